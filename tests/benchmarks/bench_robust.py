@@ -13,7 +13,7 @@ from laufruhe.load_models.built_engines import BuiltEngines, values_of
 from laufruhe.problem.tolerance import Law, Tolerances
 from laufruhe.report.grid import piped
 from laufruhe.solvers import solve
-from laufruhe.solvers.tolerances.robust import decided_values
+from laufruhe.solvers.conclusion import unbalances_of
 
 OUT = PAGES / "robust.md"
 ENGINES, PIECE = 1_000_000, 50_000
@@ -43,7 +43,7 @@ def main() -> None:
     started = time.process_time()
     result = solve(problem)
     spent = time.process_time() - started
-    built = BuiltEngines(problem, decided_values(problem, result), result.final.samples)
+    built = BuiltEngines(problem, unbalances_of(problem, result), result.final.samples)
     worst, rows = result.objective.value, []
     for how in LAWS:
         random, started, most, over = np.random.default_rng(2026), time.process_time(), 0.0, 0

@@ -19,8 +19,8 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.tolerance import Over, Tolerances
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
+from laufruhe.solvers.conclusion import unbalances_of
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.tolerances.robust import decided_values
 from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft
 
 ENGINE = (
@@ -267,7 +267,7 @@ def test_crossed(read: Callable[[str], Problem], text: str) -> None:
     found = solve(replace(problem, tolerance=1e-3))
     assert found.certificate is not None
     assert found.certificate.kind is Proof.GLOBAL
-    values = decided_values(problem, found)
+    values = unbalances_of(problem, found)
     for z in problem.tolerances.draw(np.random.default_rng(4), 200):
         own = problem.built(z)
         value = objective_value(own, evaluate(own, own.design(values), found.final.samples))
@@ -285,7 +285,7 @@ def test_what_bends_loads_is_drawn(read: Callable[[str], Problem]) -> None:
     assert "worst of 30 drawn engines" in found.objective.name
     assert "not of all" in found.certificate.method
     assert not found.robust.exact
-    values = decided_values(problem, found)
+    values = unbalances_of(problem, found)
     built = (problem.built(z) for z in problem.tolerances.draw(np.random.default_rng(1), 30))
     most = max(objective_value(own, evaluate(own, own.design(values), found.final.samples)) for own in built)
     assert most == pytest.approx(worst(found), rel=1e-9)

@@ -13,7 +13,7 @@ from laufruhe.files.complaints import Refused, one_of
 from laufruhe.files.fields import Open, Table
 from laufruhe.machine import Arms, Engine, Flywheel, Rim
 from laufruhe.physics.reduced_inertia import inertia_of_discs
-from laufruhe.problem.decision import Decision, FlywheelDrive, Kind, TorsionDrive
+from laufruhe.problem.decision import Decision, Kind, NumberDrive
 from laufruhe.problem.sets import Interval
 
 
@@ -80,7 +80,7 @@ def _decided(numbers: dict[str, tuple[str, Open]], first: int) -> list[Decision]
     found = []
     for k, (key, (unit, given)) in enumerate(numbers.items()):
         if given.is_open:
-            drive = FlywheelDrive(first + k)
+            drive = NumberDrive(Kind.FLYWHEEL, first + k)
             found.append(Decision(f"flywheel.{key}", unit, Interval(*given.bounds), given.start, (drive,)))
     return found
 
@@ -113,7 +113,7 @@ def check_told_alike(engine: Engine, table: FlywheelTable | None, decisions: Seq
         if own.kind is Kind.FLYWHEEL:
             rule = "is open, and the discs of [torsion] tell the inertia of all that turns"
             raise Refused(own.name, None, rule, "leave [flywheel] out, and open a disc")
-        if any(isinstance(drive, TorsionDrive) and (drive.part, drive.number) in discs for drive in own.drives):
+        if any(key in discs for key in own.keys(Kind.TORSION)):
             raise Refused(where, None, f"gives an inertia that follows from {own.name}, which is open", "leave it out")
     told, least = wheel.inertia, inertia_of_discs(chain, engine.slider_cranks)
     most = least + sum(absorber.inertia for absorber in chain.absorbers)

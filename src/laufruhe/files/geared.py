@@ -11,7 +11,7 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused
 from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import GearedInertia
-from laufruhe.problem.decision import Decision, ShareDrive
+from laufruhe.problem.decision import Decision, Kind, NumberDrive
 from laufruhe.problem.sets import Interval
 
 OpenShare: TypeAlias = Annotated[float | Open, f.Number("", least=0.0, most=1.0, openable=True)]
@@ -33,7 +33,7 @@ def geared_of(tables: Sequence[GearedInertiaTable]) -> tuple[tuple[GearedInertia
         share = Open.of(table.share)
         found.append(GearedInertia(table.name, table.ratio, share.start))
         if share.is_open:
-            drive = ShareDrive(table.name)
+            drive = NumberDrive(Kind.SHARE, table.name)
             decisions.append(Decision(f"{table.name}.share", "", Interval(*share.bounds), share.start, (drive,)))
     most = sum(Open.of(table.share).upper for table in tables)
     if most > 1.0 + _ROUNDING:

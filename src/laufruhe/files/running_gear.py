@@ -19,7 +19,7 @@ from laufruhe.machine import CRANKSHAFT, Bearing, Bolts, PistonPin, RunningGear,
 from laufruhe.machine.layouts import Throw
 from laufruhe.machine.running_gear import BIG_END, ROD_LENGTH, STEEL, Moving, Size, on
 from laufruhe.numerics.turns import as_turn, cis
-from laufruhe.problem.decision import Decision, SizeDrive
+from laufruhe.problem.decision import Decision, Kind, NumberDrive
 from laufruhe.problem.sets import Interval
 
 
@@ -141,7 +141,8 @@ def size_decisions(
     found = []
     for name, size, value in _opened(table, engine, bearings, built):
         if isinstance(value, Open) and value.is_open:
-            found.append(Decision(name, "m", Interval(*value.bounds), value.start, (SizeDrive(size),)))
+            drive = NumberDrive(Kind.SIZE, size)
+            found.append(Decision(name, "m", Interval(*value.bounds), value.start, (drive,)))
     if found and engine.rod is not None and isinstance(engine.rod_length, Open):
         raise Refused("engine.rod_length", None, "is open, and [engine.rod] is of one length", "fix it")
     if any(decision.name == "engine.rod_length" for decision in found):

@@ -16,7 +16,7 @@ from laufruhe.machine import CRANKSHAFT, Absorber, Disc, Section, SliderCrank, T
 from laufruhe.machine.layouts import Throw
 from laufruhe.machine.torsion import STEEL, stiffness_of
 from laufruhe.physics.reduced_inertia import reduced_inertia
-from laufruhe.problem.decision import Decision, TorsionDrive
+from laufruhe.problem.decision import Decision, Kind, NumberDrive
 from laufruhe.problem.sets import Interval
 
 T = TypeVar("T")
@@ -108,7 +108,7 @@ class _Opened:
         """The number that some parts have, or start from."""
         given = Open.of(value)
         if given.is_open:
-            drives = tuple(TorsionDrive(part, key) for part in parts)
+            drives = tuple(NumberDrive(Kind.TORSION, (part, key)) for part in parts)
             found = Decision(f"torsion.{name}.{key}", unit, Interval(*given.bounds), given.start, drives)
             self.decisions.append(found)
         return given.start

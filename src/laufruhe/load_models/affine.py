@@ -19,7 +19,7 @@ from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
 from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import added_geared_loads, added_rotor_loads, shaking_loads
 from laufruhe.problem.channels import LoadChannel
-from laufruhe.problem.decision import Decision, Domain, domains_of
+from laufruhe.problem.decision import Decision, Domain, Kind, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure, Rows, bends_of, load_rows, mass_rows
@@ -305,10 +305,10 @@ class _Change:
 def _change(problem: Problem, decision: Decision, direction: complex) -> _Change:
     by_name = {rotor.name: rotor for rotor in problem.engine.rotors}
     rotors = tuple(replace(by_name[d.rotor], unbalance=d.of(direction)) for d in decision.rotor_drives)
-    if decision.pistons and problem.fidelity.is_uneven:
+    if decision.keys(Kind.PISTON) and problem.fidelity.is_uneven:
         rule = "reciprocating masses are decided for a crank that turns evenly"
         raise ModelError(f"{rule}; leave fidelity.crank_inertia out, or fix the mass")
-    return _Change(rotors, decision.pistons, decision.shares)
+    return _Change(rotors, decision.keys(Kind.PISTON), decision.keys(Kind.SHARE))
 
 
 def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:

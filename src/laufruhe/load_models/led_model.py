@@ -18,7 +18,7 @@ from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import Spectrum, common_base
-from laufruhe.problem.decision import Decision, Kind, LeadDrive
+from laufruhe.problem.decision import Decision, Kind
 from laufruhe.problem.measure import Measure, bends_of, load_rows, selected
 from laufruhe.problem.problem import Problem
 
@@ -76,7 +76,7 @@ class LedModel:
         self.leads = tuple(d for d in problem.decisions if d.kind is Kind.LEAD)
         self.lower, self.upper = (np.array([getattr(d, side) for d in self.leads]) for side in ("lower", "upper"))
         self.start = np.array([d.start_number for d in self.leads])
-        self.names = [drive.shaft for d in self.leads for drive in d.drives if isinstance(drive, LeadDrive)]
+        self.names = [shaft for d in self.leads for shaft in d.keys(Kind.LEAD)]
         self.whole = AffineModel(_of(problem, problem.engine, problem.unbalances), True, True)
         self.domains = self.whole.domains
         self._shafts = [AffineModel(carried(problem, name.__eq__), True, True) for name in self.names]

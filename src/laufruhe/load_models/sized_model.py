@@ -21,7 +21,7 @@ from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.norms.norm import lengths
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.problem.decision import Decision, Kind, SizeDrive, domains_of
+from laufruhe.problem.decision import Decision, Kind, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
 from laufruhe.problem.measure import Measure, Rows, bends_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
@@ -104,7 +104,7 @@ class SizeModel:
         self.problem = problem
         self.sizes = tuple(d for d in problem.decisions if d.kind is Kind.SIZE)
         self.domains = domains_of(problem.unbalances)
-        self.names = [drive.size for d in self.sizes for drive in d.drives if isinstance(drive, SizeDrive)]
+        self.names = [size for d in self.sizes for size in d.keys(Kind.SIZE)]
         self.lower = np.array([d.lower for d in self.sizes])
         self.upper = np.array([d.upper for d in self.sizes])
         given = problem.engine.moving

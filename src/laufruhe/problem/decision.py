@@ -22,17 +22,12 @@ from laufruhe.problem.drives import (
     STIFFNESS,
     TURNED,
     Drive,
-    FlywheelDrive,
     Kind,
-    LeadDrive,
-    MassDrive,
     MountDrive,
+    NumberDrive,
     Numbers,
     PlaceDrive,
     RotorDrive,
-    ShareDrive,
-    SizeDrive,
-    TorsionDrive,
     mount_of,
 )
 from laufruhe.problem.sets import Set, Value
@@ -48,17 +43,13 @@ __all__ = [
     "Decision",
     "Domain",
     "Drive",
-    "FlywheelDrive",
     "Kind",
-    "LeadDrive",
-    "MassDrive",
     "MountDrive",
+    "NumberDrive",
     "Numbers",
     "PlaceDrive",
     "RotorDrive",
-    "ShareDrive",
-    "SizeDrive",
-    "TorsionDrive",
+    "columns_of",
     "domains_of",
     "mount_of",
     "moved_numbers",
@@ -120,15 +111,9 @@ class Decision:
         """Unbalances that follow."""
         return tuple(drive for drive in self.drives if isinstance(drive, RotorDrive))
 
-    @property
-    def pistons(self) -> tuple[tuple[str, str], ...]:
-        """Slider-cranks whose masses follow, and which of them."""
-        return tuple((drive.part, drive.mass) for drive in self.drives if isinstance(drive, MassDrive))
-
-    @property
-    def shares(self) -> tuple[str, ...]:
-        """Geared inertias whose shares follow."""
-        return tuple(drive.geared for drive in self.drives if isinstance(drive, ShareDrive))
+    def keys(self, kind: Kind) -> tuple[Any, ...]:
+        """Of the numbers of a kind that follow."""
+        return tuple(drive.key for drive in self.drives if isinstance(drive, NumberDrive) and drive.kind is kind)
 
     @property
     def place_drives(self) -> tuple[PlaceDrive, ...]:
@@ -215,3 +200,12 @@ def domains_of(decisions: Sequence[Decision]) -> tuple[Domain, ...]:
         out.append(Domain(decision, start))
         start += out[-1].width
     return tuple(out)
+
+
+def columns_of(domains: Sequence[Domain], values: Sequence[Value]) -> Array:
+    """Decision vector of complex unbalances, each brought into its set."""
+    out = np.zeros(sum(domain.width for domain in domains))
+    for domain, value in zip(domains, values, strict=True):
+        out[domain.columns] = domain.columns_of(value)
+        out[domain.columns] = domain.project(out)
+    return out

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, ClassVar, Protocol
 
-from laufruhe.machine import Engine, Mount, Rotor, SliderCrank
+from laufruhe.machine import Engine, Flywheel, Mount, Rotor, SliderCrank
 from laufruhe.machine.leads import led
-from laufruhe.machine.running_gear import Size
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.reduced_inertia import turned_by
 from laufruhe.physics.rigid_body import turned_axes
@@ -58,27 +57,14 @@ class Numbers:
         Of the rotors by name: x, and y and z of their shafts [m] (C2).
     mounts
         Of every spring fourteen: stiffness, loss factor, damping, position, turned angles, lag (E13).
-    flywheel, pistons
-        Inertia of the rest, mean diameter, width and height of a rim; changes of reciprocating masses by name [kg].
-    torsion
-        Of discs, sections and absorbers of the crankshaft, by their name and that of the number.
-    sizes
-        Changes of sizes of the running gear, by the same [m].
-    shares
-        Of geared inertias by name.
-    leads
-        Changes of the leads of shafts by name [rad].
+    changes
+        Of all others, by their kind and what each kind tells them apart by (`NumberDrive`).
     """
 
     unbalances: dict[str, Any] = field(default_factory=dict)
     places: dict[str, list[Any]] = field(default_factory=dict)
     mounts: list[list[Any]] = field(default_factory=list)
-    flywheel: list[Any] = field(default_factory=list)
-    pistons: dict[tuple[str, str], Any] = field(default_factory=dict)
-    torsion: dict[tuple[str, str], Any] = field(default_factory=dict)
-    sizes: dict[Size, Any] = field(default_factory=dict)
-    shares: dict[str, Any] = field(default_factory=dict)
-    leads: dict[str, Any] = field(default_factory=dict)
+    changes: dict[tuple[Kind, Any], float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, engine: Engine, mounts: Sequence[Sequence[float]] = ()) -> Numbers:
@@ -86,10 +72,12 @@ class Numbers:
         rotors = {rotor.name: rotor for rotor in engine.rotors}
         unbalances = {name: rotor.unbalance for name, rotor in rotors.items()}
         places: dict[str, list[Any]] = {name: list(rotor.place) for name, rotor in rotors.items()}
-        flywheel = list(engine.flywheel.numbers) if engine.flywheel else []
-        torsion = engine.torsion.numbers if engine.torsion else {}
-        shares: dict[str, Any] = {geared.name: geared.share for geared in engine.geared}
-        return cls(unbalances, places, [list(row) for row in mounts], flywheel, torsion=torsion, shares=shares)
+        return cls(unbalances, places, [list(row) for row in mounts])
+
+    def of_kind(self, kind: Kind, given: Mapping[Any, Any]) -> dict[Any, Any]:
+        """Numbers of a kind with their changes; some may be none that no change moves."""
+        changed = {key: change for (own, key), change in self.changes.items() if own is kind}
+        return {key: value + changed[key] if key in changed else value for key, value in given.items()}
 
     def engine(self, given: Engine) -> Engine:
         """The engine with these numbers."""
@@ -98,21 +86,27 @@ class Numbers:
         if self.mounts:
             rows = iter(self.mounts)
             mounts = tuple(mount.each(lambda spring: mount_of(spring, next(rows))) for mount in given.mounts)
-        flywheel, parts = given.flywheel.moved(self.flywheel) if given.flywheel else None, given.slider_cranks
-        torsion = given.torsion.moved(self.torsion) if given.torsion else None
-        if self.pistons:
-            parts = tuple(self._loaded(part) for part in parts)
+        shares = self.of_kind(Kind.SHARE, {geared.name: geared.share for geared in given.geared})
         # a sum of changes may leave a bound by a rounding
-        geared = tuple(replace(g, share=min(max(float(self.shares[g.name]), 0.0), 1.0)) for g in given.geared)
+        geared = tuple(replace(g, share=min(max(shares[g.name], 0.0), 1.0)) for g in given.geared)
+        kinds, parts = {kind for kind, _ in self.changes}, given.slider_cranks
+        if Kind.PISTON in kinds:
+            parts = tuple(self._loaded(part) for part in parts)
+        flywheel = given.flywheel and self.flywheel(given.flywheel)
+        torsion = given.torsion and given.torsion.moved(self.of_kind(Kind.TORSION, given.torsion.numbers))
         found = replace(
             given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel, geared=geared, torsion=torsion
         )
-        if self.sizes:
-            own = given.moving.sizes
-            found = found.resized({size: own[size] + float(self.sizes.get(size, 0.0)) for size in own})
-        if torsion is not None and (self.pistons or self.sizes):
+        if Kind.SIZE in kinds:
+            found = found.resized(self.of_kind(Kind.SIZE, given.moving.sizes))
+        if torsion is not None and kinds & {Kind.PISTON, Kind.SIZE}:
             found = replace(found, torsion=turned_by(torsion, given.slider_cranks, found.slider_cranks))
-        return led(found, self.leads) if self.leads else found
+        leads = {shaft: change for (kind, shaft), change in self.changes.items() if kind is Kind.LEAD}
+        return led(found, leads) if leads else found
+
+    def flywheel(self, given: Flywheel) -> Flywheel:
+        """The flywheel with these numbers."""
+        return given.moved(self.of_kind(Kind.FLYWHEEL, dict(enumerate(given.numbers))).values())
 
     def _turned(self, rotor: Rotor) -> Rotor:
         """With its unbalance and place."""
@@ -122,7 +116,8 @@ class Numbers:
 
     def _loaded(self, part: SliderCrank) -> SliderCrank:
         """With its masses changed."""
-        own = {mass: float(change) for (name, mass), change in self.pistons.items() if name == part.name}
+        changes = ((key, change) for (kind, key), change in self.changes.items() if kind is Kind.PISTON)
+        own = {mass: change for (name, mass), change in changes if name == part.name}
         # a sum of changes may leave a bound of zero by a rounding; what a rod lacks of inertia may be less than nothing
         least = {"rod_inertia_deficit": -math.inf}
         moved = {mass: max(getattr(part, mass) + change, least.get(mass, 0.0)) for mass, change in own.items()}
@@ -205,84 +200,25 @@ class MountDrive:
 
 
 @dataclass(frozen=True)
-class FlywheelDrive:
-    """One number of the flywheel += change."""
+class NumberDrive:
+    """A number of the engine += change.
 
-    number: int
-    kind: ClassVar[Kind] = Kind.FLYWHEEL
+    Attributes
+    ----------
+    key
+        What tells it from others of its kind: of the flywheel its place among its numbers, of a mass of a slider-crank
+        the names of both, of the running gear its size, of a lead its shaft, of a share its geared inertia, of the
+        crankshaft the names of the disc, section or absorber and of the number.
+    """
+
+    kind: Kind
+    key: Any
     acts: ClassVar[bool] = True
 
     def move(self, numbers: Numbers, change: Any) -> None:
-        """Of the flywheel."""
-        numbers.flywheel[self.number] += change
-
-
-@dataclass(frozen=True)
-class MassDrive:
-    """A mass of one slider-crank += change."""
-
-    part: str
-    mass: str = "reciprocating_mass"
-    kind: ClassVar[Kind] = Kind.PISTON
-    acts: ClassVar[bool] = True
-
-    def move(self, numbers: Numbers, change: Any) -> None:
-        """Of the slider-crank."""
-        key = self.part, self.mass
-        numbers.pistons[key] = numbers.pistons.get(key, 0.0) + change.real
-
-
-@dataclass(frozen=True)
-class SizeDrive:
-    """One size of the running gear += change."""
-
-    size: Size
-    kind: ClassVar[Kind] = Kind.SIZE
-    acts: ClassVar[bool] = True
-
-    def move(self, numbers: Numbers, change: Any) -> None:
-        """Of the size."""
-        numbers.sizes[self.size] = numbers.sizes.get(self.size, 0.0) + change.real
-
-
-@dataclass(frozen=True)
-class LeadDrive:
-    """Lead of one shaft += change."""
-
-    shaft: str
-    kind: ClassVar[Kind] = Kind.LEAD
-    acts: ClassVar[bool] = True
-
-    def move(self, numbers: Numbers, change: Any) -> None:
-        """Of the shaft."""
-        numbers.leads[self.shaft] = numbers.leads.get(self.shaft, 0.0) + float(change.real)
-
-
-@dataclass(frozen=True)
-class ShareDrive:
-    """Share of one geared inertia += change."""
-
-    geared: str
-    kind: ClassVar[Kind] = Kind.SHARE
-    acts: ClassVar[bool] = True
-
-    def move(self, numbers: Numbers, change: Any) -> None:
-        """Of the geared inertia."""
-        numbers.shares[self.geared] += change.real
-
-
-@dataclass(frozen=True)
-class TorsionDrive:
-    """One number of a disc, section or absorber of the crankshaft += change."""
-
-    part: str
-    number: str
-    kind: ClassVar[Kind] = Kind.TORSION
-    acts: ClassVar[bool] = True
-
-    def move(self, numbers: Numbers, change: Any) -> None:
-        """Of the crankshaft."""
-        numbers.torsion[self.part, self.number] += change
+        """Of the number."""
+        key = self.kind, self.key
+        numbers.changes[key] = numbers.changes.get(key, 0.0) + float(change.real)
 
 
 def mount_of(mount: Mount, numbers: Sequence[float]) -> Mount:

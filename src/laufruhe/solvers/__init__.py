@@ -11,7 +11,7 @@ from laufruhe.errors import ModelError, SolverError
 from laufruhe.load_models.run_look import asks_runs
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import Listener, listening, tell
-from laufruhe.problem.decision import Kind, LeadDrive
+from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -163,7 +163,7 @@ def _asks_led(problem: Problem) -> bool:
 
 def _shares_gas(problem: Problem) -> bool:
     """Whether gas that is felt works between two pistons, of which one may lead."""
-    names = {drive.shaft for d in problem.decisions for drive in d.drives if isinstance(drive, LeadDrive)}
+    names = {shaft for decision in problem.decisions for shaft in decision.keys(Kind.LEAD)}
     parts = problem.engine.slider_cranks
     led = (part for part in parts if part.shaft.name in names)
     return problem.feels_gas and any(part.faces(other) for part in led for other in parts if other is not part)

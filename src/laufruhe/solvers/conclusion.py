@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import itertools
 import math
 import time
@@ -237,6 +238,12 @@ def with_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
 def angle_name(decision: Decision) -> str:
     """What the angle of an open size is called."""
     return decision.name.rsplit(".", 1)[0] + ".angle"
+
+
+def unbalances_of(problem: Problem, result: Result) -> list[complex]:
+    """Complex decisions from the sizes and angles of a result."""
+    found = {decision.name: decision.value for decision in result.decisions}
+    return [cmath.rect(found[d.name], found.get(angle_name(d), d.set.angles[0])) for d in problem.unbalances]
 
 
 def decision_values(decision: Decision, value: Value, slope: Array | None = None) -> tuple[DecisionValue, ...]:

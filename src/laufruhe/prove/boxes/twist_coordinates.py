@@ -9,7 +9,7 @@ import numpy as np
 from laufruhe.machine import Section, Torsion
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.torsion import chain_of
-from laufruhe.problem.decision import Decision, TorsionDrive
+from laufruhe.problem.decision import Kind
 from laufruhe.problem.problem import Problem
 
 
@@ -26,12 +26,12 @@ class TwistCoordinates:
 
     def __init__(self, problem: Problem) -> None:
         self.problem, self._chain = problem, chain_of(problem.engine)
-        self._drives = [_drives_of(decision) for decision in problem.decisions]
+        # of every decision names of parts of the crankshaft, and of the number of each
+        self._keys: list[tuple[tuple[str, str], ...]] = [decision.keys(Kind.TORSION) for decision in problem.decisions]
         self.lower = self.of(np.array([decision.lower for decision in problem.decisions]))
         self.upper = self.of(np.array([decision.upper for decision in problem.decisions]))
         self.owners = np.array(
-            [[float(any(drive.part == s.name for drive in drives)) for s in self._chain.sections]
-             for drives in self._drives]
+            [[float(any(part == s.name for part, _ in keys)) for s in self._chain.sections] for keys in self._keys]
         )  # fmt: skip
 
     @cached_property
@@ -43,7 +43,7 @@ class TwistCoordinates:
     def _round(self) -> list[tuple[int, Section]]:
         """Coordinates of diameters, and one of the sections that has each."""
         named = {section.name: section for section in self._chain.sections}
-        return [(k, named[drives[0].part]) for k, drives in enumerate(self._drives) if drives[0].number == "diameter"]
+        return [(k, named[part]) for k, ((part, number), *_) in enumerate(self._keys) if number == "diameter"]
 
     def of(self, values: Array) -> Array:
         """Of decisions."""
@@ -70,15 +70,11 @@ class TwistCoordinates:
         """Of a box the chains of the lowest and of the highest natural frequencies; None where no corner is known."""
         absorbers = {absorber.name: absorber for absorber in self._chain.absorbers}
         falls = np.zeros(len(lower), dtype=bool)
-        for k, drives in enumerate(self._drives):
-            absorber = absorbers.get(drives[0].part)
-            free = absorber is not None and drives[0].number == "stiffness" and lower[k] == 0.0
+        for k, ((part, number), *_) in enumerate(self._keys):
+            absorber = absorbers.get(part)
+            free = absorber is not None and number == "stiffness" and lower[k] == 0.0
             # the spring of a pendulum grows with its inertia, and a ring that turns free has no frequency
-            if free or (absorber is not None and drives[0].number == "inertia" and absorber.order > 0.0):
+            if free or (absorber is not None and number == "inertia" and absorber.order > 0.0):
                 return None
-            falls[k] = drives[0].number == "inertia"
+            falls[k] = number == "inertia"
         return self.chain(np.where(falls, upper, lower)), self.chain(np.where(falls, lower, upper))
-
-
-def _drives_of(decision: Decision) -> list[TorsionDrive]:
-    return [drive for drive in decision.drives if isinstance(drive, TorsionDrive)]

@@ -57,8 +57,7 @@ class _Coordinates:
         values = x.tolist()
         if self.width is not None:
             values = [*values[: self.width], self.problem.decisions[self.width].start, *values[self.width : -1]]
-        numbers = moved_numbers(Numbers(flywheel=list(self.given.numbers)), self.problem.decisions, values)
-        wheel = self.given.moved(numbers.flywheel)
+        wheel = moved_numbers(Numbers(), self.problem.decisions, values).flywheel(self.given)
         return wheel if self.width is None else wheel.weighing(float(x[-1]))
 
     def decided(self, x: Array) -> Array:

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.solvers.conclusion import Design, judged
+from laufruhe.solvers.conclusion import Design, judged, unbalances_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
-from laufruhe.solvers.mounts.starts import unbalances_of
 from laufruhe.solvers.result import Result, Status
 
 SHARE = 0.25

@@ -6,12 +6,10 @@ but leads is open, searches from the best points of a grid find a design first.
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -28,7 +26,7 @@ from laufruhe.prove.best_first import Box, halves
 from laufruhe.prove.boxes.leads import SLACK, LeadBound, LeadBoxes
 from laufruhe.prove.certificate import Multipliers, Reach, best_bound
 from laufruhe.solvers.boxes.held_designs import SHARE, HeldDesign, HeldDesigns
-from laufruhe.solvers.boxes.search import divided
+from laufruhe.solvers.boxes.search import divided, searched
 from laufruhe.solvers.conclusion import Shown, concluded, judged, none_within
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import on_grid
@@ -36,9 +34,8 @@ from laufruhe.solvers.result import Result
 
 MOST_BOXES, MOST_PROGRAMS = 20_000, 2_000
 """Boxes of leads alone, and of those with a cone program each."""
-GRID, POLISHED = 24, 3
-"""Steps of every lead, of few at once, that searches start from, and how many of them end in one."""
-MOST_STARTS, MOST_STEPS = 600, 300
+GRID, MOST_STARTS, MOST_STEPS = 24, 600, 300
+"""Steps of a lead, and points in all, among which searches begin, and their own steps."""
 COARSE, NEAR = 4, 10.0
 """Part of the angles at which the programs of boxes stand, and the tolerances from which these stand at all."""
 LOOKS, SAME = (0.0, 0.31, 0.67), 1e-6
@@ -183,7 +180,8 @@ class _Search(HeldDesigns):
         if self.model.domains:
             found += [self.at(self.model.start), self.at(0.5 * (self.model.lower + self.model.upper))]
         else:
-            found += [HeldDesign(judged(self.problem, [float(x) for x in each])) for each in self._searched()]
+            ends = searched(self._penalised, self.model.lower, self.model.upper, GRID, MOST_STARTS, MOST_STEPS)
+            found += [HeldDesign(judged(self.problem, each.tolist())) for each in ends]
         return min(found, key=lambda each: each.design.rank)
 
     def at(self, leads: Array) -> HeldDesign:
@@ -205,26 +203,6 @@ class _Search(HeldDesigns):
 
         engine = self.problem.design([float(x) for x in leads], self.model.leads)
         return replace(self.problem, engine=engine, decisions=tuple(turned(d) for d in self.problem.unbalances))
-
-    def _searched(self) -> list[Array]:
-        """Where searches end that begin at the best points of a grid."""
-        from scipy.optimize import minimize
-
-        lower, upper = self.model.lower, self.model.upper
-        count = min(GRID, max(int(MOST_STARTS ** (1.0 / len(lower))), 2))
-        sides = [np.linspace(a, b, count) for a, b in zip(lower, upper, strict=True)]
-        points = [np.array(point) for point in itertools.product(*sides)]
-        points.sort(key=self._penalised)
-        bounds: Any = list(zip(lower, upper, strict=True))
-        found = []
-        for point in points[:POLISHED]:
-            step = 0.5 * (upper - lower) / count
-            simplex = np.clip(np.vstack([point, point + np.diag(step)]), lower, upper)
-            least = 1e-12 * max(self._penalised(point), 1e-300)
-            told: Any = {"initial_simplex": simplex, "xatol": 1e-8, "fatol": least, "maxiter": MOST_STEPS}
-            end = minimize(self._penalised, point, method="Nelder-Mead", bounds=bounds, options=told).x
-            found.append(np.clip(end, lower, upper))
-        return found
 
     def _penalised(self, leads: Array) -> float:
         """The objective, and what limits are broken by, many times over."""

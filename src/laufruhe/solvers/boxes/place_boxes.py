@@ -27,7 +27,7 @@ from laufruhe.problem.decision import Decision, Kind, RotorDrive
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Set, Value
-from laufruhe.solvers.mounts.starts import unbalances_of
+from laufruhe.solvers.conclusion import unbalances_of
 from laufruhe.solvers.result import Result
 
 

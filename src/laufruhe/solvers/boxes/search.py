@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.foresight import Foresight, foresight
 from laufruhe.prove.best_first import Division, Parts, Waiting
@@ -16,6 +18,8 @@ from laufruhe.prove.certificate import gap_of
 NEARLY = 0.99
 # boxes that may be wanted next
 AHEAD = 32
+# points of a grid from which searches begin
+POLISHED = 3
 
 
 class Box(Protocol):
@@ -135,3 +139,23 @@ def _parted(step: tuple[Any, Any, float]) -> tuple[Iterable[tuple[Any, Any]], tu
     search, box, value = step
     parts = search.parts(box, value)
     return (list(parts) if search.is_shared else parts), search.conflict
+
+
+def searched(
+    penalised: Callable[[Array], float], lower: Array, upper: Array, steps: int, most: int, most_steps: int
+) -> list[Array]:
+    """Where simplex searches end that begin at the best points of a grid, of so many steps a side and points in all."""
+    from scipy.optimize import minimize
+
+    count = min(steps, max(int(most ** (1.0 / len(lower))), 2))
+    sides = [np.linspace(a, b, count) for a, b in zip(lower, upper, strict=True)]
+    points = sorted((np.array(point) for point in itertools.product(*sides)), key=penalised)
+    bounds: Any = list(zip(lower, upper, strict=True))
+    found = []
+    for point in points[:POLISHED]:
+        simplex = np.clip(np.vstack([point, point + np.diag(0.5 * (upper - lower) / count)]), lower, upper)
+        least = 1e-12 * max(penalised(point), 1e-300)
+        told: Any = {"initial_simplex": simplex, "xatol": 1e-8, "fatol": least, "maxiter": most_steps}
+        end = minimize(penalised, point, method="Nelder-Mead", bounds=bounds, options=told).x
+        found.append(np.clip(end, lower, upper))
+    return found

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
-from typing import Any
 
 import numpy as np
 
@@ -17,12 +15,13 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import divide
 from laufruhe.prove.boxes.shared_gas import SharedGasBoxes
 from laufruhe.prove.certificate import Reach
+from laufruhe.solvers.boxes.search import searched
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, better, concluded, judged, none_within
 from laufruhe.solvers.result import Result
 
 MOST_BOXES = 20_000
-GRID, MOST_STARTS, POLISHED, MOST_STEPS = 48, 400, 3, 80
-"""Steps of a lead, and designs in all, among which searches begin; how many of them, and their steps."""
+GRID, MOST_STARTS, MOST_STEPS = 48, 400, 80
+"""Steps of a lead, and designs in all, among which searches begin, and their own steps."""
 SHARE = 0.5
 """Of the tolerance, by which no design is better where boxes end."""
 
@@ -46,7 +45,6 @@ def solve_shared_leads(problem: Problem) -> Result:
 
 def _best(problem: Problem, lower: Array, upper: Array) -> Design | None:
     """Of a grid, and where searches from its best points end."""
-    from scipy.optimize import minimize
 
     def design(leads: Array) -> Design | None:
         try:
@@ -58,13 +56,8 @@ def _best(problem: Problem, lower: Array, upper: Array) -> Design | None:
         found = design(leads)
         return math.inf if found is None else found.value * (1.0 + 1e3 * max(found.excess, 0.0))
 
-    count = min(GRID, max(int(MOST_STARTS ** (1.0 / len(lower))), 2))
-    sides = [np.linspace(a, b, count) for a, b in zip(lower, upper, strict=True)]
-    points = sorted((np.array(point) for point in itertools.product(*sides)), key=penalised)
+    found = (design(end) for end in searched(penalised, lower, upper, GRID, MOST_STARTS, MOST_STEPS))
     best = design(np.array([d.start_number for d in problem.decisions]))
-    for point in points[:POLISHED]:
-        simplex = np.clip(np.vstack([point, point + np.diag(0.5 * (upper - lower) / count)]), lower, upper)
-        told: Any = {"initial_simplex": simplex, "xatol": 1e-8, "fatol": 0.0, "maxiter": MOST_STEPS}
-        end = design(minimize(penalised, point, method="Nelder-Mead", options=told).x)
+    for end in found:
         best = best if end is None else better(end, best)
     return best

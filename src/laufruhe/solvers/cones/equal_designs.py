@@ -14,9 +14,8 @@ from laufruhe.numerics.budget import passed
 from laufruhe.numerics.norms import MEAN, Grid
 from laufruhe.problem.decision import Domain
 from laufruhe.problem.measure import Limit
-from laufruhe.solvers.conclusion import FEASIBLE
+from laufruhe.solvers.conclusion import FEASIBLE, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.mounts.starts import unbalances_of
 from laufruhe.solvers.result import DecisionRange, Result
 
 MOST_OPEN = 16

@@ -21,10 +21,9 @@ from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.conclusion import none_within, with_limits
+from laufruhe.solvers.conclusion import none_within, unbalances_of, with_limits
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import conflict_of
-from laufruhe.solvers.mounts.starts import unbalances_of
 from laufruhe.solvers.result import Result, Status
 
 _ROUNDS, _COARSE, _AGAIN = 40, 48, 4

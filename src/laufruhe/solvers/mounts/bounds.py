@@ -14,9 +14,8 @@ from laufruhe.prove.best_first import NEARLY, Divided
 from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.prove.mounts.subdivision import divided_bound, divides
 from laufruhe.prove.springs.proof import spring_bound
-from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.conclusion import KEPT, unbalances_of
 from laufruhe.solvers.mounts.search import MountSearch
-from laufruhe.solvers.mounts.starts import unbalances_of
 from laufruhe.solvers.result import Result
 
 MOST_DIVISIONS = 3

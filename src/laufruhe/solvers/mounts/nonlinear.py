@@ -12,9 +12,9 @@ import numpy as np
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem import channels
-from laufruhe.problem.decision import domains_of
+from laufruhe.problem.decision import columns_of, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
-from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
@@ -23,12 +23,12 @@ from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach, gap_of
 from laufruhe.prove.mounts.subdivision import divided_bound
 from laufruhe.prove.mounts.transmitted import transmitted_bound
-from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, none_within
+from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, none_within, unbalances_of
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_unbalances
+from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.mounts.bounds import divided_by
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mounts.search import Found, MountSearch, judged_at
-from laufruhe.solvers.mounts.starts import columns_of, unbalances_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct
 from laufruhe.solvers.smooth.program import SmoothProgram
@@ -230,12 +230,11 @@ def _none(
 
 def _ruled_out(problem: Problem) -> tuple[str, ...]:
     """Limits that no box keeps together, each needed for that."""
-    kept = problem.limits
-    for limit in problem.limits:
-        fewer = tuple(other for other in kept if other is not limit)
-        if fewer and divided_bound(replace(problem, limits=fewer), math.inf, math.inf).bound == math.inf:
-            kept = fewer
-    return tuple(limit.name for limit in kept)
+
+    def excluded(kept: Sequence[Limit]) -> bool:
+        return bool(kept) and divided_bound(replace(problem, limits=tuple(kept)), math.inf, math.inf).bound == math.inf
+
+    return smallest_conflict(problem.limits, excluded)
 
 
 def _broken(joint: SmoothProgram, optimum: LocalOptimum) -> str:

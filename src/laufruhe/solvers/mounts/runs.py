@@ -9,14 +9,13 @@ from dataclasses import replace
 
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.decision import domains_of
+from laufruhe.problem.decision import columns_of, domains_of
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach
-from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, none_within
+from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, none_within, unbalances_of
 from laufruhe.solvers.mounts.search import NEAR, Found, MountSearch
-from laufruhe.solvers.mounts.starts import columns_of, unbalances_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct
 

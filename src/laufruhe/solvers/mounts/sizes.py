@@ -14,7 +14,7 @@ import numpy as np
 
 from laufruhe.load_models.sized_model import SizeModel
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.decision import Decision, Drive, MassDrive, RotorDrive
+from laufruhe.problem.decision import Decision, Drive, Kind, NumberDrive, RotorDrive
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.nothing import nothing_of
@@ -105,7 +105,7 @@ def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> 
     engine = model.with_masses(middle)
     ways = engine.gear.throws if engine.gear is not None else ()
     drives: list[tuple[Drive, ...]] = [
-        *(tuple(MassDrive(part.name, mass) for part in engine.slider_cranks) for mass in MASSES),
+        *(tuple(NumberDrive(Kind.PISTON, (part.name, mass)) for part in engine.slider_cranks) for mass in MASSES),
         tuple(RotorDrive(name, way) for name, way in ways),
     ]
     moving = [k for k in range(len(half)) if half[k] > 0.0]

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import cmath
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,13 +11,12 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.run_look import RunLook, asks_runs
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time, left, limited
-from laufruhe.problem.decision import Domain, domains_of
+from laufruhe.problem.decision import columns_of, domains_of
 from laufruhe.problem.evaluation import Evaluation, objective_value, remounted
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.sets import Value
+from laufruhe.solvers.conclusion import unbalances_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
-from laufruhe.solvers.result import Result
 
 # starts at most for each open number, and candidates for each start: so many cost about as much as its search
 STARTS = 4
@@ -120,22 +117,3 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, count: int, w
     given_value = math.inf if initial.resonance else objective_value(problem, initial)
     least = min((float(v) for v in (*known, given_value) if 0.0 < v < math.inf), default=1.0)
     return pool[chosen], least
-
-
-def columns_of(domains: Sequence[Domain], values: Sequence[Value]) -> Array:
-    """Decision vector of complex unbalances, each brought into its set."""
-    out = np.zeros(sum(domain.width for domain in domains))
-    for domain, value in zip(domains, values, strict=True):
-        out[domain.columns] = domain.columns_of(value)
-        out[domain.columns] = domain.project(out)
-    return out
-
-
-def unbalances_of(problem: Problem, result: Result) -> list[complex]:
-    """Complex decisions from the sizes and angles of a result."""
-    found = {decision.name: decision.value for decision in result.decisions}
-    values = []
-    for decision in problem.unbalances:
-        angle = found.get(decision.name.rsplit(".", 1)[0] + ".angle", decision.set.angles[0])
-        values.append(cmath.rect(found[decision.name], angle))
-    return values

@@ -9,13 +9,12 @@ import time
 from dataclasses import replace
 
 from laufruhe.errors import ModelError
-from laufruhe.problem.phasing import Candidate
-from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers.boxes.sizes import solve_sizes
 from laufruhe.solvers.conclusion import no_star
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.phasing import Star, by_each_order
+from laufruhe.solvers.stars.phasing import by_each_order, every_star
 from laufruhe.solvers.throws.starts import none_fires
 
 MOST_STARS = 60
@@ -37,21 +36,11 @@ def solve_star_sizes(problem: Problem) -> Result:
     if phasing.continuous or phasing.throw_bounds is not None:
         rule = "sizes are decided with even firing or with throws that are given"
         raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out, or fix the sizes")
-    stars = _stars(phasing)
+    if phasing.throws is None and sum(family.size for family in families_of(phasing)[0]) > MOST_STARS:
+        many = f"more than {MOST_STARS} stars are open together with sizes"
+        raise ModelError(f"{many}; fix the firing order or the sizes")
+    stars = every_star(phasing)
     if not stars:
         return no_star(problem, none_fires(phasing)[0])
     found = by_each_order(problem, phasing, stars, solve_sizes)
     return replace(found, timing={**found.timing, "phasing": time.perf_counter() - started})
-
-
-def _stars(phasing: Phasing) -> list[Star]:
-    """Of every geometry, no more than are worth deciding one by one."""
-    if phasing.throws is not None:
-        return [(Candidate(phasing.throws, None, *phasing.least_geometry), None)]
-    families, _ = families_of(phasing)
-    if sum(family.size for family in families) > MOST_STARS:
-        raise ModelError(
-            f"more than {MOST_STARS} stars are open together with sizes; fix the firing order or the sizes"
-        )
-    pairs = [(family, tuple(map(int, star))) for family in families for star in family.stars]
-    return [(replace(family.candidate(phasing, steps), firing_order=None), steps) for family, steps in pairs]

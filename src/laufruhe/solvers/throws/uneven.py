@@ -20,6 +20,7 @@ from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.numerics.progress import tell
+from laufruhe.problem.decision import columns_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side, Term
 from laufruhe.problem.nothing import nothing_of
@@ -27,8 +28,7 @@ from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified
 from laufruhe.prove.throws.uneven import steady_bound, uneven_bound
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, no_star, with_star
-from laufruhe.solvers.mounts.starts import columns_of, unbalances_of
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, no_star, unbalances_of, with_star
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.nonlinear import solve_nonlinear
 from laufruhe.solvers.smooth.program import TURN, SmoothProgram

@@ -7,7 +7,6 @@ meets what no engine exceeds (R8).
 
 from __future__ import annotations
 
-import cmath
 import math
 import time
 from collections.abc import Callable, Sequence
@@ -30,7 +29,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.problem.tolerance import Over
 from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, angle_name, judged, none_within
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, judged, none_within, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import conflict_of, tightened
 from laufruhe.solvers.result import Result
@@ -128,7 +127,7 @@ def solve_robust(problem: Problem, solve: Solve) -> Result:
     if (drawing.certificate is None and problem.decisions) or not acting.each:
         return replace(drawing, problem=problem)
     problem = replace(problem, tolerances=acting, fidelity=drawing.problem.fidelity)
-    start = decided_values(problem, drawing)
+    start = tuple(unbalances_of(problem, drawing))
     tell("worst errors of the drawing")
     seeker, found = _found(problem, over, start, drawing)
     if found.conflict:
@@ -182,16 +181,6 @@ def _check(problem: Problem) -> None:
         raise ModelError("[robust] minimises nothing; add [objective]")
     if problem.over is not None and problem.over.share is not None and any(m.measure.is_load for m in problem.limits):
         raise ModelError('limits of loads are kept in the worst case only; take over = "worst case", or leave them out')
-
-
-def decided_values(problem: Problem, result: Result) -> tuple[Value, ...]:
-    """Decisions of a result, complex (C4)."""
-    sizes = {entry.name: entry.value for entry in result.decisions}
-    values: list[Value] = []
-    for decision in problem.decisions:
-        turned = sizes[angle_name(decision)] if decision.set.width > 1 else decision.set.angles[0]
-        values.append(sizes[decision.name] * cmath.exp(1j * turned))
-    return tuple(values)
 
 
 def _method(problem: Problem, found: Least) -> str:
