@@ -64,6 +64,7 @@ def test_init_with_nobody_to_ask_says_what_to_do(here: Path) -> None:
         ("\nMy twin\nvee\n\n2\n60\n\n\n\n\n\n0.4 kg\n", 2),
         ("\nMy six\nvee\n\n6\n60\n60\n1-6-3-5-2-4\n\n\n\n\n\n", 6),
         ("\nMy single\n\n\n1\n\n\n\n\n", 1),
+        ("\nMy ten\nvee\n\n10\n\n\n-\n0, 144, 216, 288, 72\n-\n\n\n\n\n\n", 10),
     ],
 )
 def test_init_asks(here: Path, monkeypatch: pytest.MonkeyPatch, typed: str, cylinders: int) -> None:
@@ -71,6 +72,43 @@ def test_init_asks(here: Path, monkeypatch: pytest.MonkeyPatch, typed: str, cyli
     found = run.invoke(app, ["init"], input=typed)
     assert found.exit_code == 0, found.output
     assert len(load(here / "problem.toml").engine.cylinders) == cylinders
+
+
+@pytest.mark.parametrize(
+    ("typed", "said", "count"),
+    [
+        # an odd number of cylinders in two banks, then an even one
+        ("\n\nboxer\n\n5\n4\n\n\n\n\n\n\n\n", "a boxer needs an even number of cylinders", 4),
+        # no even firing of ten cylinders at 90 degrees, nothing in its place, then throws and an order that they allow
+        ("\n\nvee\n\n10\n\n\n1-10-5-7-2-8-3-9-4-6\n\n\n45, 117, 333, 189, 261\n1-2-3-4-5-6-7-8-9-10\n\n\n\n\n\n\n",
+         "cannot be even with these pins and banks", 10),
+        ("\n\nw\n\n\n\n\n\n\n\n\n\n", "is none of these; use one of", 4),
+        ("bmw-b49\n\n\n\n\n\n\n\n\n\n\n\n", "did you mean 'bmw-b48'?", 4),
+        ("\n\n\n\nfive\n3\n1-2\n\n\n\n\n\n\n", "must be a whole number", 3),
+        ("\n\n\n\n\n\n\n\n1,5 mm\n\n1.2\n\n\n", 'write "1.5 mm"', 4),
+        ("\n\n\n\n\n\n\n\n\n1.2\n\n\n", "does not let the crank turn", 4),
+    ],
+)  # fmt: skip
+def test_a_mistake_is_told_and_asked_again(
+    here: Path, monkeypatch: pytest.MonkeyPatch, typed: str, said: str, count: int
+) -> None:
+    monkeypatch.setattr("laufruhe.cli.begin._someone_answers", lambda: True)
+    found = run.invoke(app, ["init"], input=typed)
+    assert found.exit_code == 0, found.output
+    assert said in found.output
+    assert "draft" not in found.output
+    assert len(load(here / "problem.toml").engine.cylinders) == count
+
+
+def test_nothing_is_asked_for_a_file_that_is_there(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("laufruhe.cli.begin._someone_answers", lambda: True)
+    (here / "problem.toml").write_text("mine", encoding="utf-8")
+    found = run.invoke(app, ["init"])
+    assert (found.exit_code, found.output.count("\n")) == (2, 1)
+
+
+def test_what_begins_as_a_study_is_run_as_one(here: Path) -> None:
+    assert "laufruhe study mine.toml" in run.invoke(app, ["init", "mine.toml", "--from", "tractor-sweeps"]).output
 
 
 def test_copies_bring_what_they_refer_to(here: Path) -> None:

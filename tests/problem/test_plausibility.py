@@ -42,6 +42,7 @@ def test_a_usual_engine_raises_none() -> None:
     ("old", "new", "said"),
     [
         ("0.6 kg", "450 kg", "reciprocating mass = 450 kg: is that of no usual piston"),
+        ("0.6 kg", "0 kg", "reciprocating mass = 0 kg: makes no inertia force"),
         ("0.6 kg", "0.6 g", "reciprocating mass = 0.0006 kg"),
         ("3000 rpm", "5e6 rpm", "makes a mean piston speed of 1.5e+04 m/s"),
         ("0.28", "0.6", "rod length = 75 mm: is 1.67 crank radii"),
@@ -53,6 +54,22 @@ def test_what_is_out_of_the_usual_is_told_with_what_to_check(old: str, new: str,
     found = [doubt for doubt in doubted(old, new) if said in doubt]
     assert len(found) == 1
     assert "; check" in found[0]
+
+
+@pytest.mark.parametrize("told", ["", "firing_order = [1, 10, 5, 7, 2, 8, 3, 9, 4, 6]", "fires_together = true"])
+def test_throws_without_a_firing_order_are_asked_about(told: str) -> None:
+    """A V10 whose throws leave every cylinder at its first dead centre: all fire in one turn of two."""
+    vee = 'layout = "vee"\nbank_angle = 90\ncylinder_spacing = "98 mm"'
+    engine = SINGLE.replace('layout = "inline"', vee).replace(
+        "throws = [0]", f"throws = [45, 117, 333, 189, 261]\n{told}"
+    )
+    found = [str(doubt) for doubt in load(engine).doubts]
+    assert found == ([] if told else [found[0]])
+    assert told or found[0].startswith("firing: is of all 10 cylinders within one turn of two; give a firing order")
+
+
+def test_twins_that_fire_within_one_turn_are_usual() -> None:
+    assert doubted("throws = [0]", 'throws = [0, 180]\ncylinder_spacing = "98 mm"') == []
 
 
 def test_engines_that_were_built_raise_none() -> None:

@@ -81,9 +81,9 @@ def engines(
 ) -> None:
     """List the engines of the catalogue, or show the figures of some of them."""
     with exit_statuses(Path("laufruhe")):
-        from laufruhe.cli.begin import catalogue, described
+        from laufruhe.cli.begin import catalogue, shown
 
-        typer.echo(described(names) if names else catalogue(), nl=False)
+        typer.echo(shown(names) if names else catalogue(), nl=False)
 
 
 @app.command(

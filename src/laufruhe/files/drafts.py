@@ -70,13 +70,19 @@ class _Excitation:
 def draft_of_engine(name: str) -> str:
     """A problem about an engine of the catalogue; `Refused` where there is none of that name."""
     found = engine_named(name, "engine")
-    return _draft(found.name, _catalogue_table(found), found.engine)
+    return _draft(found.name, _catalogue_table(found), engine_of_table(found.name, found.engine, Path(name)))
 
 
-def draft_of_table(title: str, engine: Mapping[str, Any]) -> str:
-    """A problem about an engine that is described; `InputError` where it cannot be."""
+def draft_of_table(title: str, engine: Mapping[str, Any], path: Path) -> str:
+    """A problem about an engine that is described; `InputError`, which names the file, where it cannot be."""
     lines = "\n".join(f"{key} = {toml_value(value)}" for key, value in engine.items())
-    return _draft(title, f"\n[engine]\n{lines}\n", engine)
+    return _draft(title, f"\n[engine]\n{lines}\n", engine_of_table(title, engine, path))
+
+
+def engine_of_table(title: str, engine: Mapping[str, Any], path: Path) -> Engine:
+    """The engine that a table describes; `InputError`, which names the file, where it cannot be."""
+    tables = {"title": title, "engine": dict(engine), "operating_points": [{"speed": SPEED}]}
+    return load_tables(tables, path).engine
 
 
 def _catalogue_table(found: CatalogueEngine) -> str:
@@ -92,9 +98,7 @@ def _catalogue_table(found: CatalogueEngine) -> str:
     ])  # fmt: skip
 
 
-def _draft(title: str, engine: str, table: Mapping[str, Any]) -> str:
-    tables = {"title": title, "engine": dict(table), "operating_points": [{"speed": SPEED}]}
-    built = load_tables(tables, Path("draft.toml")).engine
+def _draft(title: str, engine: str, built: Engine) -> str:
     half = max(abs(part.x) for part in built.slider_cranks) + _OVERHANG
     places = [(x, y) for x in (half, -half) for y in (_ASIDE, -_ASIDE)]
     mounts = "\n".join(f'    ["{1e3 * x:g} mm", "{1e3 * y:g} mm", "0 mm"],' for x, y in places)

@@ -22,6 +22,8 @@ FLATTEST, LONGEST = 0.25, 5.0
 """Stroke over bore."""
 MOST_UNBALANCE = 20.0
 """Of one weight, over that of all pistons and pins at their crank radius."""
+_PAIR = 2
+"""Cylinders that may fire within one turn of two: twins with throws at 180 degrees do."""
 MOST_SAG, LEAST_SAG = 0.1, 1e-6
 """Of a block on its mounts [m]: soft mounts give about 10 mm."""
 
@@ -63,7 +65,10 @@ def _of_pistons(engine: Engine) -> Iterator[Complaint]:
     for part in engine.slider_cranks:
         bore, stroke = part.bore or 2.0 * part.crank_radius, 2.0 * part.crank_radius
         usual = math.pi / 4.0 * bore**2 * stroke
-        if usual > 0.0 and part.reciprocating_mass and not LIGHTEST < part.reciprocating_mass / usual < HEAVIEST:
+        if not part.reciprocating_mass and part.has_rod:
+            rule = "makes no inertia force, so nothing of the pistons shakes the block"
+            yield Complaint("reciprocating mass", shown(0.0, "kg"), rule, "check it")
+        elif usual > 0.0 and part.reciprocating_mass and not LIGHTEST < part.reciprocating_mass / usual < HEAVIEST:
             # 1000 kg a cubic metre is what pistons of usual engines have
             rule = f"is that of no usual piston: one that sweeps {1e6 * usual:.4g} cm^3 has about {1e3 * usual:.2g} kg"
             yield Complaint("reciprocating mass", shown(part.reciprocating_mass, "kg"), rule, "check its unit")
@@ -95,6 +100,10 @@ def _of_mounts(engine: Engine) -> Iterator[Complaint]:
 
 def _fired_together(engine: Engine) -> Iterator[Complaint]:
     groups = [f"{', '.join(names[:-1])} and {names[-1]}" for names in together(engine)]
+    remedy = "give a firing order, or write fires_together = true in [engine] if that is meant"
     if groups:
-        remedy = "give a firing order, or write fires_together = true in [engine] if that is meant"
         yield Complaint("firing", "", f"is at once in {'; in '.join(groups)}", remedy)
+    fires = sorted(part.firing_angle for part in engine.cylinders)
+    if len(fires) > _PAIR and fires[-1] - fires[0] < math.tau <= engine.cycle.angle - math.tau:
+        rule = f"is of all {len(fires)} cylinders within one turn of two"
+        yield Complaint("firing", "", rule, remedy)

@@ -1,0 +1,153 @@
+"""Questions about an engine of the user's own: each answer is tried before the next question is asked."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import typer
+
+from laufruhe.errors import Complaint, InputError
+from laufruhe.files.catalogue import engines
+from laufruhe.files.catalogue import shown as written
+from laufruhe.files.complaints import nearest
+from laufruhe.files.drafts import engine_of_table
+from laufruhe.machine.layouts import LAYOUTS
+
+Answers: TypeAlias = Mapping[str, Any]
+_LAYOUTS = ("inline", "vee", "boxer")
+# of answers that are lists, which may be empty
+_SEPARATORS = {"firing_order": r"[-,;\s]+", "throws": r"[,;\s]+"}
+
+
+@dataclass(frozen=True)
+class _Question:
+    """One key of [engine].
+
+    Attributes
+    ----------
+    usual
+        Answer that Enter alone gives.
+    among
+        All answers there are, where they are few.
+    """
+
+    key: str
+    words: str
+    usual: str = ""
+    among: tuple[str, ...] = ()
+
+
+_QUESTIONS = (
+    _Question("layout", "Layout", "inline", among=_LAYOUTS),
+    _Question("cycle", "Cycle", "four-stroke", among=("four-stroke", "two-stroke")),
+    _Question("cylinders", "Cylinders", "4"),
+    _Question("bank_angle", "Angle between the banks [deg]", "90"),
+    _Question("split_pin_angle", "Split pins: angle by which the right bank's pin leads [deg]", "0"),
+    _Question("bank_stagger", "Distance between opposed cylinders along the crank", "40 mm"),
+    _Question("firing_order", "Firing order, or - to give the throws in its place"),
+    _Question("throws", "Angles of the throws from front to rear [deg], as in 0, 180, 180, 0"),
+    _Question("firing_order", "Firing order of these throws, or - for each cylinder at its first dead centre"),
+    _Question("bore", "Bore", "80 mm"),
+    _Question("stroke", "Stroke", "80 mm"),
+    _Question("cylinder_spacing", "Distance between cylinders of a bank", "90 mm"),
+    _Question("rod_ratio", "Crank radius over rod length", "0.3"),
+    _Question("reciprocating_mass", "Reciprocating mass of a cylinder", "0.5 kg"),
+)
+
+
+def described() -> tuple[str, dict[str, Any]]:
+    """Title and [engine] of an engine that the user describes."""
+    title: str = asked("Title", "My engine", str)
+    answers: dict[str, Any] = {}
+    for question in _QUESTIONS:
+        if _is_asked(question.key, answers):
+            words = f"{question.words} ({', '.join(question.among)})" if question.among else question.words
+            usual = _order(answers) if question.key == "firing_order" else question.usual
+            answers[question.key] = asked(words, usual, partial(_tried, question, dict(answers)))
+    return title, {key: value for key, value in answers.items() if value != []}
+
+
+def asked(words: str, usual: str, read: Callable[[str], Any]) -> Any:
+    """What `read` makes of an answer; asked again, with what was wrong, where it raises `InputError`."""
+
+    def typed(text: str) -> Any:
+        if not text.isprintable():
+            raise typer.BadParameter("holds a character that is not printed; type it once more")
+        try:
+            return read(text.strip())
+        except InputError as error:
+            first = error.complaints[0]
+            raise typer.BadParameter("; ".join(filter(None, (first.rule, first.remedy)))) from None
+
+    return typer.prompt(words, default=usual, show_default=bool(usual), value_proc=typed)
+
+
+def _is_asked(key: str, answers: Answers) -> bool:
+    """Whether a key means anything for what is described so far."""
+    count = answers.get("cylinders")
+    if not isinstance(count, int):
+        return True
+    kind = LAYOUTS[answers["layout"]]
+    several = count > kind.cylinders_per_throw
+    unordered = answers.get("firing_order") == []
+    return {
+        "bank_angle": kind.takes(key),
+        "split_pin_angle": kind.takes(key),
+        # banks on common throws may stand in one plane
+        "bank_stagger": kind.takes(key) and kind.cylinders_per_throw == 1,
+        "firing_order": several and ("firing_order" not in answers or (unordered and "throws" in answers)),
+        "throws": several and unordered,
+        "cylinder_spacing": count > 1,
+    }.get(key, True)
+
+
+def _tried(question: _Question, before: Answers, text: str) -> Any:
+    """An answer as a file has it; `InputError` where no engine has it beside those before."""
+    if question.among and text not in question.among:
+        complaint = Complaint(question.key, text, "is none of these", nearest(text, question.among))
+        raise InputError("laufruhe", (complaint,))
+    between = _SEPARATORS.get(question.key)
+    value = _value(text) if between is None else [_value(part) for part in re.split(between, text) if part]
+    _try({**before, question.key: value})
+    return value
+
+
+def _value(text: str) -> int | float | str:
+    """A number where it is one."""
+    for read in (int, float):
+        with suppress(ValueError):
+            return read(text)
+    return text
+
+
+def _try(answers: Answers) -> None:
+    """`InputError` where one of the answers cannot be, all that is not yet answered as usual."""
+    table = dict(answers)
+    for question in _QUESTIONS:
+        if question.usual and question.key not in table and _is_asked(question.key, table):
+            table[question.key] = _value(question.usual)
+    try:
+        engine_of_table("an engine", {key: value for key, value in table.items() if value != []}, Path("laufruhe"))
+    except InputError as error:
+        # what is missing may be answered later
+        later = {f"engine.{question.key}" for question in _QUESTIONS if question.key not in answers}
+        blamed = [one for one in error.complaints if one.where not in later]
+        if blamed:
+            raise InputError(error.source, tuple(blamed)) from None
+
+
+def _order(answers: Answers) -> str:
+    """Firing order of an engine of the catalogue that can be that of this one; empty where there is none."""
+    for one in engines().values():
+        order = one.engine.get("firing_order", ())
+        if one.engine["layout"] == answers["layout"] and len(order) == answers["cylinders"]:
+            with suppress(InputError):
+                _try({**answers, "firing_order": order})
+                return written(order)
+    return ""
