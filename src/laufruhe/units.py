@@ -70,7 +70,7 @@ def _factor(unit: str, wanted: str) -> float:
     if wanted == "Hz" and "Hz" not in unit:
         # radians have no dimension, so rpm would be taken for a frequency 2 pi too high
         raise UnitError(f"'{unit}' is no frequency in Hz; {advice(wanted)}")
-    other = UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {advice(wanted)}")
+    other = UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {_in_units(wanted)}")
     if wanted in COMMON and unit in _COMMON_UNITS:
         if unit not in COMMON[wanted]:
             raise other
@@ -90,7 +90,7 @@ def _by_registry(unit: str, wanted: str, other: UnitError) -> float:
         # the registry and the tokenizer below it raise a dozen kinds for what is no unit
         if type(error).__name__ == "DimensionalityError":
             raise other from None
-        raise UnitError(f"unit '{unit}' is not known; {advice(wanted)}") from None
+        raise UnitError(f"unit '{unit}' is not known; {_in_units(wanted)}") from None
     if (_TURNING.search(str(parsed)) is not None) != (wanted in _OF_ANGLES):
         # a radian has no dimension, so 50 Hz would pass for 50 rad/s and 15 deg for a ratio
         raise other
@@ -137,6 +137,15 @@ def example(unit: str) -> str:
 def advice(unit: str) -> str:
     """How to write a value of this dimension."""
     return f'write for example "{example(unit)}"'
+
+
+def usual(unit: str) -> str:
+    """Units that values of this dimension are mostly written in; others may do as well."""
+    return ", ".join(COMMON.get(unit) or [example(unit).partition(" ")[2]])
+
+
+def _in_units(unit: str) -> str:
+    return f"{advice(unit)}, in {usual(unit)} ..." if unit else advice(unit)
 
 
 def parse(text: str, unit: str) -> float:

@@ -67,6 +67,23 @@ def test_quiet_and_verbose_contradict_each_other(here: Path) -> None:
     assert "-q: is given beside -v" in found.output
 
 
+def test_loudness_may_stand_before_the_command(here: Path) -> None:
+    assert run.invoke(app, ["-q", "check", str(SINGLE)]).output == ""
+    assert "reading the problem" in run.invoke(app, ["-v", "evaluate", str(SINGLE), "--no-plots"]).stderr
+    # and holds for that command alone
+    assert "ok: " in run.invoke(app, ["check", str(SINGLE)]).output
+
+
+def test_other_options_before_the_command_are_told_where_they_stand(here: Path) -> None:
+    found = run.invoke(app, ["--json", "found.json", "check", str(SINGLE)])
+    assert (found.exit_code, list(here.iterdir())) == (2, [])
+    assert (
+        found.output
+        == "laufruhe: --json: stands behind the command; write it there, as in: laufruhe check ... --json\n"
+    )
+    assert "No such option" in run.invoke(app, ["--nothing", "check", str(SINGLE)]).output
+
+
 @pytest.mark.parametrize("command", ["check", "evaluate"])
 def test_a_problem_may_come_from_standard_input(here: Path, command: str) -> None:
     reader._typed.cache_clear()

@@ -242,13 +242,16 @@ BAD = [
     bad("no spacing", "cylinder_spacing = \"125 mm\"\n", "",
         "engine.cylinder_spacing: is missing; add it"),
     bad("no TOML", "title =", "title",
-        "file: is no TOML: Expected '=' after a key in a key/value pair (at line 2"),
+        "line 2, column 7: is no TOML: no = follows the key; write key = value"),
     bad("no end of text", 'title = "Four', "title = \"Four\ntitle = \"",
-        "file: is no TOML: "),
+        "line 2, column 14: is no TOML: the text is not closed"),
     bad("long number", "0.26", "9" * 5000,
         "file: holds a whole number of thousands of digits; write it shorter"),
     bad("key given twice", "layout =", "cycle =",
-        "file: is no TOML: Cannot overwrite a value"),
+        "line 5, column 22: is no TOML: cycle is given twice, before in line 4; keep one of them"),
+    bad("limit given twice", "[[constraints]]", (
+        '[[constraints]]\nlimit = "balancer mass"\nmax = "5 kg"\n[[constraints]]'
+        ), "constraints[2].max: limits 'balancer mass' once more, beside constraints[1] ('balancer mass')"),
 ]  # fmt: skip
 
 
@@ -437,8 +440,13 @@ class TestTrace:
     @pytest.mark.parametrize(
         ("key", "unit", "said"),
         [
-            ("angle_unit", "bar", """gas.angle_unit = "bar": 'bar' is not a unit of an angle; write"""),
-            ("pressure_unit", "deg", """gas.pressure_unit = "deg": 'deg' is not a unit of a pressure; write"""),
+            ("angle_unit", "bar", """gas.angle_unit = "bar": 'bar' is not a unit of an angle; use rad, deg ..."""),
+            (
+                "pressure_unit",
+                "deg",
+                """gas.pressure_unit = "deg": 'deg' is not a unit of a pressure; use Pa, bar, kp/cm^2 ...""",
+            ),
+            ("pressure_unit", "x", """gas.pressure_unit = "x": unit 'x' is not known; use Pa, bar, kp/cm^2 ..."""),
         ],
     )
     def test_units_of_another_dimension(self, key: str, unit: str, said: str, tmp_path: Path) -> None:

@@ -89,7 +89,7 @@ def test_a_decimal_comma_is_known_from_a_list(text: str, is_one: bool) -> None:
 
 def test_a_number_without_quotes_is_told_from_other_toml() -> None:
     for given, remedy in (("90 mm", 'in quotes, as in "90 mm"'), ('90 mm"', 'in quotes, as in "90 mm"'),
-                          ("0,28", "decimals follow a point, as in 0.28"), ("[90,", "correct it there")):  # fmt: skip
+                          ("0,28", "decimals follow a point, as in 0.28"), ("[90,", "add ]")):  # fmt: skip
         with pytest.raises(InputError) as caught:
             load(SINGLE.replace('stroke = "90 mm"', f"stroke = {given}"))
         assert str(caught.value).endswith(remedy)

@@ -107,8 +107,8 @@ BAD = [
     (study(sweep=swept(FRACTION, f"from = 0\nto = 1{400 * '0'}\npoints = 3")), "more than 64 bits"),
     (study(sweep=swept("title", "values = [1, 2]")), "title = 1: must be text"),
     (study(sweep=swept("engine", 'values = ["a", "b"]')), "engine = \"a\""),
-    (study(sweep=swept("engine.throws.9", "values = [0, 1]")), "engine.throws.9: is no quantity of this scene"),
-    (study(sweep=swept("operating_points..speed", "values = [0, 1]")), "is no quantity of this scene"),
+    (study(sweep=swept("engine.throws.9", "values = [0, 1]")), "engine.throws.9: is no quantity of this problem"),
+    (study(sweep=swept("operating_points..speed", "values = [0, 1]")), "is no quantity of this problem"),
     (study(sweep=2 * swept(FRACTION, "values = [0, 1]")), "is swept twice"),
     (study(sweep=swept(FRACTION, "values = [0, 1]") + swept(BY_PLACE, "values = [0, 1]")), "is swept twice"),
     (study(sweep=swept(FRACTION, "values = [0, 1]")) + f'set = {{ "{BY_PLACE}" = 0.5 }}', "is swept, and set by"),
@@ -123,11 +123,13 @@ BAD = [
      'k = { values = [1, 2] } }'), "makes 200000 points"),
     (study(sweep=swept(FRACTION, "values = [0, 1]")) + f'set = {{ "{FRACTION}" = 0.5 }}', "is swept, and set by"),
     (study(sweep=swept("engine.rod_ration", "values = [0.2, 0.3]")), "did you mean 'rod_ratio'?"),
-    (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "is no quantity of this scene"),
+    (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "is no quantity of this problem"),
     (study(sweep=swept("engine.rod_ratio", "values = [0.2, 1.2]")), "rod_ratio"),
     (study(problem="tractor-four-lanchester"), "leaves no balance factor open"),
     (study("balancer sizing"), "nothing to size"),
-    (study("layout comparison", problem="nowhere"), "does not exist"),
+    (study("layout comparison", problem="nowhere"), "file: is named by the study and does not exist; paths begin in"),
+    (study(sweep=swept("block.mass", 'values = ["1 kg", "2 kg"]')), "write it into the problem file first"),
+    (study(sweep=swept(SPEED, 'values = ["6 m/s", "8 m/s"]\nunit = "x"')), "a unit stands beside its number"),
     (study("layout comparison", problem="tractor-study"), "makes this a study file"),
     (study("layout comparison") + case("one", "x.toml"), "two cases of one name"),
     (study("layout comparison") + case("V", str(VEE)) + "equal_power_to = 4", "differs between cases"),
@@ -139,7 +141,7 @@ BAD = [
     ('title = "t"\n[study]\n', "study.parts: is missing; add"),
     (REPLICA.replace("common = { numbers = { m = 2 } }", "common = 1.5"), "study.common = 1.5: "),
     (study(sweep=swept("counterweights.wb.mass", "values = [0, 1]")) + 'set = { "counterweights.web.name" = 1.5 }',
-     "counterweights.wb: is no quantity of this scene; use one of: 1"),
+     "counterweights.wb: is no quantity of this problem; use one of: 1"),
 ]  # fmt: skip
 
 
@@ -310,7 +312,7 @@ def test_a_limit_has_the_name_that_results_show() -> None:
     assert keys_of(tables, "constraints.webs.max") == ("constraints", 3, "max")
     assert keys_of(tables, "constraints.2.max") == ("constraints", 1, "max")
     # two limits of one name are told apart by their numbers alone
-    with pytest.raises(Refused, match="is no quantity of this scene"):
+    with pytest.raises(Refused, match="is no quantity of this problem"):
         keys_of(tables, "constraints.balancer mass.max")
 
 

@@ -51,7 +51,8 @@ def _asked_for(file: Path) -> str | None:
     if file.exists():
         raise _refused("file", str(file), *_TAKEN)
     typer.echo("An engine of the catalogue (laufruhe engines), a ready problem (laufruhe examples),")
-    return asked("or nothing, to describe your own", "", lambda text: _known(text) if text else None)
+    source: str | None = asked("or nothing, to describe your own", "", lambda text: _known(text) if text else None)
+    return source
 
 
 def _known(source: str) -> str:

@@ -8,10 +8,12 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from itertools import takewhile
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
 from laufruhe.cli import options as o
 from laufruhe.cli.screen import (
@@ -27,12 +29,32 @@ from laufruhe.cli.screen import (
     spoken,
 )
 from laufruhe.cli.supervised import supervised
+from laufruhe.errors import Complaint, InputError
 
 _SELDOM = 50_000
 """New objects after which garbage is looked for."""
 
+
+class _Commands(TyperGroup):
+    """Says of an option of a command that it stands behind it."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As typer, which knows such an option before the command as none at all."""
+        before = [arg.partition("=")[0] for arg in takewhile(lambda arg: arg.startswith("-"), args)]
+        own = {option for param in self.get_params(ctx) for option in param.opts}
+        for option in (option for option in before if option not in own):
+            takers = [name for name, one in self.commands.items() if any(option in param.opts for param in one.params)]
+            if takers:
+                command = next((word for word in args if word in takers), takers[0])
+                remedy = f"write it there, as in: laufruhe {command} ... {option}"
+                with exit_statuses(Path("laufruhe")):
+                    raise InputError("laufruhe", (Complaint(option, "", "stands behind the command", remedy),))
+        return super().parse_args(ctx, args)
+
+
 app = typer.Typer(
     name="laufruhe",
+    cls=_Commands,
     help="Balance designer for piston engines: least mount force, with a proof of how good the design is.",
     epilog="\b\nBegin with:  laufruhe init\nExit status: 0 done, 1 infeasible or failed, 2 bad input, 130 interrupted.",
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -242,11 +264,15 @@ def _show_version(wanted: bool) -> None:
 
 @app.callback()
 def _options(
-    version: Annotated[
+    ctx: typer.Context,
+    version: Annotated[  # noqa: ARG001
         bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version.")
     ] = False,
+    quiet: o.QuietOption = False,
+    verbose: o.VerboseOption = False,
 ) -> None:
-    pass
+    with exit_statuses(Path("laufruhe")):
+        ctx.with_resource(spoken(quiet, verbose))
 
 
 def main() -> None:

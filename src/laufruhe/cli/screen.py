@@ -118,10 +118,10 @@ def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was writt
 
 @contextmanager
 def spoken(quiet: bool, verbose: bool) -> Iterator[None]:
-    """What is typed as -q and -v: nothing but errors is said within, or every step."""
+    """What is typed as -q and -v, before a command or behind it: nothing but errors is said within, or every step."""
     if quiet and verbose:
         raise InputError("laufruhe", (Complaint("-q", "", "is given beside -v", "give one of them"),))
-    before = _loudness.set(QUIET if quiet else VERBOSE if verbose else PLAIN)
+    before = _loudness.set(QUIET if quiet else VERBOSE if verbose else _loudness.get())
     try:
         yield
     finally:

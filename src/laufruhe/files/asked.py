@@ -110,6 +110,7 @@ def _minimised(name: str, table: QuantityTable, where: str, scene: Scene) -> Mea
 def limits_of(tables: Sequence[ConstraintTable], scene: Scene) -> tuple[Limit, ...]:
     """What is forbidden, limits of loads and masses before those of numbers."""
     found = [_limit(table, f"constraints[{k + 1}]", scene) for k, table in enumerate(tables)]
+    _check_once(found)
     found.sort(key=lambda limit: limit.measure.channel.is_number)
     _check_together([limit for limit in found if limit.measure.channel.is_number])
     return tuple(found)
@@ -163,6 +164,27 @@ def _band(table: ConstraintTable, measure: Measure, where: str) -> tuple[float, 
     if not low < high:
         raise Refused(f"{where}.outside", table.outside, "is no band", "write the smaller one first")
     return low, high
+
+
+def _check_once(limits: Sequence[Limit]) -> None:
+    """Refuse two limits of one side of one measure: of several bands each is its own."""
+    given: dict[tuple[Any, ...], int] = {}
+    for k, limit in enumerate(limits):
+        sides = {
+            "max": limit.maximum < math.inf,
+            "min": limit.minimum > -math.inf,
+            "outside": limit.outside is not None,
+        }
+        for side in (side for side, is_given in sides.items() if is_given):
+            other = given.setdefault((limit.measure, side, limit.outside if side == "outside" else None), k)
+            if other != k:
+                names = f"constraints[{other + 1}] ('{limits[other].name}')"
+                raise Refused(
+                    f"constraints[{k + 1}].{side}",
+                    None,
+                    f"limits '{limit.name}' once more, beside {names}",
+                    "keep the tighter one",
+                )
 
 
 def _check_together(limits: Sequence[Limit]) -> None:

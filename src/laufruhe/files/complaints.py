@@ -5,7 +5,6 @@ from __future__ import annotations
 import difflib
 import json
 import re
-import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeAlias, get_args
@@ -21,7 +20,6 @@ MOST_COMPLAINTS = 20
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _CLOSE = 0.6
 _FEW = 3
-_UNQUOTED = re.compile(r'[+-]?[\d.]+(?:[eE][+-]?\d+)? *[A-Za-z°%][^"=]*"?$')
 _RULES = {
     "int_type": "must be a whole number",
     "int_from_float": "must be a whole number",
@@ -104,7 +102,8 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]]) -> Comp
     kind, where = detail["type"], key_path(loc)
     if kind == "extra_forbidden":
         keys = [field.alias or name for table in tables[:1] for name, field in table.model_fields.items()]
-        return Complaint(where, short(detail["input"]), "is not a key here", nearest(str(loc[-1]), keys))
+        remedy = 'a unit stands beside its number, as in "120 mm"' if loc[-1] == "unit" else nearest(str(loc[-1]), keys)
+        return Complaint(where, short(detail["input"]), "is not a key here", remedy)
     if kind == "missing":
         return Complaint(where, "", "is missing", "add it")
     if kind.startswith("union_tag_"):
@@ -133,26 +132,15 @@ class Refused(LaufruheError):
         super().__init__(str(self.complaint))
 
 
-def toml_remedy(content: bytes, error: tomllib.TOMLDecodeError) -> str:
-    """What to do where TOML breaks off: 0,26 is how many write a number."""
-    found = re.search(r"at line (\d+)", str(error))
-    line = content.decode("utf-8-sig").split("\n")[int(found.group(1)) - 1] if found is not None else ""
-    value = line.partition("=")[2].strip()
-    if units.DECIMAL_COMMA.match(value):
-        return f"decimals follow a point, as in {printed(value.replace(',', '.', 1), 40)}"
-    if _UNQUOTED.match(value):
-        text = value.strip('"')
-        return f'a number with its unit stands in quotes, as in "{printed(text, 40)}"'
-    return "correct it there"
-
-
 def measured(text: str, unit: str, where: str, given: str | None = None) -> float:
     """SI value of a text such as '120 mm'; `given` is what stands at the key, where the text is only made of it."""
     try:
         return units.parse(text, unit)
     except units.UnitError as error:
         found = Complaint.of(error, where)
-        raise Refused(where, given or text, found.rule, found.remedy) from None
+        # where the unit has a key of its own, it stands there without a number
+        remedy = f"use {units.usual(unit)} ..." if given else found.remedy
+        raise Refused(where, given or text, found.rule, remedy) from None
 
 
 @contextmanager

@@ -34,7 +34,7 @@ SCHEMA = "laufruhe.schema.json"
 
 
 class SearchTable(Table):
-    """How many points a search starts from where the problem is not convex."""
+    """How far a search goes where the problem is not convex."""
 
     starts: int = Field(default=16, ge=1, le=10_000)
     seed: int = Field(default=0, ge=0)

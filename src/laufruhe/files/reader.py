@@ -22,7 +22,7 @@ from laufruhe.files.asked import limits_of, objectives_of
 from laufruhe.files.assembly import assembly_of
 from laufruhe.files.bearings import MainBearingTable, bearings_of, one_by_one
 from laufruhe.files.catalogue import with_catalogue
-from laufruhe.files.complaints import Refused, complaints_of, key_path, toml_remedy
+from laufruhe.files.complaints import Refused, complaints_of, key_path
 from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
 from laufruhe.files.fidelity import at_fidelity
 from laufruhe.files.flywheel import check_told_alike, flywheel_of
@@ -41,6 +41,7 @@ from laufruhe.files.run_up import run_of
 from laufruhe.files.running_gear import size_decisions, weighed
 from laufruhe.files.scene import Scene
 from laufruhe.files.tolerances import over_of, parted, tolerances_of, with_numbers
+from laufruhe.files.toml_faults import toml_complaint
 from laufruhe.files.torsion import torsion_of
 from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.machine.bearing import Bearing
@@ -80,6 +81,8 @@ def given(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Path]
     if not isinstance(source, str | os.PathLike):
         remedy = "give a path, the text of a problem file, or its tables"
         raise wrong_call("problem", source, f"is of type {type(source).__name__}", remedy)
+    if not str(source).strip():
+        raise wrong_call("problem", source, "is empty", "give a path, the text of a problem file, or its tables")
     path = Path(source)
     return tables_of(path), shown_as(path)
 
@@ -206,7 +209,7 @@ def _check_shape(tables: dict[str, Any], path: Path) -> None:
         strange = _UNSEEN.search("".join(text for text in (*at[-1:], node) if isinstance(text, str)))
         if strange is not None:
             rule = f"holds U+{ord(strange.group()):04X}, which is no character to read"
-            raise _refused(path, key_path(at), rule, "take it out")
+            raise _refused(path, key_path(at), rule, "take it out; a path has / in place of \\")
         if isinstance(node, dict | list) and len(node) > MOST_ENTRIES:
             raise _refused(path, key_path(at) or "file", f"has {len(node)} entries", f"at most {MOST_ENTRIES} are read")
         if isinstance(node, int) and not -LARGEST <= node <= LARGEST:
@@ -241,7 +244,7 @@ def _parsed(content: bytes, path: Path) -> dict[str, Any]:
     except UnicodeDecodeError as error:
         raise _unreadable(path, f"is no UTF-8 text (byte {error.start + 1})", "save it as UTF-8") from None
     except tomllib.TOMLDecodeError as error:
-        raise _unreadable(path, f"is no TOML: {error}", toml_remedy(content, error)) from None
+        raise InputError(str(path), (toml_complaint(content, error),)) from None
     except ValueError:
         # the one that is no TOMLDecodeError
         raise _unreadable(path, "holds a whole number of thousands of digits", "write it shorter") from None

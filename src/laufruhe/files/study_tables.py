@@ -39,7 +39,7 @@ End: TypeAlias = Annotated[int | float | str | None, BeforeValidator(_single)]
 
 
 class SweepTable(Table):
-    """One quantity of the scene and the values that it takes: listed, or spaced between two ends."""
+    """One quantity of the problem and the values that it takes: listed, or spaced between two ends."""
 
     quantity: str = Field(description="Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
     values: list[Value] | None = None
@@ -50,7 +50,7 @@ class SweepTable(Table):
 
 
 class DrawnTable(Table):
-    """One quantity of the scene that is drawn at random, evenly between two ends."""
+    """One quantity of the problem that is drawn at random, evenly between two ends."""
 
     quantity: str = Field(description="Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
     first: int | float | str = Field(alias="from")
@@ -59,7 +59,7 @@ class DrawnTable(Table):
 
 
 class CaseTable(Table):
-    """One scene: a problem file, and what is changed of it."""
+    """One case: a problem file, and what is changed of it."""
 
     name: Name
     problem: str
@@ -100,18 +100,26 @@ def joined(tables: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
 
 
 def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
-    """The keys and places that a path goes through; `Refused` where the scene has no such quantity."""
+    """The keys and places that a path goes through; `Refused` where the problem has no such quantity."""
     here: Any = tables
     keys = []
     parts = parts_of(where)
     for k, part in enumerate(parts):
         options = _options(here)
         if part not in options:
-            remedy = nearest(part, list(options)) if options else "name a quantity of the problem file"
-            raise Refused(".".join(parts[: k + 1]), None, "is no quantity of this scene", remedy)
+            raise Refused(".".join(parts[: k + 1]), None, "is no quantity of this problem", _remedy(here, parts, k))
         keys.append(options[part])
         here = here[options[part]]
     return tuple(keys)
+
+
+def _remedy(here: Any, parts: Sequence[str], k: int) -> str:
+    """What to do where a path leads nowhere from its part `k` on."""
+    options = list(_options(here))
+    remedy = nearest(parts[k], options) if options else "name a number of the problem file"
+    if isinstance(here, dict) and not remedy.startswith("did") and field_at(".".join(parts)) is not None:
+        return "write it into the problem file first: only what stands there is changed"
+    return remedy
 
 
 def parts_of(where: str) -> list[str]:

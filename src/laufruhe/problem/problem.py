@@ -31,7 +31,7 @@ class Search:
     Attributes
     ----------
     starts, seed
-        Points that a search starts from.
+        The most points that a search starts from, and the seed of those drawn at random.
     boxes
         That bounds of stiffness may be divided into for a proof; as is worth it when None.
     """

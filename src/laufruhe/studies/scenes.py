@@ -78,6 +78,16 @@ class Scenes:
         """Tables of a problem file; not to be changed."""
         path = self.folder / name
         if path not in self._files:
+            if not path.exists():
+                remedy = nearest(name, [beside.name for beside in self.folder.glob("*.toml")] or [name])
+                advice = (
+                    remedy
+                    if remedy.startswith("did") and path.parent.is_dir()
+                    else "paths begin in the folder of the study"
+                )
+                raise InputError(
+                    str(path), (Complaint("file", "", "is named by the study and does not exist", advice),)
+                )
             self._files[path] = tables_of(path)
         return self._files[path]
 

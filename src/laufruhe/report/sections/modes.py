@@ -35,7 +35,7 @@ def _modes(facts: MountingFacts, title: str) -> Grid:
         reached = number(critical) if critical else DASH
         rows.append((name, number(frequency), "yes" if driven else "no", reached, *shares))
     still = 6 - len(facts.excited)
-    rest = f"{still} of 6 modes are not excited in this scene and not computed" if still else "every mode is excited"
+    rest = f"{still} of 6 modes are not excited and not computed" if still else "every mode is excited"
     head = ("mode", "Hz", "excited", f"order {order:g} at rpm" if order else "critical rpm", *MOTIONS)
     return Grid(title, head, tuple(rows), note=f"Kinetic energy in %; {rest}.{_of_fluid(facts)}")
 

@@ -47,7 +47,7 @@ def solve_joint(problem: Problem, workers: int | None = None, among: bool = Fals
     Parameters
     ----------
     problem
-        On elastic mounts; `search.starts` points are started from.
+        On elastic mounts; `search.starts` points are started from at the most.
     workers
         Processes; as many as processors when left out.
     among

@@ -45,7 +45,7 @@ class GridTable(Table):
 
 
 class ReplicaCase(CaseTable):
-    """One scene, its numbers in place of those of the part."""
+    """One case, its numbers in place of those of the part."""
 
     problem: str = Field(description="A name under problems, or a problem file.")
     numbers: dict[str, Any] = Field(default_factory=dict, description="Numbers in place of those of the part.")
