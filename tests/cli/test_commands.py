@@ -112,7 +112,7 @@ def test_infeasible_names_the_conflict_and_is_written(here: Path) -> None:
 
 
 def test_a_solver_that_gives_up_is_a_failed_result(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def give_up(*_: object) -> None:
+    def give_up(*_: object, **__: object) -> None:
         raise SolverError("the cone solver gave up")
 
     monkeypatch.setattr(laufruhe.solvers, "solve", give_up)
@@ -123,7 +123,7 @@ def test_a_solver_that_gives_up_is_a_failed_result(here: Path, monkeypatch: pyte
 
 
 def test_an_interrupt_leaves_nothing(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupt(*_: object) -> None:
+    def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(laufruhe.solvers, "solve", interrupt)
@@ -139,7 +139,7 @@ def test_an_interrupt_keeps_the_earlier_result(here: Path, monkeypatch: pytest.M
     run("solve", path)
     before = {name: (here / "results/scene" / name).read_bytes() for name in ALL_FILES}
 
-    def interrupt(*_: object) -> None:
+    def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("laufruhe.plots.draw_and_show", interrupt)

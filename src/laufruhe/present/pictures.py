@@ -1,7 +1,7 @@
 """Pictures of a result in the order of a report, a line each: `plots.results` has a file of that name to draw it."""
 
 PICTURES = {
-    "engine": "The engine to scale, from the front and from beside, with what was decided marked.",
+    "engine": "The engine to scale, from the front and from beside; what is open is marked.",
     "star": "The best crank stars, from the front and from the side.",
     "firings": "Firing orders of the best stars over one working cycle.",
     "twins": "When a twin fires, and what turns forward and backward of its first and second order.",
@@ -34,7 +34,7 @@ CURVES = (
     "willans", "bearings-on-crank", "wear", "turning-parts", "mount-critical-speeds",
 )  # fmt: skip
 """Further ones, which `report.curves` fills."""
-PRINTED = ("weights", "assembly", "ranks", "robust", "torque", "torsion", "load_cases", "run_up")
+PRINTED = ("weights", "reach", "assembly", "ranks", "robust", "torque", "torsion", "load_cases", "run_up")
 """Sections of the report whose tables are files as they are printed, and how many each may have."""
 MOST_PRINTED = 8
 PRINTED_SHEETS = tuple(

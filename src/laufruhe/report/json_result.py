@@ -27,7 +27,7 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
 from laufruhe.report.wording import why_star
-from laufruhe.solvers.result import Result, objective_of
+from laufruhe.solvers.result import Nearest, Reached, Result, Status, objective_of
 from laufruhe.solvers.stars.ranking import RankedStar
 
 Record = dict[str, Any]
@@ -73,6 +73,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         **_robust(result),
         **_assembly(result),
         **_ranks(result),
+        **_reached(result),
         "fidelity": {
             # the crank inertia is null where the crank turns evenly
             **asdict(problem.fidelity),
@@ -322,6 +323,19 @@ def _ranks(result: Result) -> Record:
         for rank in result.ranks
     ]
     return {"objectives": found} if found else {}
+
+
+def _reached(result: Result) -> Record:
+    """`reached` and `nearest` without a design: what each conflicting limit can reach, and what breaks limits least."""
+    if result.status not in (Status.INFEASIBLE, Status.FAILED):
+        return {}
+    names, near = "name side limit unit value", result.nearest
+    reached = [{**_of(one, f"{names} bound why"), "proof": str(one.proof), **_values(one)} for one in result.reached]
+    return {"reached": reached, "nearest": near and {**_of(near, f"{names} excess broken"), **_values(near)}}
+
+
+def _values(found: Reached | Nearest) -> Record:
+    return {"decisions": {d.name: _of(d, "value unit") for d in found.decisions}}
 
 
 def _assembly(result: Result) -> Record:

@@ -12,6 +12,7 @@ from rich.text import Text
 
 from laufruhe.report.grid import Grid
 from laufruhe.report.sections import tables_of
+from laufruhe.report.sections.reach import sentences
 from laufruhe.report.wording import accuracy, explained, fired, headline, why_star
 from laufruhe.solvers.result import Result, Status
 
@@ -29,7 +30,7 @@ def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
     console.print(Text(headline(result), style=_COLOURS[result.status]))
     if result.certificate is not None:
         console.print(Text(explained(result), style="dim"))
-    for sentence in filter(None, (fired(result), why_star(result))):
+    for sentence in filter(None, (*sentences(result), fired(result), why_star(result))):
         console.print(Text(sentence))
     for grid in tables_of(result):
         console.print()

@@ -114,13 +114,11 @@ def gap_text(certificate: Certificate) -> str:
 def explained(result: Result) -> str:
     """The certificate in two sentences."""
     c, o = result.certificate, result.objective
-    if result.status is Status.INFEASIBLE and result.problem.phasing is not None:
-        return "Every star and firing order allowed was ruled out; the limits that rule them out are named above."
     if result.status is Status.INFEASIBLE:
-        return (
-            "The cone solver proved that the limits cannot be met together. "
-            "Each limit that is named is needed for the contradiction: without it, the others named can be met."
-        )
+        ruled_out = "Every star and firing order allowed was ruled out" if result.problem.phasing is not None else ""
+        needed = bool(result.reached) and all(math.isfinite(found.value) for found in result.reached)
+        said = f"{ruled_out or 'It is proven that no design keeps the limits named'}."
+        return said + needed * " Each limit that is named is needed for that: without it the others can be met."
     if c is None or o is None:
         return "Nothing was decided, so there is nothing to prove."
     if c.kind is Proof.LOCAL:

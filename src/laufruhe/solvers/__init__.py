@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -26,6 +27,7 @@ from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, j
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_sharply
 from laufruhe.solvers.in_order import solve_in_order
 from laufruhe.solvers.mounts.convex import is_convex, solve_convex_mounts
+from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.runs import solve_runs
 from laufruhe.solvers.stars.rooms import with_room
@@ -68,11 +70,6 @@ def kinds_of(problem: Problem) -> frozenset[Kind]:
     """Kinds of what is open."""
     stars = [Kind.STAR] if problem.phasing is not None else []
     return frozenset([*stars, *(decision.kind for decision in problem.decisions)])
-
-
-def _named(kinds: frozenset[Kind]) -> str:
-    """Kinds in words."""
-    return " and ".join(kind.name.lower() for kind in sorted(kinds))
 
 
 def _smooth(problem: Problem) -> Result:
@@ -151,10 +148,6 @@ def _apart(problem: Problem) -> Result:
     return solve_apart(problem, _decided)
 
 
-def _asks_flywheel(problem: Problem) -> bool:
-    return all(measure.channel.is_flywheel for measure in problem.measures)
-
-
 def _asks_led(problem: Problem) -> bool:
     """Whether all that is asked is of loads that what each shaft carries adds up to, or of how evenly these turn."""
     felt = all(measure.channel.adds_up_by_shafts or measure.is_mass for measure in problem.measures)
@@ -220,7 +213,8 @@ _U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT,
 _T = Kind.TORSION
 METHODS: tuple[Method, ...] = (
     Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, state),
-    Method("boxes of the flywheel", frozenset({_F}), _asks_flywheel, Reach.WHOLE, _flywheel),
+    Method("boxes of the flywheel", frozenset({_F}), lambda p: all(m.channel.is_flywheel for m in p.measures),
+           Reach.WHOLE, _flywheel),
     Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, _torsion),
     Method("boxes of sizes", frozenset({Kind.SIZE, _U}), _asks_sizes, Reach.WHOLE, _sizes),
     Method("second-order cones", frozenset({_U, Kind.SHARE}), _asks_loads, Reach.WHOLE,
@@ -247,7 +241,9 @@ METHODS: tuple[Method, ...] = (
 """Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
 
 
-def solve(problem: Problem, listener: Listener | None = None, time_limit: float | None = None) -> Result:
+def solve(
+    problem: Problem, listener: Listener | None = None, time_limit: float | None = None, reach: bool = False
+) -> Result:
     """Decide what a problem leaves open.
 
     Parameters
@@ -258,6 +254,8 @@ def solve(problem: Problem, listener: Listener | None = None, time_limit: float 
         Told how far searches are.
     time_limit
         Seconds after which searches end with the best that they have, and with its bound.
+    reach
+        Whether limits that no design keeps are asked what they can reach, for some times as long.
 
     Raises
     ------
@@ -267,6 +265,8 @@ def solve(problem: Problem, listener: Listener | None = None, time_limit: float 
         If the engine as given cannot be evaluated, or nothing decides what is open.
     """
     with limited(time_limit), listening(listener):
+        begun = time.perf_counter()
+        found: Result | None
         try:
             found = _decided(problem)
         except ModuleNotFoundError as error:
@@ -278,7 +278,10 @@ def solve(problem: Problem, listener: Listener | None = None, time_limit: float 
             if not passed():
                 raise
             found = None
-        return found if found is not None and not passed() else _cut_short(problem, found)
+        found = found if found is not None and not passed() else _cut_short(problem, found)
+        if not reach or found.status in (Status.OPTIMAL, Status.FEASIBLE):
+            return found
+        return with_reachable(found, problem, kinds_of(problem), time.perf_counter() - begun, _decided)
 
 
 def _cut_short(problem: Problem, found: Result | None) -> Result:
@@ -331,12 +334,13 @@ def _decided(problem: Problem) -> Result:
         if design.excess <= KEPT:
             shown = Shown(design.value, Reach.WHOLE, 0.0, "nothing open changes what is minimised")
             return concluded(design, design.evaluation, shown, {})
+    words = " and ".join(kind.name.lower() for kind in sorted(kinds))
     if kinds and not problem.objective:
-        raise ModelError(f"{_named(kinds)} is open and nothing is minimised; add [objective] or [mounts]")
+        raise ModelError(f"{words} is open and nothing is minimised; add [objective] or [mounts]")
     method = next((m for m in METHODS if kinds <= m.decides and m.suits(problem)), None)
     if method is None:
         asked = ", ".join(dict.fromkeys(measure.name for measure in problem.measures))
-        raise ModelError(f"no method decides {_named(kinds)} together for {asked}; fix one of them, or ask for less")
+        raise ModelError(f"no method decides {words} together for {asked}; fix one of them, or ask for less")
     # what is decided apart is asked once more, each part by itself
     tell(method.name)
     conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and not kinds & {_S, _T, _F, Kind.SIZE} else ()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import cmath
-import itertools
 import math
 import time
 from collections.abc import Mapping, Sequence
@@ -12,21 +11,27 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from laufruhe.fidelity.error_bounds import missed, relative
-from laufruhe.machine import Engine
-from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Limit, Side
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.nothing import nothing_of
-from laufruhe.problem.phasing import Candidate
-from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
+from laufruhe.prove.certificate import Proof, Reach, certified
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.result import DecisionValue, LimitValue, ObjectiveValue, Result, Status, infeasible, objective_of
-from laufruhe.solvers.stars.ranking import PhasingResult, none_of_given
+from laufruhe.solvers.result import (
+    DecisionValue,
+    LimitValue,
+    Nearest,
+    ObjectiveValue,
+    Result,
+    Status,
+    infeasible,
+    objective_of,
+)
+from laufruhe.solvers.stars.ranking import none_of_given
 
 FEASIBLE = 1e-6
 """Relative excess over a limit that counts as none."""
@@ -148,11 +153,7 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
         status=Status.FAILED if not met else Status.OPTIMAL if proven else Status.FEASIBLE,
         objective=ObjectiveValue.of(problem, design.value, given),
         certificate=certificate,
-        decisions=tuple(
-            entry
-            for decision, value in zip(problem.decisions, design.values, strict=True)
-            for entry in decision_values(decision, value, shown.slopes.get(decision.name))
-        ),
+        decisions=decided(design, shown.slopes),
         limits=limits,
         initial=initial,
         final=design.evaluation,
@@ -198,6 +199,16 @@ def none_within(problem: Problem, initial: Evaluation, conflict: tuple[str, ...]
 def broken_limits(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[str, ...]:
     """Names of those that a design breaks."""
     return tuple(limit.name for limit in limits if evaluation.standing(limit).excess > KEPT)
+
+
+def nearest_of(problem: Problem, design: Evaluation, decisions: tuple[DecisionValue, ...]) -> Nearest:
+    """A design that is no answer, and the limit that it breaks most."""
+    broken = max(problem.limits, key=lambda limit: design.standing(limit).excess)
+    stands = design.standing(broken)
+    names = broken_limits(problem.limits, design)
+    return Nearest(
+        broken.name, stands.side, stands.edge, broken.measure.unit, stands.value, stands.excess, names, decisions
+    )
 
 
 def _broken(problem: Problem, design: Design) -> str:
@@ -246,6 +257,15 @@ def unbalances_of(problem: Problem, result: Result) -> list[complex]:
     return [cmath.rect(found[d.name], found.get(angle_name(d), d.set.angles[0])) for d in problem.unbalances]
 
 
+def decided(design: Design, slopes: Mapping[str, Array] | None = None) -> tuple[DecisionValue, ...]:
+    """What is open of a design; slopes of the bound price the sides that it stands at."""
+    return tuple(
+        entry
+        for decision, value in zip(design.problem.decisions, design.values, strict=True)
+        for entry in decision_values(decision, value, (slopes or {}).get(decision.name))
+    )
+
+
 def decision_values(decision: Decision, value: Value, slope: Array | None = None) -> tuple[DecisionValue, ...]:
     """Size and, where open, angle of one decision; the slope of the bound prices the side that it stands at."""
     own = decision.set
@@ -265,80 +285,3 @@ def decision_values(decision: Decision, value: Value, slope: Array | None = None
     edge = not own.free_angle and size > reach and min(angle - low_angle, high_angle - angle) < 1e-6
     name = angle_name(decision)
     return entry, DecisionValue(name, angle, "rad", low_angle, high_angle, given_angle, edge)
-
-
-def with_star(
-    problem: Problem, phasing: Phasing, best: Result, candidate: Candidate, certificate: Certificate | None,
-    details: PhasingResult,
-) -> Result:  # fmt: skip
-    """The result of one star as that of all of them.
-
-    Parameters
-    ----------
-    problem
-        As given, its phasing open.
-    best
-        Of the star, nothing of the phasing open.
-    """
-    given = evaluate(problem)
-    proven = certificate is not None and certificate.kind is Proof.GLOBAL
-    status = best.status
-    if status in (Status.OPTIMAL, Status.FEASIBLE):
-        status = Status.OPTIMAL if proven else Status.FEASIBLE
-    initial = replace(given, samples=best.final.samples)
-    value = best.objective.value if best.objective else objective_value(problem, best.final)
-    return replace(
-        best,
-        problem=replace(best.problem, phasing=phasing),
-        status=status,
-        objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)),
-        certificate=certificate,
-        decisions=(*phase_decisions(problem, phasing, candidate), *best.decisions),
-        initial=initial,
-        phasing=details,
-    )
-
-
-def phase_decisions(problem: Problem, phasing: Phasing, candidate: Candidate) -> tuple[DecisionValue, ...]:
-    """Throws, banks and shafts as entries of the result."""
-    out = []
-    if phasing.throws is None:
-        given = [part.throw for part in problem.engine.slider_cranks]
-        layout = phasing.layout(candidate.bank_angle, candidate.split_pin)
-        before = [
-            given[layout.pins.index(pin)] - layout.pin_offsets[layout.pins.index(pin)] for pin in set(layout.pins)
-        ]
-        for k, (angle, was) in enumerate(zip(candidate.throws, before, strict=True)):
-            low, high = phasing.throw_bounds[k] if phasing.throw_bounds else (0.0, math.tau)
-            out.append(DecisionValue(f"throw {k + 1}", angle, "rad", low, high, was % math.tau, False))
-    bank, split = _geometry_given(problem.engine, phasing.layout_of(candidate))
-    for name, bounds, value, given_angle in (
-        ("bank angle", phasing.bank, candidate.bank_angle, bank),
-        ("split pin angle", phasing.split, candidate.split_pin, split),
-    ):
-        if bounds is not None and value is not None and bounds[0] < bounds[1]:
-            edge = min(value - bounds[0], bounds[1] - value) <= 1e-9
-            out.append(DecisionValue(name, value, "rad", *bounds, given_angle, edge))
-    optional = (name for names in phasing.shafts.optional for name in names)
-    out += [
-        DecisionValue(f"{name} built", float(name not in candidate.left_out), "", 0.0, 1.0, 1.0, False)
-        for name in optional
-    ]
-    return tuple(out)
-
-
-def _geometry_given(engine: Engine, layout: Layout) -> tuple[float, float]:
-    """Angle between the banks, and between split pins, as an engine has them [rad]; zero where it has none."""
-    parts, bank, split = engine.slider_cranks, 0.0, 0.0
-    for left, right in itertools.permutations(range(len(layout.sides)), 2):
-        if layout.side(left) > layout.side(right):
-            bank = (parts[left].bank - parts[right].bank) % math.tau
-            if layout.pins[left] == layout.pins[right]:
-                split = math.remainder(parts[right].throw - parts[left].throw, math.tau)
-    return bank, split
-
-
-def no_star(problem: Problem, why: str, status: Status = Status.INFEASIBLE, conflict: tuple[str, ...] = ()) -> Result:
-    """No star, and why."""
-    given = evaluate(problem)
-    return Result(problem, status, None, None, (), (), given, given, why, conflict)

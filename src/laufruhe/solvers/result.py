@@ -128,6 +128,59 @@ class LimitValue:
 
 
 @dataclass(frozen=True)
+class Reached:
+    """What a limit that no design keeps could be met by while the other limits hold [SI].
+
+    Attributes
+    ----------
+    side, limit
+        "at most" or "at least", and what was asked for.
+    value
+        Of the design found that comes nearest; not a number where none is told.
+    bound
+        What no design that keeps the other limits goes beyond; not a number where that is not known.
+    proof
+        Of the value.
+    decisions
+        Of that design.
+    why
+        Why nothing is told.
+    """
+
+    name: str
+    side: str
+    limit: float
+    unit: str
+    value: float = math.nan
+    bound: float = math.nan
+    proof: Proof = Proof.NONE
+    decisions: tuple[DecisionValue, ...] = ()
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """The design found that breaks limits least, which is no answer: the limit that it breaks most, and how [SI].
+
+    Attributes
+    ----------
+    value, excess
+        Of the measure that is limited, and the share by which it is beyond the limit.
+    broken
+        Names of all limits that it breaks.
+    """
+
+    name: str
+    side: str
+    limit: float
+    unit: str
+    value: float
+    excess: float
+    broken: tuple[str, ...]
+    decisions: tuple[DecisionValue, ...]
+
+
+@dataclass(frozen=True)
 class ObjectiveValue:
     """The objective of the design and of the one given, which is infinite where that stands on a resonance."""
 
@@ -179,6 +232,10 @@ class Result:
         Which part goes where, where parts were chosen.
     ranks
         Of several objectives in order, where there are.
+    reached
+        Without a design: what each of the limits that conflict can reach while the others hold.
+    nearest
+        Where no design was found, and none is proven not to exist: the one that breaks limits least.
     """
 
     problem: Problem
@@ -197,6 +254,8 @@ class Result:
     robust: RobustResult | None = None
     assembly: AssemblyResult | None = None
     ranks: tuple[RankValue, ...] = ()
+    reached: tuple[Reached, ...] = ()
+    nearest: Nearest | None = None
 
     @property
     def designs(self) -> dict[str, Evaluation]:

@@ -12,6 +12,7 @@ from laufruhe.report.sections import (
     mounts,
     orders,
     ranks,
+    reach,
     robust,
     run_up,
     stars,
@@ -22,8 +23,8 @@ from laufruhe.report.sections import (
 from laufruhe.solvers.result import Result
 
 SECTIONS = (
-    stars, assembly, ranks, decisions, weights, robust, limits, mounts, torque, torsion, modes, load_cases, run_up,
-    orders,
+    reach, stars, assembly, ranks, decisions, weights, robust, limits, mounts, torque, torsion, modes, load_cases,
+    run_up, orders,
 )  # fmt: skip
 
 

@@ -23,7 +23,7 @@ from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach, gap_of
 from laufruhe.prove.mounts.subdivision import divided_bound
 from laufruhe.prove.mounts.transmitted import transmitted_bound
-from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, none_within, unbalances_of
+from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, decided, nearest_of, none_within, unbalances_of
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_unbalances
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.mounts.bounds import divided_by
@@ -225,7 +225,9 @@ def _none(
         f"no design found: from {sum(o.starts for o in search.optima)} starts none meets {names or 'the limits'} "
         f"(nearest misses by {nearest.violation:.3g} of a limit); relax it, or open more"
     )
-    return replace(result, status=Status.FAILED, message=message)
+    design = search.best.design if search.best else None
+    near = nearest_of(problem, design.evaluation, decided(design)) if design else None
+    return replace(result, status=Status.FAILED, message=message, nearest=near)
 
 
 def _ruled_out(problem: Problem) -> tuple[str, ...]:

@@ -29,11 +29,11 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
-from laufruhe.solvers.conclusion import no_star, with_star
 from laufruhe.solvers.mounts.bounds import bounded_under
 from laufruhe.solvers.mounts.nonlinear import solve_mounts, solve_moved
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.answers import MOST_LISTED
+from laufruhe.solvers.stars.conclusion import no_star, with_star
 from laufruhe.solvers.stars.cuts import search_designs
 from laufruhe.solvers.stars.design import StarDesign
 from laufruhe.solvers.stars.families import Family, families_of

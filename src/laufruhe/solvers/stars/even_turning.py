@@ -20,8 +20,9 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified
 from laufruhe.prove.throws.swing import SwingBound
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.conclusion import broken_limits, no_star, with_limits, with_star
+from laufruhe.solvers.conclusion import broken_limits, with_limits
 from laufruhe.solvers.result import ObjectiveValue, Result
+from laufruhe.solvers.stars.conclusion import no_star, with_star
 from laufruhe.solvers.stars.design import solve_fixed
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import ranked_star, ranking_result

@@ -19,9 +19,9 @@ from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.prove.throws.firing_share import firing_bound
-from laufruhe.solvers.conclusion import no_star, with_star
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.answers import Answer, Decided, searched
+from laufruhe.solvers.stars.conclusion import no_star, with_star
 from laufruhe.solvers.stars.design import StarDesign, solve_fixed
 from laufruhe.solvers.stars.even_turning import floors, of_wheel, solve_told_alike
 from laufruhe.solvers.stars.families import Family, families_of

@@ -11,8 +11,8 @@ from dataclasses import replace
 from laufruhe.errors import ModelError
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.boxes.sizes import solve_sizes
-from laufruhe.solvers.conclusion import no_star
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.stars.conclusion import no_star
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.phasing import by_each_order, every_star
 from laufruhe.solvers.throws.starts import none_fires

@@ -28,10 +28,11 @@ from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified
 from laufruhe.prove.throws.uneven import steady_bound, uneven_bound
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, no_star, unbalances_of, with_star
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, unbalances_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.nonlinear import solve_nonlinear
 from laufruhe.solvers.smooth.program import TURN, SmoothProgram
+from laufruhe.solvers.stars.conclusion import no_star, with_star
 from laufruhe.solvers.stars.design import StarDesign, solve_fixed
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import TradePoint, ranked_star, ranking_result

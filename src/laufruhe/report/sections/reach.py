@@ -1,0 +1,56 @@
+"""Without a design: what the limits that conflict can reach, each while the others hold, and with which numbers."""
+
+from __future__ import annotations
+
+from laufruhe.present.numbers import DASH, figure, with_unit
+from laufruhe.prove.certificate import Proof
+from laufruhe.report.grid import Grid
+from laufruhe.solvers.result import DecisionValue, Nearest, Reached, Result
+
+NOTE = "None of these designs is an answer: each keeps the limits but the one that it is named by."
+
+
+def tables(result: Result) -> list[Grid]:
+    """A row a decision, a column a design."""
+    designs = [found for found in result.reached if found.decisions]
+    names = list(dict.fromkeys(decision.name for found in designs for decision in found.decisions))
+    known = [{decision.name: decision for decision in found.decisions} for found in designs]
+    first = ("value reached", *(figure(found.value, found.unit) for found in designs))
+    rows = tuple((name, *(_value(each.get(name)) for each in known)) for name in names)
+    head = ("", *(f"nearest to '{found.name}'" for found in designs))
+    return [Grid("What the limits can reach", head, (first, *rows) if designs else (), note=NOTE)]
+
+
+def _value(decision: DecisionValue | None) -> str:
+    if decision is None:
+        return DASH
+    return figure(decision.value, decision.unit, scale=max(abs(decision.lower), abs(decision.upper)))
+
+
+def sentences(result: Result) -> list[str]:
+    """Of each limit, and of the nearest design."""
+    held = "With the other limits held, " if len(result.problem.limits) > 1 else ""
+    told = [_sentence(found, held) for found in result.reached]
+    return told if result.nearest is None else [*told, _nearest(result.nearest)]
+
+
+def _sentence(found: Reached, held: str) -> str:
+    if found.why:
+        return f"What '{found.name}' can reach is not told: {found.why}."
+    least, beyond = ("least", "lower") if found.side == "at most" else ("largest", "higher")
+    value, bound = figure(found.value, found.unit), figure(found.bound, found.unit)
+    proof = Proof.GLOBAL if value == bound else found.proof
+    words = {
+        Proof.GLOBAL: f"the {least} that '{found.name}' can reach is {value}, which is proven",
+        Proof.WITHIN_GAP: f"the {least} found of '{found.name}' is {value}, and none {beyond} than {bound} is proven",
+    }
+    known = f"; no design is {beyond} than {bound}" if found.bound > 0.0 else ", and nothing is proven of it"
+    said = words.get(proof, f"the {least} found of '{found.name}' is {value}, a local optimum{known}")
+    text = f"{held}{said}; {found.side} {with_unit(found.limit, found.unit)} is asked."
+    return text[:1].upper() + text[1:]
+
+
+def _nearest(found: Nearest) -> str:
+    value, asked = figure(found.value, found.unit), with_unit(found.limit, found.unit)
+    share = f", {100.0 * found.excess:.3g} % of it too far" if found.limit else ""
+    return f"The nearest design found breaks '{found.name}' most: {value} where {found.side} {asked} is asked{share}."

@@ -1,0 +1,208 @@
+"""What limits that no design keeps could be met by: the least value of each while the others hold (P16).
+
+A limit is a measure, and so is an objective. The problem that minimises what is limited under the other limits is
+decided by whatever method suits it, and its proof is that of any objective. What has no largest value to minimise is
+asked for at edges that are halved: each edge is a problem of its own, with a design or with a proof that there is none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+from laufruhe.errors import LaufruheError
+from laufruhe.numerics.budget import in_time, left, limited, passed
+from laufruhe.numerics.progress import tell
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.evaluation import objective_value
+from laufruhe.problem.measure import Limit, Term
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof, Reach, certified
+from laufruhe.solvers.conclusion import KEPT, broken_limits, limit_values, nearest_of
+from laufruhe.solvers.result import Nearest, ObjectiveValue, Reached, Result, Status
+
+Solve = Callable[[Problem], Result]
+LEAST_SECONDS, TIMES, MOST_SECONDS = 5.0, 1.5, 60.0
+"""Each limit may take so long, or so many times what it took to find that there is no design; and all together."""
+HALVINGS, CLOSE = 10, 1e-3
+"""Of the edges of a limit that has no least value to minimise, and the share of it at which they stop."""
+_DESIGNED = (Status.OPTIMAL, Status.FEASIBLE)
+LONG = "it takes long; give it time by a time limit"
+
+
+@dataclass(frozen=True, eq=False)
+class _Answer:
+    """What is told of one limit, and the result that it is told of."""
+
+    told: Reached
+    result: Result | None = None
+
+
+def with_reachable(found: Result, problem: Problem, kinds: Collection[Kind], took: float, solve: Solve) -> Result:
+    """A result without a design, with what each conflicting limit can reach, and with the nearest design.
+
+    A design that was overlooked becomes the result; where a bound shows that there is none, the result says so.
+
+    Parameters
+    ----------
+    found
+        Infeasible or failed.
+    problem
+        As it was asked.
+    kinds
+        Of what is open.
+    took
+        Seconds that `found` did.
+    solve
+        Decides a problem by the method that suits it.
+    """
+    wanted = _wanted(found, problem)
+    asked = [limit for limit in problem.limits if limit.name in wanted]
+    # what the nearest design breaks most is looked at first
+    asked.sort(key=lambda limit: found.nearest is None or limit.name != found.nearest.name)
+    if not asked or problem.assembly is not None:
+        return found
+    answers = []
+    # a limit of time that was asked for counts alone
+    most = min(max(LEAST_SECONDS, TIMES * took) * len(asked), MOST_SECONDS)
+    seconds = None if math.isfinite(left()) else most
+    with limited(seconds):
+        for limit in asked:
+            tell(f"what '{limit.name}' can reach")
+            answers.append(_answer(limit, problem, kinds, found.status, solve))
+    designs = [answer.result for answer in answers if answer.result is not None]
+    drawn = problem.over is None and not problem.ranks
+    for result in designs:
+        if drawn and result.final.excess(problem.limits) <= KEPT:
+            return _recovered(found, problem, result)
+    found = replace(found, reached=tuple(answer.told for answer in answers))
+    found = _excluded(found) if found.status is Status.FAILED else found
+    near = _nearest(found, problem, designs) if drawn and found.status is Status.FAILED else None
+    return replace(found, nearest=near)
+
+
+def _wanted(found: Result, problem: Problem) -> Collection[str]:
+    """Names of the limits to look at: those that conflict, or that the best design breaks, else all of them."""
+    if found.status is Status.INFEASIBLE:
+        return found.conflict
+    broken = broken_limits(problem.limits, found.final) if found.decisions else found.nearest and found.nearest.broken
+    return broken or [limit.name for limit in problem.limits]
+
+
+def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], status: Status, solve: Solve) -> _Answer:
+    """What one limit can reach while the others hold."""
+    measure, edge = limit.measure, limit.maximum
+    side = "at most" if edge < math.inf else "at least"
+    told = Reached(limit.name, side, edge if side == "at most" else limit.minimum, measure.unit)
+    if limit.outside is not None:
+        return _Answer(replace(told, why="a band is kept or not; no single value can be reached"))
+    if passed():
+        return _Answer(replace(told, why=LONG))
+    others = tuple(other for other in problem.limits if other is not limit)
+    if not measure.channel.is_moved_by(kinds):
+        return _Answer(replace(told, why="nothing that is open changes it"))
+    try:
+        if measure.channel.minimised and side == "at most" and limit.minimum == -math.inf:
+            return _least(told, _asking(problem, (Term(measure),), others), solve)
+        return _at_edges(told, limit, problem, others, status, solve)
+    except LaufruheError as error:
+        return _Answer(replace(told, why=str(error)))
+
+
+def _asking(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, ...]) -> Problem:
+    """Another question to the same engine, without what is open that nothing in it depends on."""
+    asked = problem.changed(objective=objective, limits=limits, ranks=(), sharply=False)
+    if problem.phasing is not None:
+        return asked
+    felt = [measure.channel for measure in asked.measures]
+    moving = tuple(d for d in asked.decisions if any(channel.is_moved_by({d.kind}) for channel in felt))
+    return asked.changed(decisions=moving)
+
+
+def _least(told: Reached, asked: Problem, solve: Solve) -> _Answer:
+    """By the problem that minimises what is limited."""
+    result = solve(asked)
+    if result.status not in _DESIGNED or result.objective is None:
+        return _Answer(replace(told, why=_none(result)))
+    proof = result.certificate
+    return _Answer(
+        replace(
+            told,
+            value=result.objective.value,
+            bound=proof.lower_bound if proof else math.nan,
+            proof=proof.kind if proof else Proof.NONE,
+            decisions=result.decisions,
+        ),
+        result,
+    )
+
+
+def _none(result: Result) -> str:
+    """Why nothing is told where the other limits found no design."""
+    if result.status is Status.INFEASIBLE:
+        names = " and ".join(f"'{name}'" for name in result.conflict)
+        return f"the other limits cannot be met together either{names and ': no design keeps '}{names}"
+    return LONG if passed() else "no design was found that keeps the other limits"
+
+
+def _at_edges(
+    told: Reached, limit: Limit, problem: Problem, others: tuple[Limit, ...], status: Status, solve: Solve
+) -> _Answer:
+    """By edges between the one asked for and what a design without the limit has, halved."""
+    high = told.side == "at most"
+    first = solve(_asking(problem, problem.objective, others))
+    if first.status not in _DESIGNED:
+        return _Answer(replace(told, why=_none(first)))
+    best, reached = first, first.final.standing(limit).value
+    missed, bound = told.limit, told.limit if status is Status.INFEASIBLE else math.nan
+    for _ in in_time(range(HALVINGS)):
+        if abs(reached - missed) <= CLOSE * abs(told.limit):
+            break
+        edge = 0.5 * (reached + missed)
+        moved = replace(limit, maximum=edge) if high else replace(limit, minimum=edge)
+        found = solve(_asking(problem, problem.objective, (*others, moved)))
+        if found.status in _DESIGNED:
+            best, reached = found, found.final.standing(moved).value
+        else:
+            missed, bound = edge, edge if found.status is Status.INFEASIBLE else bound
+    proven = Proof.WITHIN_GAP if bound == missed else Proof.LOCAL
+    return _Answer(replace(told, value=reached, bound=bound, proof=proven, decisions=best.decisions), best)
+
+
+def _recovered(found: Result, problem: Problem, result: Result) -> Result:
+    """A design that keeps all limits after all, by what bounds are known of the objective."""
+    value = objective_value(problem, result.final)
+    proof = certified(
+        value, found.certificate.lower_bound if found.certificate else 0.0, nothing_of(problem, result.final.engine),
+        problem.tolerance, Reach.ASIDE, math.inf, f"found while {result.problem.objective_name} was minimised",
+    )  # fmt: skip
+    return replace(
+        result,
+        problem=result.problem.changed(objective=problem.objective, limits=problem.limits),
+        status=Status.OPTIMAL if proof.kind is Proof.GLOBAL else Status.FEASIBLE,
+        objective=ObjectiveValue.of(problem, value, objective_value(problem, found.initial)),
+        certificate=proof,
+        decisions=tuple(replace(d, shadow_price=math.nan if d.at_bound else 0.0) for d in result.decisions),
+        limits=limit_values(problem, result.final, {}, value),
+        initial=found.initial,
+    )
+
+
+def _excluded(found: Result) -> Result:
+    """Infeasible where no design that keeps the other limits comes down to one of them."""
+    for told in found.reached:
+        if told.side == "at most" and told.bound > told.limit * (1.0 + KEPT):
+            others = " that keeps the other limits" if len(found.problem.limits) > 1 else ""
+            message = f"no design exists: none{others} keeps '{told.name}'"
+            return replace(found, status=Status.INFEASIBLE, objective=None, certificate=None, message=message,
+                           conflict=(told.name,))  # fmt: skip
+    return found
+
+
+def _nearest(found: Result, problem: Problem, designs: Sequence[Result]) -> Nearest | None:
+    """Of the best design found, and of those that are least in one limit, the one that breaks limits least."""
+    known = [found.nearest] if found.nearest is not None else []
+    known += [nearest_of(problem, r.final, r.decisions) for r in (*designs, found) if not r.final.resonance]
+    return min(known, key=lambda each: each.excess, default=None)

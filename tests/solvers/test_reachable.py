@@ -1,0 +1,250 @@
+"""What limits that no design keeps can reach (P16), against grids of designs, every star, and edges beside them."""
+
+from __future__ import annotations
+
+import cmath
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.files.reader import load_tables
+from laufruhe.numerics.budget import limited
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.evaluation import Evaluation, evaluate
+from laufruhe.problem.measure import Limit
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from laufruhe.report.json_result import as_dict
+from laufruhe.report.sections.reach import sentences
+from laufruhe.report.wording import explained
+from laufruhe.solvers import solve
+from laufruhe.solvers.reachable import LONG, with_reachable
+from laufruhe.solvers.result import Result, Status
+
+SINGLE = {
+    "layout": "inline", "cycle": "four-stroke", "bore": "100 mm", "stroke": "120 mm", "rod_ratio": 0.28,
+    "reciprocating_mass": "1.5 kg", "throws": [0], "firing_order": [1],
+}  # fmt: skip
+VEE = SINGLE | {"layout": "vee", "bank_angle": 70, "cylinder_spacing": "130 mm", "firing_order": [1, 2]}
+BOXER = SINGLE | {
+    "layout": "boxer",
+    "bank_stagger": "40 mm",
+    "cylinder_spacing": "130 mm",
+    "throws": [0, 180],
+    "firing_order": [1, 2],
+}
+FIVE = SINGLE | {"cylinders": 5, "throws": "open", "firing_order": "open", "cylinder_spacing": "120 mm"}
+POSITIONS = [
+    ["200 mm", "250 mm", "0 mm"], ["200 mm", "-250 mm", "0 mm"],
+    ["-300 mm", "250 mm", "-20 mm"], ["-300 mm", "-250 mm", "-20 mm"],
+]  # fmt: skip
+POINTS = [{"name": "idle", "speed": "800 rpm"}, {"name": "rated", "speed": "2500 rpm", "weight": 3.0, "gas": False}]
+GAS = {"model": "seiliger", "peak_pressure": "80 bar", "imep": "6 bar"}
+WEB = {
+    "name": "web", "x": "10 mm", "opposite_throw": 1, "radius": "80 mm",
+    "mass": {"between": ["0 kg", "3 kg"]}, "angle": {"between": [-180, 180]},
+}  # fmt: skip
+BLOCK = {
+    "mass": "120 kg", "centre_of_gravity": ["0 mm", "0 mm", "100 mm"],
+    "inertia": ["6 kg m^2", "9 kg m^2", "8 kg m^2"],
+}  # fmt: skip
+
+
+def limit(quantity: str, **told: Any) -> dict[str, Any]:
+    return {"limit": quantity, **told}
+
+
+LIGHT = limit("counterweight mass", max="0.3 kg", name="light")
+QUIET = limit("maximum mount force", max="900 N", operating_points=["rated"], name="quiet")
+
+
+def problem_of(limits: list[dict[str, Any]], **told: Any) -> Problem:
+    whole = {
+        "title": "test", "engine": SINGLE, "mounts": {"positions": POSITIONS}, "operating_points": POINTS, "gas": GAS,
+        "counterweights": [WEB], "objective": {"minimise": "mean mount force"}, "fidelity": {"samples": 180},
+        "constraints": limits,
+    }  # fmt: skip
+    return load_tables({key: value for key, value in (whole | told).items() if value is not None}, Path("t.toml"))
+
+
+def grid_of(problem: Problem) -> Iterator[Evaluation]:
+    """Designs over the whole of the bounds of one weight, by the exact model alone."""
+    (weight,) = problem.decisions
+    for size, angle in itertools.product(np.linspace(0.0, weight.set.upper, 11), np.linspace(-math.pi, math.pi, 25)):
+        yield evaluate(problem, problem.design([cmath.rect(size, angle)]))
+
+
+def keeps(found: Evaluation, limits: tuple[Limit, ...]) -> bool:
+    return found.excess(limits) <= 1e-5
+
+
+SCENES = {
+    "single, gas, two points": problem_of([LIGHT, QUIET]),
+    "single, each by itself": problem_of([limit("rms shaking force", max="2 N"), QUIET]),
+    "vee": problem_of([LIGHT, QUIET, limit("rms rocking couple", max="400 N m")], engine=VEE),
+    "boxer, on elastic mounts": problem_of(
+        [LIGHT, limit("rms rocking couple", max="1 N m", name="couple"), limit("maximum mount travel", max="20 mm")],
+        engine=BOXER, block=BLOCK,
+        mounts={"kind": "elastic", "loss_factor": 0.1,
+                "places": [{"position": at, "stiffness": ["200 N/mm"] * 3} for at in POSITIONS]},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCENES)
+def test_no_design_of_a_grid_goes_under_what_a_limit_can_reach(name: str) -> None:
+    problem = SCENES[name]
+    result = laufruhe.solve(problem)
+    assert result.status is Status.INFEASIBLE
+    assert [told.name for told in result.reached] == list(result.conflict)
+    designs = [*grid_of(problem)]
+    for told in result.reached:
+        own = next(limit for limit in problem.limits if limit.name == told.name)
+        others = tuple(limit for limit in problem.limits if limit is not own)
+        kept = [found.value(own.measure) for found in designs if keeps(found, others)]
+        if told.why:
+            assert not kept
+            assert solve(replace(problem, limits=others)).status is Status.INFEASIBLE
+            continue
+        assert told.proof is Proof.GLOBAL
+        assert told.bound > own.maximum
+        assert min(kept, default=math.inf) >= told.bound * (1.0 - 1e-6)
+        values = {decision.name: decision.value for decision in told.decisions}
+        design = evaluate(problem, problem.design([cmath.rect(values["web.mass"], values["web.angle"])]))
+        assert design.value(own.measure) == pytest.approx(told.value, rel=1e-4)
+        assert keeps(design, others)
+        # the tool finds a design at the value told, and proves that there is none a little lower
+        for share, status in ((1.001, (Status.OPTIMAL, Status.FEASIBLE)), (0.999, (Status.INFEASIBLE,))):
+            moved = replace(own, maximum=share * told.value)
+            assert solve(replace(problem, limits=(*others, moved))).status in status
+
+
+@pytest.mark.slow
+def test_every_star_is_looked_at() -> None:
+    """Two couples of five cylinders: what one can reach under the other, by all stars there are."""
+    asked = [limit("rms rocking couple", orders=[k], max="300 N m", name=f"order {k}") for k in (1, 2)]
+    problem = problem_of(asked, engine=FIVE, counterweights=None)
+    result = laufruhe.solve(problem)
+    assert result.status is Status.INFEASIBLE
+    pairs = []
+    for steps in itertools.permutations(range(1, 5)):
+        fixed = {key: value for key, value in FIVE.items() if key != "firing_order"}
+        star = problem_of([], engine=fixed | {"throws": [0, *(72 * k for k in steps)]}, counterweights=None)
+        found = evaluate(star)
+        pairs.append([found.value(limit.measure) for limit in problem.limits])
+    for k, told in enumerate(result.reached):
+        kept = [pair[k] for pair in pairs if pair[1 - k] <= 300.0]
+        assert told.proof is Proof.GLOBAL
+        assert told.value == pytest.approx(min(kept), rel=1e-9)
+        assert {decision.name for decision in told.decisions} == {f"throw {j}" for j in range(1, 6)}
+    assert "Each limit that is named is needed" in explained(result)
+
+
+OPEN = {"between": ["50 N/mm", "800 N/mm"], "start": "300 N/mm"}
+
+
+def mounts_of(front: dict[str, Any], rear: Any = OPEN) -> dict[str, Any]:
+    """Two pairs of mounts, one open number of each or more."""
+    front = {"name": "front", "position": POSITIONS[0], "stiffness": ["100 N/mm", "100 N/mm", OPEN]} | front
+    own = {"name": "rear", "position": POSITIONS[2], "stiffness": ["100 N/mm", "100 N/mm", rear]}
+    return {"kind": "elastic", "loss_factor": 0.1,
+            "places": [front, {"mirror_of": "front"}, own, {"mirror_of": "rear"}]}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("side", ["min", "max"])
+def test_what_is_not_minimised_is_asked_for_at_edges(side: str) -> None:
+    """Natural frequencies under a sag, against a grid of both stiffnesses."""
+    asked = [limit("static sag", max="1 mm"), limit("natural frequencies", **{side: "12 Hz"})]
+    problem = problem_of(
+        asked, block=BLOCK, counterweights=None, mounts=mounts_of({}), objective={"minimise": "total stiffness"}
+    )
+    result = laufruhe.solve(problem)
+    assert result.status is Status.INFEASIBLE
+    told = next(each for each in result.reached if each.name == "natural frequencies")
+    own = next(limit for limit in problem.limits if limit.name == told.name)
+    others = tuple(limit for limit in problem.limits if limit is not own)
+    sides = [np.geomspace(d.set.lower, d.set.upper, 15) for d in problem.decisions]
+    designs = (evaluate(problem, problem.design(pair)) for pair in itertools.product(*sides))
+    kept = [found.standing(own).value for found in designs if keeps(found, others)]
+    sign = 1.0 if side == "min" else -1.0
+    best = max(sign * value for value in kept)
+    assert told.side == ("at least" if side == "min" else "at most")
+    assert best <= sign * told.bound
+    assert best - 0.01 * abs(best) <= sign * told.value <= sign * told.bound
+    assert told.value == pytest.approx(told.bound, rel=2e-3)
+    values = [decision.value for decision in told.decisions]
+    assert evaluate(problem, problem.design(values)).standing(own).value == pytest.approx(told.value)
+
+
+FORCE = {"minimise": "rms mount force"}
+LOW = mounts_of({"position": ["200 mm", "250 mm", {"between": ["-50 mm", "50 mm"], "start": "0 mm"}]}, "300 N/mm")
+
+
+@pytest.mark.slow
+def test_the_nearest_design_is_kept_where_none_is_found() -> None:
+    """Travel on mounts whose place is open: nothing is proven, and nothing proven is claimed."""
+    asked = [limit("maximum mount travel", max="1 mm"), limit("static sag", max="2 mm")]
+    problem = problem_of(asked, block=BLOCK, counterweights=None, mounts=LOW, objective=FORCE,
+                         search={"starts": 2, "boxes": 1})  # fmt: skip
+    result = laufruhe.solve(problem)
+    assert result.status is Status.FAILED
+    near = result.nearest
+    assert near is not None
+    assert near.name == "maximum mount travel"
+    design = evaluate(problem, problem.design([decision.value for decision in near.decisions]))
+    assert design.value(problem.limits[0].measure) == pytest.approx(near.value, rel=1e-9)
+    assert design.excess(problem.limits) == pytest.approx(near.excess, rel=1e-9)
+    assert near.broken == ("maximum mount travel",)
+    sides = [np.linspace(d.lower, d.upper, 5) for d in problem.decisions]
+    grid = [evaluate(problem, problem.design(list(point))) for point in itertools.product(*sides)]
+    assert near.excess <= evaluate(problem).excess(problem.limits)
+    (told,) = result.reached
+    assert told.proof is Proof.LOCAL
+    kept = [found.value(problem.limits[0].measure) for found in grid if keeps(found, problem.limits[1:])]
+    assert told.bound <= min(kept)
+    assert told.value <= 1.05 * min(kept)
+    written = as_dict(result)
+    assert written["objective"]["value"] is None
+    assert written["nearest"]["decisions"].keys() == {decision.name for decision in near.decisions}
+    assert "proven;" not in " ".join(sentences(result))
+
+
+def told_of(problem: Problem, status: Status, seconds: float | None = None) -> Result:
+    """What is told of a problem that a method says so of, whether that is so or not."""
+    found = replace(solve(problem.changed(decisions=())), status=status, conflict=("quiet",))
+    with limited(seconds):
+        return with_reachable(found, problem, {Kind.UNBALANCE}, 1.0, solve)
+
+
+def test_a_design_that_was_overlooked_is_the_result() -> None:
+    """Whatever a method says: what the exact model shows to keep all limits is a design."""
+    for status in (Status.FAILED, Status.INFEASIBLE):
+        found = told_of(problem_of([LIGHT | {"max": "2 kg"}, QUIET | {"max": "2 kN"}]), status)
+        assert found.status is Status.FEASIBLE
+        assert found.final.excess(found.problem.limits) <= 1e-5
+        assert found.objective.name == "mean mount force"
+        assert found.objective.value == pytest.approx(found.final.value(found.problem.objective[0].measure))
+        assert found.certificate.lower_bound == 0.0
+        assert not found.reached
+
+
+def test_what_a_search_failed_at_is_infeasible_where_the_bound_says_so() -> None:
+    found = told_of(problem_of([LIGHT, QUIET]), Status.FAILED)
+    assert found.status is Status.INFEASIBLE
+    assert found.conflict == ("quiet",)
+
+
+def test_nothing_is_looked_at_when_time_is_over() -> None:
+    found = told_of(SCENES["vee"], Status.INFEASIBLE, 1e-9)
+    assert [each.why for each in found.reached] == [LONG]
+    assert all(math.isnan(each.value) for each in found.reached)
+    assert "it takes long" in sentences(found)[0]
