@@ -201,7 +201,7 @@ class AffineModel:
         """Of the wrench, and of loads inside the crankcase: a bearing feels each cylinder beside it alone."""
         inside = {measure.load for measure in self.problem.measures if measure.is_load and measure.load.is_inside}
         signals = [*(loads.wrench for loads in bare.loads), *(s for channel in inside for s in bare.signals(channel))]
-        return common_base([signal.repeats(tuple(orders)) for signal in signals])
+        return common_base([signal.repeats(tuple(orders)) for signal in signals] or [Fraction(1)])
 
     @property
     def full_samples(self) -> int:

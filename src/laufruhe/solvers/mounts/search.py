@@ -29,7 +29,7 @@ SAME = 1e-6
 MOST_MARGINS = 3
 # excess over a limit that is more than a peak between the samples
 NEAR = 0.05
-ITERATIONS = 150
+ITERATIONS = 100
 MOST_AROUND = 3
 # ends of a search that run-ups are followed exactly from
 MOST_REFINED = 1
@@ -178,7 +178,7 @@ class MountSearch:
                 found, columns = _decided(joint, x)
                 mounts = found + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(found))
                 again.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.turns(x)))
-            more = self._ends(again)
+            more = self._ends(again, _never)
             optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in more))
         self._take(optima)
 
@@ -251,6 +251,11 @@ class MountSearch:
                 break
             near = Found(design, joint, ends[0])
             self._keep(near)
+
+
+def _never(_: Sequence[LocalOptimum]) -> bool:
+    """All starts are tried."""
+    return False
 
 
 def _is_other(found: Found, other: Found) -> bool:

@@ -81,6 +81,7 @@ class Task:
     max_seconds: float
     expand: bool
     outside: Outside | None = None
+    deciding: int | None = None
 
 
 def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
@@ -164,12 +165,17 @@ class _Told(ca.Callback):
 
 @dataclass(frozen=True, eq=False)
 class _Program:
-    """The solver of a program, its clock, the derivatives of the judge's own making, and what has to be kept for it."""
+    """The solver of a program, its clock, and what has to be kept for it."""
 
     solver: Any
     clock: _Clock
-    slopes: Any
     kept: Any = None
+
+    def slopes(self, y: Array, parameters: Sequence[float]) -> tuple[float, Array, Array, Array]:
+        """Objective, constraints, gradient and Jacobian at a point, evaluated anew."""
+        f, gradient = self.solver.get_function("nlp_grad_f")(y, list(parameters))
+        g, jacobian = self.solver.get_function("nlp_jac_g")(y, list(parameters))
+        return float(f), _flat(g), _flat(gradient), np.asarray(jacobian, dtype=float)
 
 
 @lru_cache(maxsize=_BUILT)
@@ -186,8 +192,7 @@ def _built(oracle: str, expand: bool, max_iterations: int, outside: Outside | No
     n, m = function.size1_in("x"), function.size1_out("g")
     clock = _Clock({"x": n, "f": 1, "g": m, "lam_x": n, "lam_g": m, "lam_p": function.size1_in("p")})
     options: dict[str, Any] = {**_QUIET, "ipopt": solver, "iteration_callback": clock}
-    slopes = function.factory("slopes", ["x", "p"], ["f", "g", "grad:f:x", "jac:g:x"])
-    return _Program(ca.nlpsol("solver", "ipopt", function, options), clock, slopes, told)
+    return _Program(ca.nlpsol("solver", "ipopt", function, options), clock, told)
 
 
 def _with_outside(function: Any, outside: Outside) -> tuple[Any, _Told]:
@@ -217,16 +222,16 @@ def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptim
         m, b = _flat(found["lam_g"]), _flat(found["lam_x"])
         if ending in (Ending.FAILED, Ending.INFEASIBLE):
             break
-    f, g, gradient, jacobian = built.slopes(y, list(task.stages[-1]))
+    f, g, gradient, jacobian = built.slopes(y, task.stages[-1])
     with np.errstate(invalid="ignore"):
         # of a point without numbers nothing is a number, and that is all that is asked of it
-        residual, violation = _judged(task, y, _flat(g), _flat(gradient), np.asarray(jacobian, dtype=float), m, b)
-    if not np.isfinite(residual) or not np.isfinite(float(f)):
+        residual, violation = _judged(task, y, g, gradient, jacobian, m, b)
+    if not np.isfinite(residual) or not np.isfinite(f):
         ending, residual, violation = Ending.FAILED, np.inf, np.inf
     return LocalOptimum(
         x=y * task.scales,
-        value=float(f) * task.objective_scale,
-        constraints=_flat(g) * task.constraint_scales,
+        value=f * task.objective_scale,
+        constraints=g * task.constraint_scales,
         multipliers=m * task.objective_scale / task.constraint_scales,
         kkt_residual=residual,
         violation=violation,

@@ -88,6 +88,9 @@ class NonlinearProgram:
         the cost: three times as fast to evaluate, and slower to set up.
     told
         Numbers in the expressions that a model outside tells.
+    deciding
+        How many of the first variables tell two ends apart: all when None. Shapes of modes, that
+        follow from the rest, may have either sign.
     """
 
     x: Any
@@ -106,6 +109,7 @@ class NonlinearProgram:
     stages: tuple[tuple[float, ...], ...] = ((),)
     expand: bool = False
     told: Told | None = None
+    deciding: int | None = None
 
     def __post_init__(self) -> None:
         n, m = self.x.numel(), 0 if self.constraints is None else self.constraints.numel()
@@ -136,7 +140,8 @@ def solve_nonlinear(
     """Local optima that the starts lead to, the best usable one first.
 
     A search of many starts, which `enough` may end, takes all through the first stage; of those that end there at one
-    point, one goes on. Else each goes through all stages: from one point a solver may come to several optima.
+    point, one goes on, and none that is worse there than the best is in the end: what softens norms less makes no
+    end better (N4). Else each goes through all stages: from one point a solver may come to several optima.
 
     Parameters
     ----------
@@ -214,7 +219,8 @@ def _grouped(found: Sequence[LocalOptimum], task: Task) -> list[LocalOptimum]:
 
 def _is_same(end: LocalOptimum, known: LocalOptimum, task: Task) -> bool:
     near = SAME_END * max(abs(known.value), LEAST_SCALE * task.objective_scale)
-    return end.value - known.value <= near and bool(np.all(np.abs(end.x - known.x) <= SAME_PLACE * task.scales))
+    apart = np.abs(end.x - known.x)[: task.deciding] > SAME_PLACE * task.scales[: task.deciding]
+    return end.value - known.value <= near and not apart.any()
 
 
 def _polished(task: Task, groups: Sequence[LocalOptimum], several: Several) -> list[LocalOptimum]:
@@ -225,17 +231,21 @@ def _polished(task: Task, groups: Sequence[LocalOptimum], several: Several) -> l
         return [replace(end, ending=Ending.UNFINISHED) if end.usable else end for end in groups]
     least = min((end.value for end in groups if end.usable), default=math.inf)
     # what is not there yet and worse than what is goes no further
-    left = [end for end in groups if end.ending not in (Ending.FAILED, Ending.INFEASIBLE)
-            and (end.usable or end.value < least)]  # fmt: skip
-    later = {o.start: o for o in several((replace(task, stages=task.stages[1:]), [(o.start, o.x) for o in left]))}
+    going = [end for end in groups if end.ending not in (Ending.FAILED, Ending.INFEASIBLE)
+             and (end.usable or end.value < least)]  # fmt: skip
+    further, later = replace(task, stages=task.stages[1:]), dict[int, LocalOptimum]()
+    # the best first: what is worse where norms are softened more is so where they are softened less (N4)
+    for some in (going[:1], going[1:]):
+        best = min((o.value for o in later.values() if o.usable), default=math.inf)
+        later |= {o.start: o for o in several((further, [(o.start, o.x) for o in some if o.value < best]))}
     found = []
     for end in groups:
         own = later.get(end.start)
-        if own is None:
-            found.append(replace(end, ending=Ending.UNFINISHED) if end.usable else end)
-        else:
+        if own is not None:
             spent = (end.iterations + own.iterations, end.seconds + own.seconds)
             found.append(replace(own, starts=end.starts, iterations=spent[0], seconds=spent[1]))
+        else:
+            found.append(replace(end, ending=Ending.UNFINISHED) if end.usable and passed() else end)
     return found
 
 
@@ -258,5 +268,5 @@ def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float, ma
     return Task(
         oracle.serialize(), program.lower / scales, program.upper / scales, program.constraint_lower / heights,
         program.constraint_upper / heights, scales, program.objective_scale, heights, program.stages,
-        max_iterations, max_seconds, program.expand and many, outside,
+        max_iterations, max_seconds, program.expand and many, outside, program.deciding,
     )  # fmt: skip

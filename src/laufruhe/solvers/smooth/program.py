@@ -148,6 +148,7 @@ class SmoothProgram:
             stages=self._stages,
             expand=not self._is_wide,
             told=self._runs.told,
+            deciding=self._turned.stop,
         )
 
     @property
