@@ -14,7 +14,6 @@ from drawn import scraper  # noqa: E402
 extensions = [
     "mathml",
     "myst_nb",
-    "schema_keys",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
@@ -28,6 +27,9 @@ exclude_patterns = [
     "gallery/*.ipynb",
     "gallery/*.py",
     "gallery/*.md5",
+    # index.rst includes the one, and the site has the other with its pictures
+    "README.md",
+    "gallery.md",
 ]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "amsmath"]
 myst_heading_anchors = 3
@@ -74,6 +76,14 @@ def for_readers_aloud(app, page, template, context, doctree):
     context["body"] = body.replace('<div class="table-wrapper', '<div tabindex="0" class="table-wrapper')
 
 
+def with_pictures(app, *given):
+    """Links to the list of examples lead to the gallery, which the site alone has."""
+    content = given[-1]
+    content[0] = content[0].replace("gallery.md)", "gallery/index.rst)")
+
+
 def setup(app):
     """After the theme has made its navigation."""
+    app.connect("source-read", with_pictures)
+    app.connect("include-read", with_pictures)
     app.connect("html-page-context", for_readers_aloud, priority=900)

@@ -47,7 +47,7 @@ BLOCKS = (
     Code("laufruhe solve " + "a-problem-with-a-long-name-" * 8 + ".toml"),
 )  # fmt: skip
 LEFT_OUT = {"_build", "jupyter_execute", "gallery", "notebooks", "examples"}
-SITE = ("index", "reference/commands", "theory/equations")
+SITE = ("README", "reference/commands", "theory/equations")
 
 
 def _run(*words: object) -> None:
@@ -102,7 +102,7 @@ def site() -> Path:
         for page in source.rglob("*.md"):
             if str(page.relative_to(source).with_suffix("")) not in SITE:
                 page.unlink()
-        extensions = "extensions=mathml,myst_nb,schema_keys,sphinx_copybutton"
+        extensions = "extensions=mathml,myst_nb,sphinx_copybutton"
         words = [sys.executable, "-m", "sphinx", "-Q", "-b", "html", "-D", extensions, source, folder / "site"]
         subprocess.run(words, check=True)
 

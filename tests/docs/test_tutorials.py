@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import doctest
 import re
-import shutil
 from pathlib import Path
 
 import pytest
@@ -13,6 +12,7 @@ from typer.testing import CliRunner
 from laufruhe.cli import app
 
 DOCS = Path(__file__).parents[2] / "docs"
+FILE = re.compile(r"^Save this as `([\w.-]+\.toml)`.*:\n\n```toml\n((?:.*\n)*?)```", re.MULTILINE)
 BLOCK = re.compile(r"^```(console|pycon)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 pytestmark = pytest.mark.slow
@@ -49,8 +49,9 @@ def name_of(page: Path) -> str:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder of a user who saved the files of the pages."""
-    for path in DOCS.glob("tutorials/*.toml"):
-        shutil.copy(path, tmp_path)
+    for page in TUTORIALS:
+        for name, text in FILE.findall(page.read_text(encoding="utf-8")):
+            (tmp_path / name).write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "120")
     return tmp_path
@@ -79,4 +80,6 @@ def test_python_answers_as_the_page_says(page: Path, folder: Path) -> None:
 def test_every_tutorial_shows_an_answer() -> None:
     assert TUTORIALS
     for page in TUTORIALS:
+        text = page.read_text(encoding="utf-8")
+        assert len(FILE.findall(text)) == text.count("```toml"), page.stem
         assert blocks(page, "console") or blocks(page, "pycon"), page.stem

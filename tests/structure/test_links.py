@@ -22,7 +22,7 @@ PAGES = sorted(
     )
     for path in ROOT.glob(pattern)
 )
-LINK = re.compile(r"\]\((?![a-z]+:)([^)\s]*)\)")
+LINK = re.compile(r"\]\((?!https?:|mailto:)([^)\s]*)\)")
 
 
 def is_kept(path: Path) -> bool:

@@ -1,0 +1,108 @@
+"""Pages made of other files, which read without the site too: `python docs/extensions/pages.py` writes them."""
+
+from __future__ import annotations
+
+import ast
+import json
+from collections.abc import Iterator
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from laufruhe.files.hover import alternatives, kind
+
+DOCS = Path(__file__).parents[1]
+HEAD = "| key | type | meaning | example |\n| --- | --- | --- | --- |\n"
+KEYS = """\
+# All keys
+
+Every key of problem and study files, from the schemas that editors use. *Number* is a plain number; a dimension means
+a number with a unit; *may be open* means that `{ between = [low, high] }` may stand in place of the number.
+"""
+GALLERY = """\
+# Gallery
+
+What the ready problems solve. Each program makes the pictures of its problem; the documentation site (`make docs`)
+shows them.
+
+| example | program |
+| --- | --- |
+"""
+
+
+def tables_of(schema: dict[str, Any], entry: dict[str, Any]) -> Iterator[tuple[bool, dict[str, Any]]]:
+    """Tables that a key holds, and whether it is a list of them."""
+    for one in alternatives(schema, entry):
+        if "properties" in one and "between" not in one["properties"]:
+            yield False, one
+        elif one.get("type") == "array" and isinstance(one.get("items"), dict):
+            yield from ((True, table) for _, table in tables_of(schema, one["items"]))
+
+
+def parts_of(table: dict[str, Any]) -> list[dict[str, Any]]:
+    """Tables of which one stands there, as its kind says."""
+    return [choice["then"] for choice in table.get("allOf", ())] or [table]
+
+
+def shown(value: Any) -> str:
+    """A value as it stands in a file."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {shown(one)}" for key, one in value.items()) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(shown, value)) + "]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def which(table: dict[str, Any]) -> str:
+    """What tells one of several tables of a key from the others."""
+    told = [(key, table["properties"][key]) for key in ("kind", "model") if key in table["properties"]]
+    return next((f' {key} = "{entry["const"]}"' for key, entry in told if "const" in entry), "")
+
+
+def row(schema: dict[str, Any], key: str, entry: dict[str, Any]) -> str:
+    """One key."""
+    examples = ", ".join(f"`{shown(one)}`" for one in entry.get("examples", ()))
+    cells = (f"`{key}`", kind(schema, entry), entry.get("description", ""), examples)
+    return "| " + " | ".join(" ".join(cell.split()).replace("|", "\\|") for cell in cells) + " |\n"
+
+
+def sections(schema: dict[str, Any], path: str, table: dict[str, Any], is_list: bool, seen: set[str]) -> Iterator[str]:
+    """The section of a table, and then those of what stands in it, each table once."""
+    name = f"`[[{path}]]`" if is_list else f"`[{path}]`" if path else "At the top of the file"
+    told = [f"{table['description']}\n"] if "description" in table else []
+    rows = "".join(row(schema, key, entry) for key, entry in table["properties"].items())
+    yield "\n".join([f"### {name}{which(table)}\n", *told, HEAD + rows])
+    for key, entry in table["properties"].items():
+        for each, inner in tables_of(schema, entry):
+            for part in parts_of(inner):
+                one = next(alternatives(schema, part))
+                mark = json.dumps(one, sort_keys=True)
+                if mark not in seen:
+                    seen.add(mark)
+                    yield from sections(schema, f"{path}.{key}".strip("."), one, each, seen)
+
+
+def keys() -> str:
+    """Every key of both schemas."""
+    found = [KEYS]
+    for title, name in (("Problem files", "laufruhe"), ("Study files", "laufruhe-study")):
+        schema = json.loads((files("laufruhe.files") / f"{name}.schema.json").read_text(encoding="utf-8"))
+        found += [f"## {title}\n", *sections(schema, "", schema, False, set())]
+    return "\n".join(found)
+
+
+def gallery() -> str:
+    """Every example, with its first lines."""
+    rows = []
+    for path in sorted(DOCS.glob("examples/plot_*.py")):
+        title, _, *lines = (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").split("\n")
+        words = " ".join(" ".join(lines).split())
+        rows.append(f"| **{title}** {words} | [{path.name}](examples/{path.name}) |\n")
+    return GALLERY + "".join(rows)
+
+
+PAGES = {"reference/keys.md": keys, "gallery.md": gallery}
+
+if __name__ == "__main__":
+    for place, made in PAGES.items():
+        (DOCS / place).write_text(made(), encoding="utf-8")
