@@ -16,6 +16,7 @@ import typer
 from typer.core import TyperGroup
 
 from laufruhe.cli import options as o
+from laufruhe.cli.drawing import SELDOM, artists
 from laufruhe.cli.screen import (
     DONE,
     FAILED,
@@ -30,9 +31,6 @@ from laufruhe.cli.screen import (
 )
 from laufruhe.cli.supervised import supervised
 from laufruhe.errors import Complaint, InputError
-
-_SELDOM = 50_000
-"""New objects after which garbage is looked for."""
 
 
 class _Commands(TyperGroup):
@@ -126,10 +124,13 @@ def solve(
     verbose: o.VerboseOption = False,
 ) -> None:
     """Decide what the problem leaves open, and prove how good the design is."""
-    with exit_statuses(problem), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler):
+    kinds = () if no_plots else kind.kinds
+    with (
+        exit_statuses(problem), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler), artists(kinds) as draws
+    ):  # fmt: skip
         from laufruhe.cli.solve import Request, run, solved
 
-        run(Request("solve", problem, json, out, () if no_plots else kind.kinds, animate, tolerance, series), solved)
+        run(Request("solve", problem, json, out, kinds, draws, animate, tolerance, series), solved)
 
 
 @app.command(epilog=_example("laufruhe evaluate problem.toml --series --json -"))
@@ -148,10 +149,11 @@ def evaluate(
 
     Mount forces and orders of the file's own numbers; nothing is decided.
     """
-    with exit_statuses(problem), spoken(quiet, verbose):
+    kinds = () if no_plots else kind.kinds
+    with exit_statuses(problem), spoken(quiet, verbose), artists(kinds) as draws:
         from laufruhe.cli.solve import Request, run, stated
 
-        run(Request("evaluate", problem, json, out, () if no_plots else kind.kinds, animate, series=series), stated)
+        run(Request("evaluate", problem, json, out, kinds, draws, animate, series=series), stated)
 
 
 @app.command(epilog=_example("laufruhe page problem.toml", "laufruhe page problem.toml --no-browser --port 8600"))
@@ -278,7 +280,7 @@ def _options(
 def main() -> None:
     """Entry point of the `laufruhe` command; ends the process."""
     # classes of models and marks of pictures are many, and none of them is garbage
-    gc.set_threshold(_SELDOM)
+    gc.set_threshold(SELDOM)
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             # a terminal that knows no Greek gets an escape in place of a traceback

@@ -13,6 +13,7 @@ from pathlib import Path
 import typer
 
 from laufruhe.cli.check import doubt
+from laufruhe.cli.drawing import Draws
 from laufruhe.cli.screen import DONE, FAILED, Watched, above_zero, complain, is_quiet, json_file, progress
 from laufruhe.errors import SolverError
 from laufruhe.files.reader import load
@@ -42,6 +43,7 @@ class Request:
     json: str | None
     out: Path | None
     kinds: tuple[str, ...]
+    draws: Draws
     animated: bool = False
     tolerance: float | None = None
     series: bool = False
@@ -98,13 +100,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         what = "which parts go where" if problem.assembly else what
         say(f"deciding {what}" if open_numbers or problem.phasing is not None or problem.assembly else "evaluating")
         result = answer(problem, Watched(say, problem.objective_unit or ""))
-        pictures: dict[str, str] = {}
-        if request.kinds:
-            from laufruhe.plots import draw_and_show
-
-            say("drawing")
-            with _timed(seconds, "plots"):
-                pictures = draw_and_show(result, stage, request.kinds)
+        drawn = request.draws(result, stage)
         if request.animated:
             from laufruhe.plots.motion import animate
 
@@ -114,6 +110,10 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         say("writing tables")
         with _timed(seconds, "tables"):
             write_tables(result, stage)
+        if request.kinds:
+            say("drawing")
+        with _timed(seconds, "plots"):
+            pictures = drawn()
         result = replace(result, timing={**result.timing, **seconds})
         document = result_document(result, list(pictures), request.command)
         files.write(stage / files.REPORT, rendered(document, f".{request.kinds[0]}" if request.kinds else ""))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import chdir
 from importlib import import_module
 from pathlib import Path
@@ -21,10 +21,8 @@ from laufruhe.solvers.result import Result
 
 def figures(result: Result) -> Iterator[tuple[str, Figure]]:
     """Every picture that this result fills, by its name, in the order of a report."""
-    for name in PICTURES:
-        picture = import_module(f"{__name__}.results.{name}")
-        if picture.applies(result):
-            yield name, picture.figure(result)
+    for name in names(result):
+        yield name, figure(result, name)
 
 
 def names(result: Result) -> list[str]:
@@ -44,18 +42,20 @@ def figure(result: Result, name: str) -> Figure:
 
 def draw(result: Result, folder: Path, kinds: Sequence[str] = ("png",)) -> tuple[str, ...]:
     """Picture files of these kinds, png or svg, into a folder; returns their names."""
-    return tuple(name for _, figure_names, _ in _drawn(result, folder, kinds) for name in figure_names)
+    return tuple(name for _, figure_names, _ in _drawn(result, folder, kinds, names(result)) for name in figure_names)
 
 
-def draw_and_show(result: Result, folder: Path, kinds: Sequence[str]) -> dict[str, str]:
-    """As `draw`, and what stands in a page: SVG by the names of the pictures."""
-    return {name: as_svg(figure) for name, _, figure in _drawn(result, folder, kinds)}
+def draw_and_show(result: Result, folder: Path, kinds: Sequence[str], wanted: Iterable[str]) -> dict[str, str]:
+    """Some pictures as `draw` makes them, and what stands in a page: SVG by their names."""
+    return {name: as_svg(figure) for name, _, figure in _drawn(result, folder, kinds, wanted)}
 
 
-def _drawn(result: Result, folder: Path, kinds: Sequence[str]) -> Iterator[tuple[str, list[str], Figure]]:
+def _drawn(
+    result: Result, folder: Path, kinds: Sequence[str], wanted: Iterable[str]
+) -> Iterator[tuple[str, list[str], Figure]]:
     folder.mkdir(parents=True, exist_ok=True)
-    for name, figure in figures(result):
-        files = [f"{name}.{kind}" for kind in kinds]
+    for name in wanted:
+        drawn, files = figure(result, name), [f"{name}.{kind}" for kind in kinds]
         for file in files:
-            save(figure, folder / file)
-        yield name, files, figure
+            save(drawn, folder / file)
+        yield name, files, drawn

@@ -1,0 +1,49 @@
+"""Pictures that other processes draw are those that the command would draw itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cli import scenes
+from laufruhe.cli import drawing
+from laufruhe.files.reader import load
+from laufruhe.solvers import solve
+from laufruhe.solvers.result import Result
+from problem_files import PROBLEMS
+
+pytestmark = pytest.mark.slow
+
+
+def drawn(result: Result, folder: Path, count: int, monkeypatch: pytest.MonkeyPatch) -> dict[str, bytes]:
+    monkeypatch.setattr(drawing, "MOST", count)
+    monkeypatch.setattr(drawing, "processors", lambda: 3)
+    with drawing.artists(("png",)) as draws:
+        found = draws(result, folder)()
+    files = {f"{name}.png": (folder / f"{name}.png").read_bytes() for name in found}
+    assert {path.name for path in folder.iterdir()} == set(files)
+    return files | {name: svg.encode() for name, svg in found.items()}
+
+
+def test_by_whom_a_picture_is_drawn_cannot_be_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    result = solve(load(PROBLEMS / "vee-two-90.toml"))
+    here, there = (drawn(result, tmp_path / str(count), count, monkeypatch) for count in (0, 2))
+    assert list(here) == list(there)
+    assert here == there
+
+
+def test_a_crank_that_was_open_is_drawn_by_another_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def never(*_: object) -> None:
+        raise AssertionError("drawn here")
+
+    result = solve(load(PROBLEMS / "two-stroke-four-open.toml"))
+    monkeypatch.setattr("laufruhe.plots.draw_and_show", never)
+    assert {"star.png", "firings.png"} <= set(drawn(result, tmp_path, 1, monkeypatch))
+
+
+def test_what_cannot_be_told_to_another_process_is_drawn_here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    result = scenes.solved(scenes.TIGHT)
+    result = replace(result, timing={"none": lambda: None})  # type: ignore[dict-item]
+    assert "engine.png" in drawn(result, tmp_path, 1, monkeypatch)
