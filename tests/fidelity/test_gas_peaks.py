@@ -18,7 +18,7 @@ from laufruhe.fidelity.automatic import choose
 from laufruhe.machine import GasModel, PressureTrace, Seiliger, SliderCrank, Wiebe
 from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.physics.bearing_loads import pin_forces
-from laufruhe.physics.gas_cycle import cylinder_pressure, pressure_at
+from laufruhe.physics.gas_cycle import pressure_at
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem import channels
@@ -26,6 +26,7 @@ from laufruhe.problem.evaluation import evaluate, measured, objective_value
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.accuracy import error_of
+from one_cylinder import cylinder_pressure
 
 FAST, USUAL, QUICK = 12, 25, 20_000
 SUBJECTS = channels.MOUNT_FORCE, channels.ROLL_MOMENT

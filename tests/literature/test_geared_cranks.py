@@ -12,11 +12,11 @@ import moving_masses as mm
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.numerics.spectrum import order_amplitude
-from laufruhe.physics.gas_cycle import cylinder_pressure
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Result
+from one_cylinder import cylinder_pressure
 from problem_files import PROBLEMS, changed, loaded
 
 

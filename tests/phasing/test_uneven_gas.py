@@ -10,8 +10,7 @@ import pytest
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.load_models.throw_moves import ThrowMoves
-from laufruhe.load_models.uneven_gas import LEFT_OUT
-from laufruhe.load_models.uneven_model import Symbols, UnevenModel, rides_of
+from laufruhe.load_models.uneven_model import LEFT_OUT, Symbols, UnevenModel, rides_of
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate

@@ -15,7 +15,7 @@ import pytest
 import laufruhe
 from laufruhe.errors import ModelError
 from laufruhe.files.reader import load_tables, tables_of
-from laufruhe.load_models import turned_loads, uneven_model
+from laufruhe.load_models import uneven_model
 from laufruhe.load_models.mount_loads import MovedThrows
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.throw_waves import ThrowWaves
@@ -86,7 +86,7 @@ SCENES = {
 def test_smooth_loads_are_those_of_the_exact_model(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Throws, bank, split pin and weight drawn at random; every order kept."""
     monkeypatch.setattr(uneven_model, "INSIDE_LEFT_OUT", 1e-9)
-    monkeypatch.setattr(turned_loads, "HIGHEST", math.inf)
+    monkeypatch.setattr(uneven_model, "HIGHEST", math.inf)
     engine, throws, told = SCENES[name]
     problem = problem_of(engine, "rms main-bearing force", throws, **told)
     phasing = problem.phasing

@@ -23,8 +23,8 @@ from laufruhe.physics.bearing_loads import (
 from laufruhe.physics.bearing_shares import beam_shares, lever_shares
 from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.gas_cycle import cylinder_pressure
 from laufruhe.physics.shaking_loads import rotor_loads, shaking_loads
+from one_cylinder import cylinder_pressure
 
 FloatArray = NDArray[np.float64]
 GAS = Seiliger(peak_pressure=80e5, imep=6e5)

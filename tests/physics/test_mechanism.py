@@ -13,7 +13,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Shaft, SliderCrank
 from laufruhe.physics import mechanism
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.shaking_loads import inertia_coefficients
+from one_cylinder import inertia_coefficients
 
 ROUNDING = 2e-13
 

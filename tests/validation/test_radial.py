@@ -30,7 +30,6 @@ from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_cycle import thrust_at
 from laufruhe.physics.shaking_loads import (
-    inertia_coefficients,
     reciprocating_loads,
     rod_inertia_loads,
     rotating_loads,
@@ -38,6 +37,7 @@ from laufruhe.physics.shaking_loads import (
 )
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
+from one_cylinder import inertia_coefficients
 from problem_files import changed, loaded
 
 READY = Path(__file__).parents[2] / "problems" / "radial-seven.toml"

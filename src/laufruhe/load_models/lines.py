@@ -48,14 +48,6 @@ class Lines:
         return Lines(self.orders, ca.horzcat(*real), ca.horzcat(*imaginary))
 
 
-def turned(orders: Array, coefficients: NDArray[np.complex128], angle: Any) -> Lines:
-    """c_h e^{i h angle} of every order, shape (1, n)."""
-    phases = ca.DM(orders).T * angle
-    cosine, sine = ca.cos(phases), ca.sin(phases)
-    a, b = ca.DM(coefficients.real.copy()).T, ca.DM(coefficients.imag.copy()).T
-    return Lines(orders, a * cosine - b * sine, a * sine + b * cosine)
-
-
 def summed(parts: Sequence[Lines]) -> Lines:
     """Signals added up, order by order."""
     orders = np.unique(np.concatenate([part.orders for part in parts]))

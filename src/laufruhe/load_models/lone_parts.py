@@ -6,11 +6,15 @@ cylinder, and one cylinder may load those of another.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
 from laufruhe.machine import Chambers, Engine, OperatingPoint, Rotor, SliderCrank
 from laufruhe.problem.problem import Problem
+
+QUARTERS = (0.0, 0.5 * math.pi, math.pi)
+"""Banks that tell what a cylinder loads at any other: all of it leans with the bank, or not at all."""
 
 
 def idle(part: SliderCrank) -> SliderCrank:

@@ -1,14 +1,18 @@
-"""Loads of throws as sums of waves of their angles, with coefficients from the exact model (S26).
+"""Loads of throws as sums of waves of their angles, with coefficients from the exact model (S26, S30).
 
 Whatever turns with a throw loads by order h as c_h e^{i h theta}: its slider-cranks, their gas and the unbalances
 that ride on it. A norm of loads is then one of rows that are affine in cos(h theta) and sin(h theta) of
 every throw, and in the unbalances.
+
+Where the bank angle is open, a cylinder alone with its axis upright loads by A, with the axis a quarter turn further by
+B, and in roll by C. On the bank b = s beta its axis leans by b, and it is later by b: order h is e^{i h (theta - b)}
+times A_h cos b + B_h sin b + C_h, waves of b of the orders h - 1, h and h + 1. A split pin makes it later alone.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -16,9 +20,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import MOST_NUMBERS, AffineModel, AffineNorm
-from laufruhe.load_models.lone_parts import lone, motored, only_rotors, working
-from laufruhe.machine import Engine
-from laufruhe.machine.firing_windows import lateness
+from laufruhe.load_models.lone_parts import QUARTERS, lone, motored, only_rotors, working
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.norms.norm import amplitudes, mean_square
@@ -30,6 +32,7 @@ from laufruhe.problem.problem import Problem
 _NOTHING, _FEW = 1e-10, 24
 _MANY = 96
 _LISTED = 4096
+Wave = tuple[Fraction, ...]
 PEAK_STEPS = 2
 """Parts of a step about which peaks are averaged: none is more than the peak, however short."""
 
@@ -44,15 +47,19 @@ class Moving:
         Its throw.
     cylinder
         Its number from 0; None of unbalances.
-    angle, lap
-        Angle of the throw and whole turns of the firing in the engine that its loads are taken from.
+    found
+        Its loads alone; where the bank angle is open, of a cylinder upright, a quarter turn further and upside down.
+    ahead
+        Angle that makes them those at theta = 0, no whole turns and open angles at zero [rad].
+    riding
+        Unbalances by the names of their rotors.
     """
 
     pin: int
     cylinder: int | None
-    engine: Engine
-    angle: float
-    lap: int
+    found: tuple[Evaluation, ...]
+    ahead: float
+    riding: dict[str, complex]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +110,10 @@ class ThrowWaves:
         Of its engine.
     rides
         Throw that every rotor turns with; rotors left out stand still.
+    opened
+        Whether the bank angle and split pins are open.
+    turns
+        What an open angle adds to every throw: side of cylinder 1 where throws are counted from its dead centre.
     """
 
     share_left_out: tuple[float, float] = 1e-4, 1e-3
@@ -110,26 +121,59 @@ class ThrowWaves:
     are lowered by it. Of many orders more: inside the crankcase a pressure that jumps has no end of them."""
     _followed: tuple[float, float] = 1e-4, 3e-5
 
-    def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int]) -> None:
-        self.problem, self.layout = problem, layout
-        engine = problem.engine
+    def __init__(
+        self, problem: Problem, layout: Layout, rides: dict[str, int], opened: tuple[bool, bool] = (False, False),
+        turns: float = 0.0,
+    ) -> None:  # fmt: skip
+        self.problem, self.layout, self._opened, self._turns = problem, layout, opened, turns
         self.throws = len(layout.throw_positions)
+        if any(opened) and self.throws == 1:
+            # one throw is cheap to follow
+            self.share_left_out, self._followed = (1e-6, 1e-6), (1e-9, 1e-9)
+        engine = problem.engine
         still = tuple(replace(rotor, unbalance=0.0j) if rotor.name in rides else rotor for rotor in engine.rotors)
         inside = any(measure.is_inside for measure in problem.measures)
-        self.parts = _moving(engine, layout, rides, inside)
-        self._alone = [evaluate(self._acting(part), part.engine) for part in self.parts]
+        self.parts = [*self._cylinders(inside), *self._riding(rides, inside)]
         self.rest = AffineModel(replace(motored(problem), engine=only_rotors(engine, still, inside)), keep_all=True)
         self.times = self._kept()
-        self.orders = np.array([[float(order)] for order in self.times])
+        every = sorted({wave for part in self.parts for wave, *_ in self._waves_of(part)})
+        self.orders = np.array([[float(order) for order in wave] for wave in every])
+        self._place_of = {wave: place for place, wave in enumerate(every)}
         self._turning = [as_order(abs(rotor.shaft.ratio)) for rotor in still]
         self.base = common_base([order for order in (*self.times, *self._turning, Fraction(1)) if order])
         self.rest.base = self.base
 
-    def _acting(self, part: Moving) -> Problem:
-        """What acts on a part alone."""
-        if part.cylinder is None:
-            return motored(self.problem)
-        return working(self.problem, self.problem.engine.slider_cranks[part.cylinder].name)
+    def _cylinders(self, inside: bool) -> Iterator[Moving]:
+        """Every cylinder with alpha = 0 when phi = 0, alone or, for loads inside the crankcase, beside idle ones."""
+        engine, layout = self.problem.engine, self.layout
+        for k, (part, pin) in enumerate(zip(engine.slider_cranks, layout.pins, strict=True)):
+            acting, late = working(self.problem, part.name), layout.late[k] if layout.late else 0.0
+            banks = QUARTERS if self._opened[0] else (layout.banks[k],)
+            turned = (replace(part, bank=bank, throw=bank, firing_angle=late) for bank in banks)
+            found = tuple(evaluate(acting, lone(engine, k, inside, each)) for each in turned)
+            # what is not open makes the cylinder later, or sooner
+            ahead = 0.0 if self._opened[0] else -layout.banks[k]
+            yield Moving(pin, k, found, ahead + (0.0 if self._opened[1] else layout.pin_offsets[k]), {})
+
+    def _riding(self, rides: dict[str, int], inside: bool) -> Iterator[Moving]:
+        """What rides on every throw."""
+        engine, layout = self.problem.engine, self.layout
+        for pin in sorted(set(rides.values())):
+            own = [rotor for rotor in engine.rotors if rides.get(rotor.name) == pin and rotor.unbalance]
+            k = layout.pins.index(pin)
+            angle = engine.slider_cranks[k].throw - layout.pin_offsets[k]
+            if own:
+                found = evaluate(motored(self.problem), only_rotors(engine, own, inside))
+                yield Moving(pin, None, (found,), -angle, {rotor.name: rotor.unbalance for rotor in own})
+
+    def _waves_of(self, part: Moving) -> Iterator[tuple[Wave, int, int]]:
+        """Waves of a part, each with the place of its order and its component."""
+        side = Fraction(0 if part.cylinder is None else self.layout.side(part.cylinder))
+        for j, step in enumerate((-1, 0, 1) if len(part.found) > 1 else (0,)):
+            for h, order in enumerate(self.times):
+                turned = order * Fraction(self._turns)
+                each = (turned - (order + step) * side, turned - order * side)
+                yield (order, *(m for m, is_open in zip(each, self._opened, strict=True) if is_open)), h, j
 
     @property
     def followed(self) -> float:
@@ -142,10 +186,6 @@ class ThrowWaves:
     @property
     def _loads(self) -> list[Measure]:
         return [measure for measure in self.problem.measures if measure.is_load]
-
-    def _signals(self, measure: Measure, k: int) -> list[Spectrum]:
-        """What counts of one moving part's loads at every operating point that counts."""
-        return self.counted(measure, self._alone[k])
 
     def counted(self, measure: Measure, found: Evaluation) -> list[Spectrum]:
         """What counts of loads at every operating point that counts."""
@@ -163,7 +203,8 @@ class ThrowWaves:
         kept = {Fraction(1)}
         for measure in self._loads:
             squares: dict[Fraction, float] = {}
-            for signal in (one for k in range(len(self.parts)) for one in self._signals(measure, k)):
+            every = (found for part in self.parts for found in part.found)
+            for signal in (one for found in every for one in self.counted(measure, found)):
                 sizes = np.square(np.abs(signal.coefficients)).reshape(len(signal.coefficients), -1).sum(axis=1)
                 for j in np.flatnonzero(sizes):
                     order = int(j) * signal.base
@@ -179,11 +220,19 @@ class ThrowWaves:
 
     def left_out(self, measure: Measure, samples: int) -> float:
         """What the orders that are left out amount to at most, wherever the throws stand."""
-        return sum(self._left_out(measure, k, samples) for k in range(len(self.parts))) if measure.is_load else 0.0
+        return sum(self._left_out(measure, part, samples) for part in self.parts) if measure.is_load else 0.0
 
-    def _left_out(self, measure: Measure, k: int, samples: int) -> float:
-        """Of one part."""
-        return self.tail(measure, self._signals(measure, k), samples)
+    def _left_out(self, measure: Measure, part: Moving, samples: int) -> float:
+        """Of one part, wherever its bank: |A cos b + B sin b + C| is no more than all three."""
+        every = [self.counted(measure, found) for found in part.found]
+        if len(every) == 1:
+            return self.tail(measure, every[0], samples)
+        total = 0.0
+        for u, a, d in zip(*every, strict=True):
+            still = (u + d).each(lambda values: 0.5 * values)
+            leaning = (u + d.each(np.negative)).each(lambda values: 0.5 * values), a + still.each(np.negative)
+            total = max(total, sum(self.tail(measure, [one], samples) for one in (still, *leaning)))
+        return total
 
     def tail(self, measure: Measure, signals: Sequence[Spectrum], samples: int) -> float:
         """What the orders that are left out of signals amount to at most, those beyond the last included."""
@@ -216,45 +265,49 @@ class ThrowWaves:
         if count > MOST_NUMBERS:
             raise ModelError(f"{2e-6 * count:.0f} million numbers at once")
         waves = np.zeros((len(self.parts), len(self.orders), *fixed.constant.shape), complex)
-        for k in range(len(self.parts)):
-            self.add(waves[k], measure, k, samples)
+        for own, part in zip(waves, self.parts, strict=True):
+            if measure.is_load or (measure.is_mass and part.cylinder is None):
+                rows = self._own_rows(measure, part, samples)
+                for wave, h, j in self._waves_of(part):
+                    own[self._place_of[wave]] += rows[j][h]
         return WaveNorm(fixed, waves, self.left_out(measure, samples))
 
-    def add(self, waves: ComplexArray, measure: Measure, k: int, samples: int) -> None:
-        """Rows of one part to those of its waves, shape (waves, k, d)."""
-        if self.acts(measure, k):
-            waves[:] = self.own_rows(measure, k, samples)
-
-    def acts(self, measure: Measure, k: int) -> bool:
-        """Whether a part has to do with a measure."""
-        return measure.is_load or (measure.is_mass and self.parts[k].cylinder is None)
-
-    def own_rows(self, measure: Measure, k: int, samples: int) -> ComplexArray:
-        """Rows of every order of a part at theta = 0 and no whole turns, shape (orders, k, d)."""
-        part = self.parts[k]
+    def _own_rows(self, measure: Measure, part: Moving, samples: int) -> list[ComplexArray]:
+        """Rows of every order of a part, of each of its components, shape (orders, k, d)."""
+        times = np.array([float(order) for order in self.times])
+        turned = np.exp(1j * times * part.ahead)[:, None, None]
         if measure.is_load:
-            rows = [self.coefficients(signal) for signal in self._alone[k].signals(measure.load)]
-            return self.rows_of(measure, rows, samples) * self._turned(part)
-        first = np.array([order == 1 for order in self.times])
-        return np.asarray(first[:, None, None] * self._turned(part) * self._weights(measure, part))
+            every = [found.signals(measure.load) for found in part.found]
+            by_point = [self._components([self._coefficients(one) for one in own]) for own in zip(*every, strict=True)]
+            return [self._rows_of(measure, own, samples) * turned for own in zip(*by_point, strict=True)]
+        return [np.asarray((times == 1.0)[:, None, None] * turned * self._weights(measure, part))]
+
+    @staticmethod
+    def _components(found: list[ComplexArray]) -> list[ComplexArray]:
+        """Of what leans with the bank, of what does not, and of what leans against it, from the banks of `QUARTERS`."""
+        if len(found) == 1:
+            return found
+        upright, across, upside = found
+        still = 0.5 * (upright + upside)
+        a, b = 0.5 * (upright - upside), across - still
+        return [0.5 * (a - 1j * b), still, 0.5 * (a + 1j * b)]
 
     def _weights(self, measure: Measure, part: Moving) -> ComplexArray:
         """Rows of the masses that ride on a throw, which turn with it."""
         engine = self.problem.engine
-        riding = {rotor.name: rotor.unbalance for rotor in part.engine.rotors}
         rows = [
-            mass_rows(measure, [replace(r, unbalance=turn * riding.get(r.name, 0.0)) for r in engine.rotors]).vectors
+            mass_rows(
+                measure, [replace(r, unbalance=turn * part.riding.get(r.name, 0.0)) for r in engine.rotors]
+            ).vectors
             for turn in (1.0, 1.0j)
         ]
         return np.asarray(rows[0] - 1j * rows[1])
 
-    def coefficients(self, signal: Spectrum) -> ComplexArray:
+    def _coefficients(self, signal: Spectrum) -> ComplexArray:
         """Of the orders that are kept, shape (orders, places, d)."""
         return np.array([signal.at(float(order)) for order in self.times])
 
-    def rows_of(
-        self, measure: Measure, own: Sequence[ComplexArray], samples: int
-    ) -> ComplexArray:  # fmt: skip
+    def _rows_of(self, measure: Measure, own: Sequence[ComplexArray], samples: int) -> ComplexArray:
         """Rows of every order of coefficients at the operating points, shape (orders, k, d)."""
         steps, times = [round(order / self.base) for order in self.times], np.array([float(t) for t in self.times])
         angles = math.tau / float(self.base) * np.arange(samples) / samples
@@ -270,14 +323,10 @@ class ThrowWaves:
                 blocks.append(rows.reshape(len(steps), -1, counted.shape[-1]))
         return np.concatenate(blocks, axis=1) if blocks else np.zeros((len(steps), 1, 1), complex)
 
-    def _turned(self, part: Moving) -> ComplexArray:
-        """Every order back to theta = 0 and no whole turns, shape (orders, 1, 1)."""
-        times = np.array([float(order) for order in self.times])
-        return np.asarray(np.exp(-1j * times * (part.angle - math.tau * part.lap))[:, None, None])
-
     def arcs(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Bounds of the throws in a box of all angles, as the unbalances that ride on them know them [rad]."""
-        return lower, upper
+        """Bounds of the throws in a box of all angles, which open ones turn, as what rides on them knows them [rad]."""
+        ends = self._turns * lower[self.throws :].sum(), self._turns * upper[self.throws :].sum()
+        return lower[: self.throws] + min(ends), upper[: self.throws] + max(ends)
 
     def samples(self, measure: Measure, wanted: int) -> int:
         """Steps at which squares are exact, or as many as wanted."""
@@ -295,17 +344,3 @@ def _averaged(signal: Spectrum, out: Mask, steps: float) -> Array:
     count, base = len(signal.coefficients), float(signal.base)
     further = signal.corners.beyond_averaged(count, base, steps / base)
     return np.asarray(whole + np.linalg.norm(further, axis=-1))
-
-
-def _moving(engine: Engine, layout: Layout, rides: dict[str, int], inside: bool) -> list[Moving]:
-    """Every cylinder, and what rides on every throw; for loads inside the crankcase with the places of the others."""
-    out, angles, late = [], {}, lateness(layout)
-    for k, (part, pin) in enumerate(zip(engine.slider_cranks, layout.pins, strict=True)):
-        angles[pin] = part.throw - layout.pin_offsets[k]
-        lap = round((part.firing_angle + late[k] + angles[pin]) / math.tau)
-        out.append(Moving(pin, k, lone(engine, k, inside), angles[pin], lap))
-    for pin in sorted(set(rides.values())):
-        riding = tuple(rotor for rotor in engine.rotors if rides.get(rotor.name) == pin and rotor.unbalance)
-        if riding:
-            out.append(Moving(pin, None, only_rotors(engine, riding, inside), angles[pin], 0))
-    return out

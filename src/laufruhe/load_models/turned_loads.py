@@ -1,4 +1,4 @@
-"""Loads of any channel as expressions of throws, banks and unbalances, with coefficients from the exact model (S37).
+"""Loads as expressions of throws, banks and unbalances, with coefficients from the exact model (S19, S23, S37).
 
 A cylinder that fires when phi = 0 loads by order h as A_h with its axis upright, B_h with it a quarter turn further,
 D_h upside down. At a bank b and at a star angle s = theta + o - b, counted from where it fires, it loads by
@@ -11,7 +11,6 @@ Re U times what 1 loads, and Im U times what i loads, at the one order that its 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -20,18 +19,34 @@ import casadi as ca
 import numpy as np
 
 from laufruhe.load_models.lines import Lines, summed
-from laufruhe.load_models.lone_parts import lone, motored, only_rotors, working
+from laufruhe.load_models.lone_parts import QUARTERS, lone, motored, only_rotors, working
 from laufruhe.machine import Engine, Rotor
-from laufruhe.numerics.arrays import Array, ComplexArray
+from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import Measure, selected
+from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.problem import Problem
 
-QUARTERS = (0.0, 0.5 * math.pi, math.pi)
-HIGHEST = 24.0
-"""Order up to which a smooth program knows loads inside the crankcase: a pressure that jumps has no end of them."""
 _NOTHING = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Felt:
+    """Which orders of some components of a load are followed.
+
+    Attributes
+    ----------
+    rows
+        Of the components, places one after the other.
+    left_out
+        Share of their root mean square that orders left out may hold together.
+    gain
+        What an order counts for; the same for all when left out.
+    """
+
+    rows: slice
+    left_out: float
+    gain: Callable[[float], float] = lambda _: 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,24 +59,29 @@ class _Leaning:
 
 
 class TurnedLoads:
-    """What a measure takes the norm of at one operating point, of a crank whose throws and banks move.
+    """A load at one operating point, of a crank whose throws and banks move.
 
     Parameters
     ----------
     problem
         With one star and firing order.
-    measure
-        Of a load.
     point
         Number of the operating point.
+    signal
+        What is felt of loads, shape (n, places, d).
     banks
-        Whether banks move.
-    left_out
-        Share of the root mean square that orders left out may hold together.
+        Whether banks may move.
+    felt
+        Which orders are followed: all that any of these follow.
+    beside
+        Whether the load has places of every cylinder, so that those idle stay in theirs.
     """
 
-    def __init__(self, problem: Problem, measure: Measure, point: int, banks: bool, left_out: float) -> None:
-        self._problem, self._measure, self._banks = problem, measure, banks
+    def __init__(
+        self, problem: Problem, point: int, signal: Callable[[PointLoads], Spectrum], banks: bool,
+        felt: Sequence[Felt], beside: bool,
+    ) -> None:  # fmt: skip
+        self._problem, self._signal, self._banks, self._beside = problem, signal, banks, beside
         self._point = replace(problem, points=(problem.points[point],))
         parts = problem.engine.slider_cranks
         found = [[self._of_cylinder(k, bank) for bank in (QUARTERS if banks else (part.bank,))]
@@ -74,8 +94,10 @@ class TurnedLoads:
         rows = [[self._rows(spectrum) for spectrum in own] for own in found]
         longest = max(len(own) for each in rows for own in each)
         padded = [[_padded(own, longest) for own in each] for each in rows]
-        kept = _kept(padded, left_out)
-        self._orders: Array = np.asarray(kept * float(self._base), dtype=np.float64)
+        orders: Array = np.arange(longest, dtype=np.float64) * float(self._base)
+        squares = np.sum([np.square(np.abs(own)) for each in padded for own in each], axis=0)
+        kept = np.flatnonzero(np.any([_kept(squares[:, own.rows].sum(axis=1), orders, own) for own in felt], axis=0))
+        self._orders: Array = orders[kept]
         self._cylinders = [_leaning([own[kept] for own in each]) for each in padded]
 
     def lines(self, stars: Sequence[Any], banks: Sequence[Any], unbalance: Callable[[Rotor], Any]) -> list[Lines]:
@@ -108,21 +130,22 @@ class TurnedLoads:
         """Alone, at a bank, firing when phi = 0."""
         engine = self._problem.engine
         part = replace(engine.slider_cranks[k], bank=bank, throw=bank, firing_angle=0.0)
-        return self._signal(working(self._point, part.name), lone(engine, k, True, part))
+        return self._loaded(working(self._point, part.name), lone(engine, k, self._beside, part))
 
     def _of_unit(self, rotor: Rotor) -> list[Spectrum]:
         """Of one that is 1, and i."""
         engine = self._problem.engine
-        units = (only_rotors(engine, [replace(rotor, unbalance=u)], True) for u in (1.0, 1.0j))
-        return [self._signal(motored(self._point), unit) for unit in units]
+        units = (only_rotors(engine, [replace(rotor, unbalance=u)], self._beside) for u in (1.0, 1.0j))
+        return [self._loaded(motored(self._point), unit) for unit in units]
 
-    def _signal(self, problem: Problem, engine: Engine) -> Spectrum:
-        (signal,) = evaluate(problem, engine).signals(self._measure.load)
-        return selected(self._measure, signal.series, self._problem.engine)
+    def _loaded(self, problem: Problem, engine: Engine) -> Spectrum:
+        (point,), fidelity = problem.points, problem.fidelity
+        wrench = shaking_loads(engine, point, fidelity)
+        return self._signal(PointLoads(point, wrench, None, moving=engine, fidelity=fidelity)).series
 
     def _rows(self, spectrum: Spectrum) -> ComplexArray:
         """Coefficients of the orders of the cycle, shape (orders, places times components)."""
-        own = spectrum.rebased(self._base).kept(HIGHEST).coefficients
+        own = spectrum.rebased(self._base).coefficients
         return np.asarray(own.reshape(len(own), -1))
 
 
@@ -130,12 +153,12 @@ def _padded(rows: ComplexArray, count: int) -> ComplexArray:
     return np.pad(rows, ((0, count - len(rows)), (0, 0)))
 
 
-def _kept(rows: Sequence[Sequence[ComplexArray]], left_out: float) -> Array:
+def _kept(squares: Array, orders: Array, felt: Felt) -> Mask:
     """The first orders, that hold all but a share of the root mean square."""
-    squares = np.sum([np.square(np.abs(own)).sum(axis=1) for each in rows for own in each], axis=0)
+    squares = squares * np.square([felt.gain(float(order)) for order in orders])
     tail = np.cumsum(squares[::-1])[::-1]
-    felt = (tail > left_out**2 * tail[0]) & (squares > _NOTHING**2 * tail[0])
-    return np.asarray(np.flatnonzero(felt) if felt.any() else np.zeros(1, dtype=np.intp))
+    found = (tail > felt.left_out**2 * tail[0]) & (squares > _NOTHING**2 * tail[0])
+    return np.asarray(found if found.any() else np.arange(len(orders)) == 0)
 
 
 def _leaning(rows: Sequence[ComplexArray]) -> _Leaning:
@@ -148,4 +171,5 @@ def _leaning(rows: Sequence[ComplexArray]) -> _Leaning:
 
 
 def _dm(values: Array) -> Any:
-    return ca.DM(np.ascontiguousarray(values))
+    """What gas does not load is left out: it has many orders, and forces few."""
+    return ca.sparsify(ca.DM(np.ascontiguousarray(values)))

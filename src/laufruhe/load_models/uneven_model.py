@@ -1,9 +1,8 @@
-"""Loads of throws at any angles as smooth expressions, with coefficients from the exact model (S19).
+"""Norms of loads over throws at any angles as smooth expressions, with coefficients from the exact model (S19).
 
-A slider-crank's wrench of order h is its own coefficient times e^{i h (theta + o - beta)}
-along its axis; a rotor that rides on a throw turns with it, and gas with the firing dead
-centre of its cylinder. Everything that turns the same way whatever the throws do is a
-number from the exact model.
+What a cylinder loads by turns with its throw and leans with its bank, its gas with its firing dead centre
+phi_k = 2 pi l_k - (theta_k + o_k - beta_k); a rotor that rides on a throw turns with it. The number of turns l_k is the
+firing order's, and stays while the throws move (S23).
 """
 
 from __future__ import annotations
@@ -18,11 +17,10 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.load_models.lines import Lines, summed, turned
+from laufruhe.load_models.lines import Lines
 from laufruhe.load_models.mount_rows import SAMPLES_PER_ORDER
 from laufruhe.load_models.mount_symbols import waves
-from laufruhe.load_models.turned_loads import TurnedLoads
-from laufruhe.load_models.uneven_gas import LEFT_OUT, GasMoments, turns_of
+from laufruhe.load_models.turned_loads import Felt, TurnedLoads
 from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array
@@ -30,18 +28,22 @@ from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import Spectrum, as_order, base_of
 from laufruhe.physics.mount_forces import RigidMounting
 from laufruhe.physics.mounting import mount_maps, mounting_of, travel_of
-from laufruhe.physics.shaking_loads import inertia_coefficients, rotor_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.decision import Domain, domains_of
-from laufruhe.problem.measure import Measure, counted_rotors, radius_of
+from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.measure import Measure, counted_rotors, radius_of, selected
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 
 LEAST_SAMPLES = 72
-NEGLIGIBLE = 1e-9
-INSIDE_LEFT_OUT = 1e-2
-"""Share of a load inside the crankcase, that orders left out of the smooth program may hold together."""
+NEGLIGIBLE, LEFT_OUT = 1e-9, 1e-2
+"""Shares of the root mean square, of forces and of the torque of gas, that orders left out may hold together."""
+INSIDE_LEFT_OUT, HIGHEST = 1e-2, 24.0
+"""The same of a load inside the crankcase, and the last order that is known of it: a pressure that jumps has no end of
+them."""
+ROLL = 3
+"""Of the components of a wrench."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +78,7 @@ class UnevenModel:
     rides
         Throw that every rotor turns with; rotors left out stand still beside the throws.
     left_out
-        Share of the gas torque's root mean square that orders left out may hold together.
+        Share of the root mean square of the roll moment that orders left out may hold together, where gas acts.
     """
 
     def __init__(self, problem: Problem, layout: Layout, rides: dict[str, int], left_out: float = LEFT_OUT) -> None:
@@ -84,7 +86,7 @@ class UnevenModel:
         self.domains: tuple[Domain, ...] = domains_of(problem.unbalances)
         self._mounting = mounting_of(problem.engine, problem.fidelity)
         self._start = [_throw_of(problem.engine.slider_cranks, layout, k) for k in range(len(layout.throw_positions))]
-        self._gas = GasMoments(problem, left_out)
+        self._left_out = left_out
 
     def _points(self, quantity: Measure) -> list[OperatingPoint]:
         return [p for p in self.problem.points if quantity.points is None or p.name in quantity.points]
@@ -135,10 +137,22 @@ class UnevenModel:
 
     def _inside(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[Lines]:
         """Of places inside the crankcase (S37)."""
-        parts, banks = self.problem.engine.slider_cranks, isinstance(at.bank, ca.MX)
-        turned = TurnedLoads(self.problem, quantity, self.problem.points.index(point), banks, INSIDE_LEFT_OUT)
+        engine = self.problem.engine
+
+        def signal(loads: PointLoads) -> Spectrum:
+            return selected(quantity, quantity.load.signal(loads).series, engine).kept(HIGHEST)
+
+        return self._turned(point, at, signal, [Felt(slice(None), INSIDE_LEFT_OUT)], True)
+
+    def _turned(
+        self, point: OperatingPoint, at: Symbols, signal: Callable[[PointLoads], Spectrum], felt: Sequence[Felt],
+        beside: bool,
+    ) -> list[Lines]:  # fmt: skip
+        """Of every place that a signal has."""
+        k, parts = self.problem.points.index(point), self.problem.engine.slider_cranks
+        turned = TurnedLoads(self.problem, k, signal, at.bank is not None, felt, beside)
         placed = [self._place(k, part, at) for k, part in enumerate(parts)]
-        stars = [a - b - math.tau * turns_of(part) for (a, b), part in zip(placed, parts, strict=True)]
+        stars = [a - b - math.tau * _turns_of(part) for (a, b), part in zip(placed, parts, strict=True)]
         return turned.lines(stars, [bank for _, bank in placed], lambda rotor: self._unbalance(rotor, at))
 
     def _counted(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> Lines:
@@ -174,17 +188,12 @@ class UnevenModel:
         return lambda h: float(np.abs(self._map(quantity, h, point.speed)[:, :, 3]).max())
 
     def wrench(self, point: OperatingPoint, at: Symbols, gain: Callable[[float], float] | None = None) -> Lines:
-        """Wrench by order; gas of the orders that a gain leaves to matter."""
-        parts = self.problem.engine.slider_cranks
-        found = [lines for k, part in enumerate(parts) for lines in self._cylinder(k, part, point.speed, at)]
-        roll = np.eye(6)[:, 3:4]
-        stars = [self._star(k, part, at) for k, part in enumerate(parts)]
-        found += [moment.mapped(roll) for moment in self._gas.at(point, stars, gain)]
-        for rotor in self.problem.engine.rotors:
-            pair = [rotor_wrench(replace(rotor, unbalance=u), point.speed) for u in (1.0, 1.0j)]
-            u = self._unbalance(rotor, at)
-            found.append(_turning(pair, abs(rotor.shaft.ratio), u[0], u[1]))
-        return summed(found)
+        """Wrench by order; the roll moment of gas of the orders that a gain leaves to matter."""
+        share = NEGLIGIBLE if self.problem.fidelity.gas_of(point) is None else self._left_out
+        others = [Felt(slice(k, k + 1), NEGLIGIBLE) for k in range(6) if k != ROLL]
+        roll = Felt(slice(ROLL, ROLL + 1), share, gain or (lambda _: 1.0))
+        (found,) = self._turned(point, at, _wrench_of, [*others, roll], False)
+        return found
 
     def _place(self, k: int, part: SliderCrank, at: Symbols) -> tuple[Any, Any]:
         """Angle of a cylinder's own pin, and of its bank."""
@@ -192,31 +201,6 @@ class UnevenModel:
         bank = side * at.bank if at.bank is not None else part.bank
         offset = -side * at.split if at.split is not None else self.layout.pin_offsets[k]
         return at.throws[self.layout.pins[k]] + offset, bank
-
-    def _star(self, k: int, part: SliderCrank, at: Symbols) -> Any:
-        """A cylinder's own crank angle when phi = 0 (C5)."""
-        angle, bank = self._place(k, part, at)
-        return angle - bank
-
-    def _cylinder(self, k: int, part: SliderCrank, speed: float, at: Symbols) -> list[Lines]:
-        angle, bank = self._place(k, part, at)
-        series = inertia_coefficients(part, speed, self.problem.fidelity)
-        sizes = np.array([np.abs(each) for each in series]) / np.array([[1.0], [1.0], [part.crank_radius]])
-        felt = sizes.max(axis=0) > NEGLIGIBLE * sizes.max(axis=1).sum()
-        orders = np.flatnonzero(felt & (np.arange(len(felt)) > 0)).astype(float)
-        along, side, moment = (turned(orders, each[orders.astype(int)], angle - bank) for each in series)
-        cosine, sine = ca.cos(bank), ca.sin(bank)
-        parts = []
-        for a, s, m in ((along.real, side.real, moment.real), (along.imaginary, side.imaginary, moment.imaginary)):
-            lateral, vertical = a * sine + s * cosine, a * cosine - s * sine
-            parts.append(ca.vertcat(ca.DM.zeros(1, len(orders)), lateral, vertical, m, -part.x * vertical,
-                                    part.x * lateral))  # fmt: skip
-        out = [Lines(orders, *parts)]
-        if part.rotating_mass > 0.0:
-            mass = part.rotating_mass * part.crank_radius
-            pair = [rotor_wrench(Rotor("pin", part.x, u * mass, part.shaft), speed) for u in (1.0, 1.0j)]
-            out.append(_turning(pair, abs(part.shaft.ratio), ca.cos(angle), ca.sin(angle)))
-        return out
 
     def _unbalance(self, rotor: Rotor, at: Symbols) -> Any:
         """U of a rotor as (re, im), turned with the throw that it rides on."""
@@ -247,12 +231,13 @@ def _throw_of(parts: Sequence[SliderCrank], layout: Layout, pin: int) -> float:
     return parts[k].throw - layout.pin_offsets[k]
 
 
-def _turning(pair: Sequence[NDArray[np.complex128]], order: float, real: Any, imaginary: Any) -> Lines:
-    """Wrench of an unbalance (real, imaginary) from those of one and of i."""
-    by_real, by_imaginary = pair
-    first, second = (ca.DM(w.copy()) * real + ca.DM(v.copy()) * imaginary
-                     for w, v in ((by_real.real, by_imaginary.real), (by_real.imag, by_imaginary.imag)))  # fmt: skip
-    return Lines(np.array([order]), first, second)
+def _turns_of(part: SliderCrank) -> int:
+    """Turns from the dead centre at -(theta + o - beta) to the one that fires."""
+    return round((part.firing_angle + part.throw - part.bank) / math.tau)
+
+
+def _wrench_of(loads: PointLoads) -> Spectrum:
+    return loads.wrench.each(lambda wrench: wrench[:, None, :])
 
 
 def _steps(lines: Lines) -> int:

@@ -59,24 +59,6 @@ def _ratio(part: SliderCrank) -> float:
     return ratio
 
 
-def indicated_mean_pressure(pressures: Array, part: SliderCrank, cycle: Cycle) -> float:
-    """Cyclic integral of p dV over the displacement (G3).
-
-    Parameters
-    ----------
-    pressures
-        Shape (n,) [Pa], at equal steps over one cycle from the firing dead centre.
-
-    Returns
-    -------
-    Mean pressure [Pa] by the trapezoidal rule with the exact dV/d gamma. It converges
-    faster than any power of 1/n for a smooth trace, and with 1/n^2 where the pressure
-    has jumps at dead centres or bends.
-    """
-    angles = cycle.angle * np.arange(len(pressures)) / len(pressures)
-    return float(np.mean(pressures * swept_rate(part, angles)) * cycle.angle)
-
-
 @dataclass(frozen=True)
 class ChargedCylinder:
     """Volumes of a cylinder over its cycle, and when its valves open.

@@ -25,19 +25,14 @@ from laufruhe.physics.working_chambers import chambers_breaks, chambers_thrust
 OneChamber: TypeAlias = Seiliger | Wiebe | PressureTrace
 
 
-def cylinder_pressure(gas: OneChamber, part: SliderCrank, cycle: Cycle, samples: int) -> NDArray[np.float64]:
-    """Absolute cylinder pressure [Pa] at equal steps of the crank angle from the firing dead centre, shape (samples,).
+def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Absolute cylinder pressure [Pa] at crank angles from the firing dead centre [rad], shape of `angles`.
 
     Raises
     ------
     ModelError
         If the model cannot meet its indicated mean pressure, or a trace does not cover the cycle.
     """
-    return pressure_at(gas, part, cycle, cycle.angle * np.arange(samples) / samples)
-
-
-def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """As `cylinder_pressure`, at any crank angles from the firing dead centre [rad], shape of `angles`."""
     gas, own, cycle, pace = _worked(gas, part, cycle)
     angles = angles - part.swept.late
     if isinstance(gas, PressureTrace):

@@ -22,7 +22,7 @@ from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_moment
 from laufruhe.physics.mechanism import Direction, Effect, mass_effects, rod_effects
-from laufruhe.physics.star_loads import order_index, square_of, star_loads
+from laufruhe.physics.star_loads import order_index, star_loads
 from laufruhe.physics.uneven_speed import uneven_geared_loads, uneven_loads, uneven_rotor_loads
 from laufruhe.physics.wrench import plane_parts
 
@@ -139,21 +139,3 @@ def _rotor_wrenches(rotors: Sequence[Rotor], speed: float) -> NDArray[np.complex
         force = (shaft.ratio * speed) ** 2 * (rotor.unbalance if forward else rotor.unbalance.conjugate())
         wrenches.append(plane_parts(force * (-1j if forward else 1j), force, rotor.x, shaft))
     return np.array(wrenches, dtype=complex)
-
-
-def inertia_coefficients(
-    part: SliderCrank, speed: float, fidelity: Fidelity = EXACT
-) -> tuple[NDArray[np.complex128], NDArray[np.complex128], NDArray[np.complex128]]:
-    """Force along the axis and across it [N] and roll moment [N m] of one cylinder, by order of its own crank angle.
-
-    Returns
-    -------
-    Three arrays of one length: the coefficients that `reciprocating_loads` and
-    `rod_inertia_loads` multiply by the phase and place of each cylinder (L2-L4, L7).
-    """
-    effects = (*mass_effects(part, fidelity), *rod_effects(part, fidelity))
-    found = [(effect.direction, effect.size * square_of(part, speed) * effect.series()) for effect in effects]
-    out = np.zeros((3, max((len(series) for _, series in found), default=1)), dtype=complex)
-    for direction, series in found:
-        out[direction, : len(series)] += series
-    return out[0], out[1], out[2]

@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.angle_waves import AngleWaves
 from laufruhe.load_models.throw_waves import ThrowWaves, averaged, averages
 from laufruhe.load_models.uneven_model import rides_of
 from laufruhe.machine.firing_windows import FiringWindow
@@ -248,7 +247,7 @@ class ThrowSearch:
             raise ModelError("what rides on a throw knows how far pins are apart")
         # where nothing tells when the crank turns, its first throw stays where it is, and what rides on it
         stands = phasing.throw_bounds is not None or turn_freely(phasing, candidate, rides)
-        return AngleWaves(problem, layout, rides, opened(phasing), 0.0 if stands else layout.side(0))
+        return ThrowWaves(problem, layout, rides, opened(phasing), 0.0 if stands else layout.side(0))
 
     def candidate(self, window: FiringWindow, throws: Array) -> Candidate:
         """A design with these throws, and with a firing order that they keep."""
