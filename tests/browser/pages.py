@@ -47,7 +47,7 @@ BLOCKS = (
     Code("laufruhe solve " + "a-problem-with-a-long-name-" * 8 + ".toml"),
 )  # fmt: skip
 LEFT_OUT = {"_build", "jupyter_execute", "gallery", "notebooks", "examples"}
-SITE = ("README", "reference/commands", "theory/equations")
+SITE = ("index", "reference/commands", "theory/equations")
 
 
 def _run(*words: object) -> None:
@@ -100,7 +100,7 @@ def site() -> Path:
         source = folder / "source"
         shutil.copytree(DOCS, source, ignore=lambda *_: LEFT_OUT)
         for page in source.rglob("*.md"):
-            if str(page.relative_to(source).with_suffix("")) not in SITE:
+            if str(page.relative_to(source).with_suffix("")) not in (*SITE, "README"):
                 page.unlink()
         extensions = "extensions=mathml,myst_nb,sphinx_copybutton"
         words = [sys.executable, "-m", "sphinx", "-Q", "-b", "html", "-D", extensions, source, folder / "site"]
