@@ -17,6 +17,7 @@ from laufruhe.plots.machine_view import Scene, reaches
 from laufruhe.plots.motion import animate
 from laufruhe.plots.results import engine
 from laufruhe.present.poses import STEEL, THICKNESS, Pose, half_disc
+from laufruhe.solvers import state
 from problem_files import PROBLEMS
 
 
@@ -56,6 +57,22 @@ def test_what_was_decided_is_marked() -> None:
     front, side = reaches(scene)
     assert front
     assert side
+
+
+@pytest.mark.parametrize(
+    ("name", "cranks", "pistons", "rods"),
+    [
+        ("single-rod-length", 0, 0, True), ("worked-diesel-sizes", 1, 0, True), ("geared-three-leads", 2, 0, False),
+        ("opposed-pistons-masses", 0, 1, False), ("vee-eight-open", 1, 0, False),
+    ],
+)  # fmt: skip
+def test_leads_masses_and_sizes_that_are_open_are_marked(name: str, cranks: int, pistons: int, rods: bool) -> None:
+    result = state(load(PROBLEMS / f"{name}.toml"))
+    scene = Scene.of(result)
+    assert (len(scene.cranks), len(scene.pistons), scene.rods) == (cranks, pistons, rods)
+    labels = {text.get_text() for text in engine.figure(result).legends[0].get_texts()}
+    told = {"crank, open": cranks, "piston, open": pistons, "rod, open": rods}
+    assert {label for label, count in told.items() if count} == labels & set(told)
 
 
 def test_the_engine_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -34,6 +34,7 @@ from laufruhe.plots.style import AFTER, GREY, ORANGE, PALE, Page, entry_of_dots,
 from laufruhe.plots.words import INK, SMALL, round_ticks, width_of
 from laufruhe.present.measures import changed
 from laufruhe.present.poses import THICKNESS, Pose, bore_of, direction, half_disc
+from laufruhe.problem.drives import Kind
 from laufruhe.solvers.result import Result
 
 # both views side by side, of one page, and between them [inch]
@@ -73,15 +74,17 @@ class Scene:
         engine, problem = result.final.engine, result.problem
         drives = [drive for decision in problem.decisions for drive in decision.drives]
 
-        def driven(what: str) -> frozenset[Any]:
-            return frozenset(getattr(drive, what) for drive in drives if hasattr(drive, what))
+        def driven(what: str, kind: Kind | None = None) -> frozenset[Any]:
+            own = [drive for drive in drives if hasattr(drive, what) and kind in (None, drive.kind)]
+            return frozenset(getattr(drive, what) for drive in own)
 
-        numbers, sizes = driven("mount"), {part for part, _ in driven("size")}
+        numbers, sizes = driven("mount"), {part for part, _ in driven("key", Kind.SIZE)}
+        masses = frozenset(part for part, _ in driven("key", Kind.PISTON))
         mounts = frozenset(mount.name for k, mount in enumerate(engine.mounts) if k in numbers)
         every = frozenset(part.shaft.name for part in engine.slider_cranks)
-        cranks = every if problem.phasing is not None or sizes - _OF_RODS else driven("shaft") & every
+        cranks = every if problem.phasing is not None or sizes - _OF_RODS else driven("key", Kind.LEAD) & every
         state = "decided" if changed(result) else "open"
-        return cls(engine, driven("rotor"), mounts, driven("part"), cranks, bool(sizes & _OF_RODS), state)
+        return cls(engine, driven("rotor"), mounts, masses, cranks, bool(sizes & _OF_RODS), state)
 
     @property
     def weights(self) -> list[Rotor]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from laufruhe.plots.style import VERMILION, entry
-from laufruhe.plots.words import FAINT, SMALL
+from laufruhe.plots.words import FAINT, SMALL, fitted, spread, width_of
 from laufruhe.present.mounting import MountingFacts
 from laufruhe.problem.channels import Channel
 from laufruhe.problem.measure import Limit
@@ -17,6 +18,8 @@ from laufruhe.units import readable
 
 RPM = readable("rad/s")[1]
 LIMIT = VERMILION
+MOST_NAMES, _APART = 5, 0.1
+"""Operating points that are all named, and room between two names [inch]."""
 # styles tell orders apart in print as well
 STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 
@@ -31,13 +34,26 @@ def limits_on(result: Result, channel: Channel) -> list[Limit]:
     return [limit for limit in result.problem.limits if limit.measure.channel is channel]
 
 
-def mark_points(axes: Axes, result: Result, share: float) -> None:
-    """Operating points as thin lines; names where they do not crowd, at a share of the height."""
-    points = result.problem.points
-    words: Any = {"size": SMALL, "color": FAINT, "ha": "right", "rotation": 90, "zorder": 4}
-    words |= {"va": "top" if share > 0.5 else "bottom", "transform": axes.get_xaxis_transform()}
-    for k, point in enumerate(points):
+def mark_points(axes: Axes, result: Result, lift: float = 0.06) -> None:
+    """Operating points as thin lines, when the ends of the axis are known; above the panel their names, of many two.
+
+    Parameters
+    ----------
+    lift
+        Of the names over the panel [inch].
+    """
+    points = sorted(result.problem.points, key=lambda point: point.speed)
+    for point in points:
         axes.axvline(point.speed * RPM, color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)), zorder=0.6)
-        if len(points) <= 5 or k in (0, len(points) - 1):
-            box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 0.5}
-            axes.text(point.speed * RPM, share, point.name, bbox=box, **words)
+    named = points if len(points) <= MOST_NAMES else [points[0], points[-1]]
+    wide, tall = axes.bbox.width / axes.figure.dpi, axes.bbox.height / axes.figure.dpi
+    names = [fitted(point.name, wide / len(named) - _APART) for point in named]
+    (low, high), widest = axes.get_xlim(), max(map(width_of, names)) + _APART
+    at = (np.array([point.speed * RPM for point in named]) - low) / (high - low)
+    half = 0.5 * widest / wide
+    for name, place, moved in zip(names, at, spread(at, 2.0 * half, half, max(1.0 - half, half)), strict=True):
+        leader = {"arrowstyle": "-", "color": FAINT, "lw": 0.6, "shrinkA": 0.0, "shrinkB": 0.0}
+        axes.annotate(
+            name, (place, 1.0), (moved, 1.0 + lift / tall), "axes fraction", "axes fraction", size=SMALL, color=FAINT,
+            ha="center", va="bottom", annotation_clip=False, arrowprops=leader,
+        )  # fmt: skip

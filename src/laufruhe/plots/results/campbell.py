@@ -39,7 +39,7 @@ def figure(result: Result) -> Figure:
         axes.plot([0.0, top * RPM], [0.0, order * top / math.tau], color=AFTER, linestyle=STYLES[k], linewidth=1.4)
     axes.set(xlim=(0.0, top * RPM), ylim=(0.0, reach), xlabel="crank speed [rpm]", ylabel="frequency [Hz]")
     _modes(axes, facts)
-    mark_points(axes, result, 0.98)
+    mark_points(axes, result)
     critical = entry_of_dots("critical speed", color=AFTER, markersize=4.5)
     which = "of the design as decided" if changed(result) else "as given"
     lines = f"Natural frequencies {which}, and the orders that load it most.{at_which_stiffness(facts)}"

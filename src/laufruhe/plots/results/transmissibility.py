@@ -39,7 +39,6 @@ def figure(result: Result) -> Figure:
             axes.plot(speeds * RPM, curve, color=one.colour, linestyle=STYLES[k], linewidth=1.6)
     legend = [*(one.entry() for one in series), *order_entries(facts, INK), *_limits(axes, result, top * RPM)]
     axes.axhline(1.0, color=FAINT, linewidth=0.8)
-    mark_points(axes, result, 0.98)
     axes.set_yscale("log")
     axes.yaxis.set_major_locator(LogLocator(10.0, (1.0,) if lowest < 1e-2 else (1.0, 2.0, 5.0), numticks=12))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -50,6 +49,7 @@ def figure(result: Result) -> Figure:
         xlabel="crank speed [rpm]",
         ylabel="transmissibility",
     )
+    mark_points(axes, result)
     lines = f"Force on the mounts over that on mounts that give no way; loads of {point.name}."
     return headed(drawn, result, "Transmissibility over speed", lines, legend)
 

@@ -64,7 +64,7 @@ def _firings(axes: Axes, result: Result) -> None:
         axes.plot([angle, angle], [0.0, 1.0], color=INK, linewidth=5.0, solid_capstyle="butt")
         axes.text(angle, 1.1, number, ha="center", size=SMALL)
         middle = 0.5 * (angle + following)
-        axes.text(middle % whole, 0.5, f"{following - angle:.5g}°", ha="center", va="center", size=SMALL, color=FAINT)
+        axes.text(middle % whole, 0.5, f"{following - angle:.3g}°", ha="center", va="center", size=SMALL, color=FAINT)
     axes.set(xlim=(-0.06 * whole, 1.06 * whole), ylim=(0.0, 1.6), xlabel="crank angle [deg]", yticks=[])
     axes.set_xticks(np.linspace(0.0, whole, 5))
     axes.set_title("firings", loc="left", size=9)

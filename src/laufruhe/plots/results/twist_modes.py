@@ -78,8 +78,9 @@ def _speeds(axes: Axes, result: Result, facts: TorsionFacts, high: float) -> Non
             if speed <= high:
                 size = LARGEST * math.sqrt(float(facts.sums[k, m]) / largest)
                 axes.plot(speed * RPM, frequency, "o", color=COLOURS[m], markersize=size, zorder=5, alpha=0.85)
-    mark_points(axes, result, 0.98)
     axes.set(xlim=(0.0, high * RPM), ylim=(0.0, reach), xlabel="crank speed [rpm]", ylabel="frequency [Hz]")
+    # over the names of orders
+    mark_points(axes, result, lift=0.24)
 
 
 def _orders(axes: Axes, orders: list[float], high: float, reach: float) -> None:

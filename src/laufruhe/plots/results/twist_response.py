@@ -47,8 +47,8 @@ def figure(result: Result) -> Figure:
     whole = np.concatenate([torque.max(axis=1) for torque in found])
     finite = whole[np.isfinite(whole)]
     top = min(float(finite.max(initial=1.0)), MOST * float(np.median(finite)) if len(finite) else 1.0)
-    mark_points(axes, result, 0.98)
     axes.set(xlim=(low * RPM, high * RPM), ylim=(0.0, 1.1 * top), xlabel="crank speed [rpm]",
              ylabel="alternating torque [N m]")  # fmt: skip
+    mark_points(axes, result)
     lines = "Half of the peak to peak torque in the section that has most of it, steady at every speed."
     return headed(drawn, result, "Twist of the crankshaft over speed", lines, legend)

@@ -331,7 +331,8 @@ def _orders(case: str, design: str, one: xr.Dataset) -> p.Panel:
         peak = int(np.argmax(np.nan_to_num(values)))
         side = "right" if speeds[peak] > speeds.mean() else "left"
         marks.append(p.Line(speeds, values, colour))
-        marks.append(p.Words(speeds[peak], values[peak] + 0.05 * top, f"order {order:g}", colour=colour, across=side))
+        at = speeds[peak], values[peak] + 0.05 * top
+        marks.append(p.Words(*at, f"order {order:g}", colour=colour, across=side, boxed=True))
         met = 2.0 * math.pi * PER_RAD * one["frequency"].values[0] / order if "frequency" in one else np.zeros(0)
         met = met[(met > speeds.min()) & (met < speeds.max())]
         marks.append(p.Line(met, np.zeros(len(met)), colour, width=0.0, marker="|", size=10.0))
