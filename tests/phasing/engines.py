@@ -1,21 +1,9 @@
 """Problem files that phasing tests write for themselves."""
 
-from functools import cache
 from pathlib import Path
 
-from laufruhe.files.reader import load
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers import Result, solve
 from problem_files import loaded
-
-PROBLEMS = Path(__file__).parents[2] / "problems"
-
-
-@cache
-def solved(name: str) -> Result:
-    """The result of a ready problem, solved once for all tests."""
-    return solve(load(PROBLEMS / f"{name}.toml"))
-
 
 MOUNTS = """
 [mounts]

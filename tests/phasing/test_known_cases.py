@@ -21,6 +21,7 @@ from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.stars.search import search_stars
 from phasing import engines
+from ready import solved
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 SQRT2, SQRT10 = math.sqrt(2.0), math.sqrt(10.0)
@@ -86,7 +87,7 @@ def test_four_stroke_four_and_six(tmp_path, cylinders, star):
 
 def test_cross_plane_eight():
     """90 degree V8: with counterweights free the cross-plane crank, nothing of order 1 and 2 left."""
-    result = engines.solved("vee-eight-open")
+    result = solved("vee-eight-open")
     assert result.status is Status.OPTIMAL
     best = result.phasing.ranking[0]
     assert sorted(degrees(best)) == [0, 90, 180, 270]
@@ -100,8 +101,7 @@ def test_cross_plane_eight():
 
 def test_split_pins_of_a_six():
     """90 degree V6: 30 degree split pins, the only ones that fire evenly."""
-    problem = load(PROBLEMS / "vee-six-open.toml")
-    result = solve(problem)
+    result = solved("vee-six-open")
     assert result.status is Status.OPTIMAL
     assert next(d.value for d in result.decisions if d.name == "split pin angle") == pytest.approx(math.radians(30.0))
     assert result.final.engine.firing_intervals == pytest.approx([math.radians(120.0)] * 6)
@@ -143,7 +143,7 @@ def test_least_couples_of_in_line_engines(cycle, cylinders):
 
 def test_published_couples():
     """Textbook example 5 and the free couples of a two-stroke seven."""
-    five = engines.solved("inline-five-open").phasing.ranking[0]
+    five = solved("inline-five-open").phasing.ranking[0]
     assert five.couples[:2] == pytest.approx((0.4490, 4.9798), abs=1e-4)
     layout = inline(7, 1.0)
     space = StarSpace(7, ((1,) * 7,), layout.throw_positions, True, True)
@@ -154,7 +154,7 @@ def test_published_couples():
 
 @pytest.mark.slow
 def test_vee_twenty():
-    result = engines.solved("vee-twenty-open")
+    result = solved("vee-twenty-open")
     assert result.certificate.kind is Proof.GLOBAL
     assert result.certificate.gap < 1e-9
     values = [star.value for star in result.phasing.ranking]
@@ -199,7 +199,7 @@ def test_reports_say_where_a_bound_is_from(tmp_path):
 
 @pytest.mark.slow
 def test_json_holds_ranking_and_trade():
-    record = as_dict(engines.solved("inline-nine-uneven"))
+    record = as_dict(solved("inline-nine-uneven"))
     assert [star["rank"] for star in record["ranking"]] == list(range(1, len(record["ranking"]) + 1))
     assert record["objective"]["value"] == record["ranking"][0]["objective"]
     assert len(record["phasing"]["trade"]) > 2

@@ -78,17 +78,16 @@ def crooked_vee(folder, cylinders, bank, deviation, rest=engines.COUPLE, keys=""
     return solve(engines.problem(folder, cylinders, "four-stroke", engine, allowed, rest, "vee"))
 
 
-@pytest.mark.parametrize("deviation", [5, 10])
-def test_banks_that_no_even_star_fits_start_from_every_crank_that_fires(tmp_path, deviation):
+def test_banks_that_no_even_star_fits_start_from_every_crank_that_fires(tmp_path):
     """A V12 at 65 degrees: the star of an in-line six fires 55 and 65 degrees apart, and is balanced."""
-    result = crooked_vee(tmp_path, 12, 65, deviation)
+    result = crooked_vee(tmp_path, 12, 65, 5)
     assert result.objective.value == pytest.approx(0.0, abs=1e-6 * result.objective.initial)
 
 
 def test_more_freedom_is_never_worse(tmp_path):
     """A V10 at 90 degrees fires 54 and 90 degrees apart at best."""
     rest = engines.COUPLE + "[search]\nboxes = 50\n"
-    found = [crooked_vee(tmp_path, 10, 90, deviation, rest).objective for deviation in (18, 20, 25)]
+    found = [crooked_vee(tmp_path, 10, 90, deviation, rest).objective for deviation in (18, 25)]
     values = [objective.value for objective in found]
     assert values == sorted(values, reverse=True)
     assert values[0] < 0.2 * found[0].initial

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from scipy import optimize
 
 import laufruhe
+import ready
 from laufruhe.errors import InputError, ModelError
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.physics.gas_loads import gas_loads
@@ -55,7 +56,7 @@ ROWS = "speed, torque, fuel\n1750, 20, 2.0\n1750, 60, 3.3\n1750, 120, 5.5\n1750,
 
 @pytest.fixture(scope="module")
 def solved() -> laufruhe.solvers.Result:
-    return laufruhe.solve(laufruhe.load(PROBLEMS / "car-four-willans.toml"))
+    return ready.solved("car-four-willans")
 
 
 def test_mean_pressure_of_the_bench_manual() -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-from functools import cache
 from itertools import combinations
 
 import numpy as np
@@ -11,17 +10,17 @@ import pytest
 from matplotlib.colors import to_rgb
 from scipy.optimize import isotonic_regression
 
+import ready
 from cli import scenes
 from lanes import first_fast
-from laufruhe.files.reader import load
 from laufruhe.plots import figures, style
 from laufruhe.plots.results import firings, torque, twist_modes
 from laufruhe.plots.words import FAINT, INK, READ, contrast, grouped, ink_on, legible, rows_of, spread, typeset, wrapped
 from laufruhe.present.pictures import PICTURES
-from laufruhe.solvers import Result, solve
+from laufruhe.solvers import Result
 from laufruhe.studies import picture
 from picture_faults import faults_of
-from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft
+from problem_files import FOUR, MOUNTS, changed, shaft
 
 BUILT = 'unbalance = { between = ["0 kg m", "0.05 kg m"], tolerance = "± 10 %" }\nradius = "20 mm"\nangle = 180\n'
 ROBUST = (
@@ -46,9 +45,8 @@ MODELS = (
 )  # fmt: skip
 
 
-@cache
 def solved(name: str) -> Result:
-    return scenes.solved(ROBUST) if name == "robust" else solve(load(PROBLEMS / f"{name}.toml"))
+    return scenes.solved(ROBUST) if name == "robust" else ready.solved(name)
 
 
 @pytest.mark.parametrize("name", first_fast(MODELS, 3))

@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 from cli import scenes
 from lanes import first_fast
 from laufruhe.files.reader import load
-from laufruhe.plots import draw
-from laufruhe.plots.results import bars, cycle, engine, polar, spectrum, twins
+from laufruhe.plots import draw, figures, names
+from laufruhe.plots.results import bars, cycle, engine, polar, spectrum
 from laufruhe.plots.style import AFTER, BEFORE, DPI, fitted
 from laufruhe.present.measures import mount_orders
 from laufruhe.problem.evaluation import measured, samples_of
@@ -41,29 +41,26 @@ def size_of(path: Path) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize(
-    ("text", "names"),
-    first_fast(
-        [
-            (scenes.TIGHT, ("engine.png", "polar.png", "cycle.png", "bars.png", "spectrum.png")),
-            (scenes.TWO_POINTS, ("engine.png", "polar.png", "cycle.png", "bars.png", "spectrum.png")),
-            (scenes.PARTS, ("engine.png", "twins.png", "polar.png", "cycle.png", "bars.png", "spectrum.png")),
-            (scenes.SHAKING_ONLY, ("engine.png", "cycle.png", "spectrum.png")),
-        ],
-        1,
-    ),
+    ("text", "wanted"),
+    [
+        (scenes.TIGHT, ["engine", "polar", "cycle", "bars", "spectrum"]),
+        (scenes.TWO_POINTS, ["engine", "polar", "cycle", "bars", "spectrum"]),
+        (scenes.PARTS, ["engine", "twins", "polar", "cycle", "bars", "spectrum"]),
+        (scenes.SHAKING_ONLY, ["engine", "cycle", "spectrum"]),
+    ],
 )
-def test_pictures_are_whole(text: str, names: tuple[str, ...], tmp_path: Path) -> None:
-    result = scenes.solved(text)
-    assert draw(result, tmp_path) == names
-    assert {path.name for path in tmp_path.iterdir()} == set(names)
-    makers = {
-        f"{maker.__name__.rpartition('.')[2]}.png": maker.figure
-        for maker in (engine, twins, polar, cycle, bars, spectrum)
-    }
-    for name in names:
-        inches = makers[name](result).get_size_inches()
-        assert size_of(tmp_path / name) == tuple(int(DPI * side) for side in inches)
-        assert (tmp_path / name).stat().st_size > 10_000
+def test_a_result_fills_pictures(text: str, wanted: list[str]) -> None:
+    assert names(scenes.solved(text)) == wanted
+
+
+def test_pictures_are_whole(tmp_path: Path) -> None:
+    result = scenes.solved(scenes.TIGHT)
+    files = draw(result, tmp_path)
+    assert files == tuple(f"{name}.png" for name in names(result))
+    assert {path.name for path in tmp_path.iterdir()} == set(files)
+    for name, figure in figures(result):
+        assert size_of(tmp_path / f"{name}.png") == tuple(int(DPI * side) for side in figure.get_size_inches())
+        assert (tmp_path / f"{name}.png").stat().st_size > 10_000
 
 
 def test_polar_diagrams_are_the_samples() -> None:
@@ -247,17 +244,17 @@ def renamed(result: Result, names: tuple[str, ...]) -> Result:
 
 
 @pytest.mark.parametrize(
-    "names", [("$a$ and $b", "\\frac{", "{x}"), ("发动机", "a" * 60, "%d")], ids=["signs", "letters"]
+    "called", [("$a$ and $b", "\\frac{", "{x}"), ("发动机", "a" * 60, "%d")], ids=["signs", "letters"]
 )
-def test_any_name_can_be_drawn(names: tuple[str, ...], tmp_path: Path) -> None:
-    result = renamed(scenes.solved(scenes.TIGHT), names)
-    assert len(result.final.engine.mounts) >= len(names)
+def test_any_name_can_be_drawn(called: tuple[str, ...], tmp_path: Path) -> None:
+    result = renamed(scenes.solved(scenes.TIGHT), called)
+    assert len(result.final.engine.mounts) >= len(called)
     assert len(draw(result, tmp_path)) == 5
 
 
 def test_long_lines_are_cut() -> None:
     assert fitted("a  b\nc", 8.0, 9.0) == "a b c"
-    assert fitted("x" * 500, 8.0, 9.0).endswith("…")
+    assert fitted("x" * 250, 8.0, 9.0).endswith("…")
 
 
 @pytest.mark.slow

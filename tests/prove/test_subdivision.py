@@ -166,12 +166,13 @@ def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "text", [ASKED["rms"], 'minimise = "transmissibility"\norders = [2]', 'minimise = "mean mount travel"']
+    "text",
+    [ASKED["rms"], 'minimise = "transmissibility"\norders = [2]', 'minimise = "mean mount travel"\norders = [2]'],
 )
-def test_few_open_stiffnesses_are_decided_with_proof(text: str, tmp_path: Path) -> None:
+def test_few_open_stiffnesses_are_decided_with_proof(asked: str, tmp_path: Path) -> None:
     """A search over a grid of all designs, which knows nothing of boxes, finds nothing better either."""
     limit = '[[constraints]]\nlimit = "static sag"\nmax = "4 mm"\n[search]\nstarts = 2\n'
-    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]", text, limit)
+    problem = replace(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]", asked, limit), tolerance=1e-3)
     result = solve(problem)
     assert result.certificate is not None
     assert result.objective is not None
@@ -181,7 +182,7 @@ def test_few_open_stiffnesses_are_decided_with_proof(text: str, tmp_path: Path) 
     assert "bounds of mounts looked at in" in result.certificate.method
     given = evaluate(problem)
 
-    axes = [np.geomspace(d.lower, d.upper, 25) for d in problem.mount_decisions]
+    axes = [np.geomspace(d.lower, d.upper, 17) for d in problem.mount_decisions]
     values = []
     for x in itertools.product(*axes):
         design = remounted(given, problem.design(list(x)))

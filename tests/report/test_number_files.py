@@ -22,8 +22,9 @@ from laufruhe.report import curves
 from laufruhe.report.sections import SECTIONS
 from laufruhe.report.sheet import Sheet
 from laufruhe.report.tables import sheets_of, write_book, write_tables
-from laufruhe.solvers import Result, solve, state
+from laufruhe.solvers import Result, state
 from problem_files import PROBLEMS, loaded
+from ready import solved
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +101,7 @@ def test_elastic_mounts_have_modes_travel_and_curves_over_speed(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_ranked_stars_are_a_sheet() -> None:
-    found = sheets_of(solve(load(PROBLEMS / "inline-five-open.toml")))
+    found = sheets_of(solved("inline-five-open"))
     assert found["rankings"].rows[0][0] == 1
     assert found["rankings"].rows[0][3] is True
     # an even five-cylinder star has no free force of any order shown

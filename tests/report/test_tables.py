@@ -10,14 +10,13 @@ from pathlib import Path
 import pytest
 
 from cli import scenes
-from laufruhe import load
 from laufruhe.report.grid import escaped
 from laufruhe.report.markdown import as_markdown
 from laufruhe.report.screen import show
 from laufruhe.report.sections import tables_of
 from laufruhe.report.wording import explained, headline, why_star
-from laufruhe.solvers import Result, solve
-from problem_files import PROBLEMS
+from laufruhe.solvers import Result
+from ready import solved
 
 
 def screen(result: Result) -> str:
@@ -98,7 +97,7 @@ def test_markdown_in_names_means_nothing() -> None:
 
 def test_why_a_star_wins_is_told_by_its_free_couples() -> None:
     """Rocking couples of a five: what is minimised is the couple of orders 1 and 2, so order 4 is not named."""
-    result = solve(load(PROBLEMS / "inline-five-open.toml"))
+    result = solved("inline-five-open")
     assert why_star(result) == (
         "Star 1 beats star 2 by 32 %. Its throws leave a smaller couple of order 1 (0.449 against 1.56). "
         "It leaves a larger couple of order 2 (4.98 against 4.75)."

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import laufruhe
 from laufruhe.physics.torsion import natural_modes, shaft_torque, vector_sums
 from laufruhe.plots import draw
 from laufruhe.present.torsion import torque_over_speed
@@ -17,12 +16,12 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.report.json_result import as_dict
 from laufruhe.report.sections import tables_of
 from laufruhe.solvers.result import Result
-from problem_files import PROBLEMS
+from ready import solved
 
 
 @pytest.fixture(scope="module")
 def result() -> Result:
-    return laufruhe.solve(laufruhe.load(PROBLEMS / "inline-five-torsion.toml"))
+    return solved("inline-five-torsion")
 
 
 @pytest.fixture(scope="module")

@@ -81,12 +81,12 @@ def _never_worse(found: list[Result]) -> None:
         assert more.objective.value <= value * (1.0 + gap) + room
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(5))
 def test_more_freedom_is_never_worse(seed: int, tmp_path: Path) -> None:
     _never_worse([solve(loaded(tmp_path, _text(seed, weights))) for weights in FREEDOM])
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(5))
 def test_fewer_limits_are_never_worse(seed: int, tmp_path: Path) -> None:
     tight, loose, other = (
         f'[[constraints]]\nlimit = "{limit}"\nmax = "{most}"\n'

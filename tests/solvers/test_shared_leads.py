@@ -27,7 +27,12 @@ READY = tables_of(PROBLEMS / "opposed-pistons-lead.toml")
 def problem(quantity: str, lead: Any, **more: Any) -> Problem:
     told = {key: value for key, value in READY.items() if key != "counterweights"}
     told["engine"] = {**told["engine"], "crank_lead": lead, **more.pop("engine", {})}
-    told |= {"objective": {"minimise": quantity}, "tolerance": 2e-3, "fidelity": {"samples": 180}, **more}
+    told |= {
+        "objective": {"minimise": quantity},
+        "tolerance": 1e-2,
+        "fidelity": {"samples": 180, "gas_samples": 720},
+        **more,
+    }
     return load_tables({key: value for key, value in told.items() if value is not None}, Path("shared.toml"))
 
 
@@ -75,7 +80,7 @@ CASES = {
     "largest lead": problem("rms roll moment", between(0, 40)),
     "from no lead on, inside": problem("mean mount force", between(-25, 60)),
     "with the crank": problem("mean mount force", between(5, 60, start=10), engine={"crank_ratio": 1}),
-    "a peak": problem("maximum roll moment", between(0, 40, start=5), search={"boxes": 120}),
+    "a peak": problem("maximum roll moment", between(0, 40, start=5), search={"boxes": 50}),
 }
 
 

@@ -14,6 +14,7 @@ import laufruhe
 from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.solvers import Result
+from ready import solved
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 pytestmark = pytest.mark.slow
@@ -44,7 +45,7 @@ def test_angle_between_the_cranks_is_the_best_of_all(two_crank: Result) -> None:
 
 
 def test_flywheel_of_the_waterworks_engine() -> None:
-    result = laufruhe.solve(PROBLEMS / "waterworks-steam-pump.toml")
+    result = solved("waterworks-steam-pump")
     assert result.certificate.kind == "global"
     assert result.final.value(result.problem.limits[0].measure) == pytest.approx(1.0 / 40.0, rel=1e-6)
 

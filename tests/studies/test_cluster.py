@@ -6,7 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from laufruhe.cli import app
 from studies import clusters
 
 pytest.importorskip("distributed", reason="Dask is not installed: pip install 'laufruhe[cluster]'")
@@ -62,7 +64,9 @@ def test_a_killed_client_and_a_killed_scheduler_change_no_bit(
 
 def test_an_address_where_nobody_answers_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = clusters.prepared(tmp_path, **SMALL)
-    said = clusters.finished(folder, "--scheduler", "nowhere")
-    assert said.startswith("2: laufruhe: --scheduler = nowhere: does not answer (missing port")
-    assert said.count("\n") == 1
+    monkeypatch.chdir(folder)
+    answer = CliRunner().invoke(app, ["study", "s.toml", "--out", "out", "--scheduler", "nowhere"])
+    assert answer.exit_code == 2
+    assert answer.stderr.startswith("laufruhe: --scheduler = nowhere: does not answer (missing port")
+    assert answer.stderr.count("\n") == 1
     assert not (folder / "out").exists()

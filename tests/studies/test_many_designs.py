@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from laufruhe.studies import run, runner
 from laufruhe.studies.kept_points import KEPT
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.regions import Regions
-from problem_files import PROBLEMS
+from problem_files import PROBLEMS, changed, written
 
 pytest.importorskip("zarr", reason="Zarr is not installed: pip install 'laufruhe[cluster]'")
 SINGLE, FOUR = "tractor-single.toml", "tractor-four-lanchester.toml"
@@ -120,19 +121,24 @@ def test_engines_that_cannot_be_are_counted(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_ready_study_runs_and_goes_on(tmp_path: Path) -> None:
-    words = ["study", str(PROBLEMS / "many-designs.toml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
+    """With a tenth of its draws of designs, and a third of its engines."""
+    text = (PROBLEMS / "many-designs.toml").read_text(encoding="utf-8")
+    text = changed(changed(text, "draws = 20_000", "draws = 2_000"), "draws = 24\nchunk = 8", "draws = 8\nchunk = 4")
+    for name in (SINGLE, FOUR, "tractor-four-lanchester-and-moment.toml"):
+        shutil.copy(PROBLEMS / name, tmp_path)
+    words = ["study", str(written(tmp_path, text)), "--out", str(tmp_path / "out"), "--jobs", "1"]
     assert CliRunner().invoke(app, words).exit_code == 0
     made = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"designs.nc", "designs.csv", "designs.png", "engines.nc", "engines.csv", "engines.png"} <= made
     with xr.open_dataset(tmp_path / "out/designs.nc") as data:
-        assert data.sizes == {"case": 2, "draw": 20_000}
+        assert data.sizes == {"case": 2, "draw": 2_000}
         assert np.all(data["objective"].where(data["within_limits"] > 0.0).min("draw") >= data["lower_bound"])
     with xr.open_dataset(tmp_path / "out/engines.nc") as data:
         assert set(data["proof"].values.ravel().tolist()) == {0}
         assert np.all(data["objective"] <= data["objective_given"])
     store = xr.open_zarr(tmp_path / "out.zarr", group="designs", consolidated=False, chunks=None)
     assert store["values"].dims == ("case", "draw", "quantity")
-    assert int(np.any(store["done"].values, axis=2).sum()) == 4
+    assert int(np.any(store["done"].values, axis=2).sum()) == 2
     again = CliRunner().invoke(app, words)
     assert again.exit_code == 0
     assert "0.0 s on one core" not in again.stdout

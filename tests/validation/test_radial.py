@@ -39,6 +39,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from one_cylinder import inertia_coefficients
 from problem_files import changed, loaded
+from ready import solved
 
 READY = Path(__file__).parents[2] / "problems" / "radial-seven.toml"
 TEXT = """
@@ -384,7 +385,7 @@ def test_an_even_speed_is_the_limit_of_an_uneven_one() -> None:
 
 
 def test_the_ready_problem_is_proven() -> None:
-    result = solve(load(READY))
+    result = solved("radial-seven")
     certificate = result.certificate
     assert certificate.kind.value.startswith("global")
     assert certificate.lower_bound <= result.objective.value <= certificate.lower_bound * (1.0 + 1e-4)
