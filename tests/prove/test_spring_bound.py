@@ -14,18 +14,22 @@ import pytest
 from lanes import first_fast
 from laufruhe.files.reader import load
 from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.decision import STIFFNESS
+from laufruhe.problem.decision import TURNED as ANGLES
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bound
+from laufruhe.prove.mounts.transmitted import number_ranges
 from laufruhe.prove.springs import box
 from laufruhe.prove.springs import orders as orders_
 from laufruhe.prove.springs.bound import Multipliers, Program, Proposed
-from laufruhe.prove.springs.conditions import conditions
-from laufruhe.prove.springs.high_orders import felt_at_most
+from laufruhe.prove.springs.conditions import conditions, of_stiffness
+from laufruhe.prove.springs.high_orders import HighOrder
 from laufruhe.prove.springs.lines import Felt
 from laufruhe.prove.springs.mirrored import mirrored_halves, mirrored_parts
 from laufruhe.prove.springs.open_mounts import OpenMounts, open_mounts
+from laufruhe.prove.springs.opened import own_axes
 from laufruhe.prove.springs.orders import Order
 from laufruhe.prove.springs.program import proposed
 from laufruhe.prove.springs.proof import spring_bound
@@ -157,12 +161,32 @@ def numbers_of(whole: OpenMounts, mounting: Any) -> np.ndarray:
 
 
 def designs_in(generator: np.random.Generator, boxes: SpringBoxes, about: np.ndarray, count: int) -> Any:
-    """Boxes of every size, and a design in each."""
+    """Boxes of every size, of planes about what a design has in them, and a design in each."""
+    own = slice(len(about))
     for _ in range(count):
-        width = generator.choice([1.0, 0.3, 0.05]) * (boxes.upper - boxes.lower)
-        low = np.clip(about - width * generator.random(len(about)), boxes.lower, boxes.upper - width)
-        columns = generator.uniform(-0.7, 0.7, boxes.columns.count)
-        yield low, low + width, low + generator.random(len(about)) ** 2 * width, columns
+        share = generator.choice([1.0, 0.3, 0.05])
+        width = share * (boxes.upper - boxes.lower)[own]
+        low = np.clip(about - width * generator.random(len(about)), boxes.lower[own], boxes.upper[own] - width)
+        x = low + generator.random(len(about)) ** 2 * width
+        columns, planes = generator.uniform(-0.7, 0.7, boxes.columns.count), in_planes(boxes, x)
+        wide = share * (boxes.upper - boxes.lower)[len(about) :] * generator.random((2, len(planes)))
+        given = np.append(low, planes - wide[0]), np.append(low + width, planes + wide[1])
+        kept = boxes.kept(np.maximum(given[0], boxes.lower), np.minimum(given[1], boxes.upper))
+        # what keeps planes that are possible keeps this one
+        assert kept is not None
+        assert np.all(kept[0][len(about) :] <= planes * (1.0 + 1e-12) + 1e-3)
+        assert np.all(kept[1][len(about) :] >= planes * (1.0 - 1e-12) - 1e-3)
+        yield *kept, x, columns
+
+
+def in_planes(boxes: SpringBoxes, x: np.ndarray) -> np.ndarray:
+    """K11, K22 and K12 of a design, of the one plane that the ready tractor has, by its stiffness matrix (E63)."""
+    if not boxes._planes:
+        return np.zeros(0)
+    own, frame = number_ranges(boxes.problem, x, x)[0][0], own_axes(boxes._frames[0, ANGLES])[1:]
+    axes = own_axes(own[ANGLES])
+    seen = frame @ axes.T @ np.diag(own[STIFFNESS]) @ axes @ frame.T
+    return np.array([seen[0, 0], seen[1, 1], seen[0, 1]])
 
 
 @pytest.mark.parametrize("name", ["stiffness", "all"])
@@ -197,7 +221,7 @@ def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatc
         kept += 1
         assert mounts.lowest <= values[0] * (1.0 + 1e-9)
         assert values[-1] <= mounts.highest * (1.0 + 1e-9)
-        for limit in conditions(0, mounts, line):
+        for limit in (*conditions(0, mounts, line), *of_stiffness(mounts, line.size)):
             moments = np.einsum("abij,i,j->ab", limit.moments, told.vector, told.vector)
             whole = limit.constant + np.tensordot(told.numbers, limit.slopes, 1) + moments
             assert np.linalg.eigvalsh(whole)[0] >= -1e-9 * max(1.0, np.abs(whole).max())
@@ -314,8 +338,9 @@ def test_no_design_of_mounts_and_unbalances_is_under_the_bound(norm: str, tmp_pa
     low, high = boxes.lower.copy(), boxes.upper.copy()
     assert boxes.relaxed(low, high)[0] <= least
     # about the best of them, its place held
-    width = np.where(["position" in d.name for d in problem.mount_decisions], 0.0, 1e-3 * (high - low))
-    near = np.clip(boxes._near, low + width, high - width)
+    held = [*("position" in d.name for d in problem.mount_decisions), False, False, False]
+    width = np.where(held, 0.0, 1e-3 * (high - low))
+    near = np.clip(boxes.near, low + width, high - width)
     bound = boxes.relaxed(near - width, near + width)[0]
     # the unbalances may cancel the one order that others than root mean squares are shown by
     assert (0.3 * least if norm == "rms" else 0.0) <= bound <= least
@@ -394,7 +419,10 @@ def test_no_design_feels_more_of_a_high_order_than_its_line() -> None:
         numbers = numbers_of(parts[0], mounting)
         for mounts in parts:
             load_ = generator.normal(size=mounts.size) + 1j * generator.normal(size=mounts.size)
-            line = felt_at_most(mounts, load_, omega)
+            high = HighOrder(mounts, load_, omega, generator.uniform(-1.0, 1.0, mounts.numbers))
+            if not high.is_plain:
+                continue
+            line = high.felt
             assert line is not None
             k, h = (mounts.root @ mounting.total(m) @ mounts.root.T for m in (mounting.springs, mounting.losses))
             motion = np.linalg.solve(k + 1j * h - omega**2 * np.eye(mounts.size), load_)
@@ -402,6 +430,10 @@ def test_no_design_feels_more_of_a_high_order_than_its_line() -> None:
             forces = np.einsum("mij,mj->mi", mounting.springs + 1j * mounting.losses, travel)
             felt = float(np.linalg.norm(forces, axis=1).sum())
             assert felt <= line.constant + float(line.slopes @ numbers)
+            # chords are over what they cover by what is told of them, and by nothing at their ends
+            over = high.hidden(numbers)
+            assert np.all(over >= 0.0)
+            assert over.sum() <= sum(chord.line(numbers).near for chord in high.chords)
             tight = max(tight, felt / line.largest)
     assert tight > 0.3
 

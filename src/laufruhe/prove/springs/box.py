@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
 
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.budget import passed
 from laufruhe.prove.springs.bound import Cap, Program, Proposed, Root, follows, pulls
 from laufruhe.prove.springs.columns import Columns
-from laufruhe.prove.springs.conditions import Held, conditions
-from laufruhe.prove.springs.high_orders import AtMost, felt_at_most
+from laufruhe.prove.springs.conditions import Held, conditions, of_stiffness
+from laufruhe.prove.springs.high_orders import AtMost, HighOrder, constant
 from laufruhe.prove.springs.limits import Limits
 from laufruhe.prove.springs.lines import Felt, Line, squared
 from laufruhe.prove.springs.means import Mean, mean_of
@@ -28,6 +28,8 @@ from laufruhe.prove.springs.program import aimed, proposed
 NEAR, ROUGH = 0.9995, 0.97
 # rounds that the roots of a mean narrow each other in, and share of it under which one is left as it is
 ROUNDS, SMALL = 2, 0.03
+# of what a box lacks, what is told too high of odd multiples and is worth halving it for
+WORTH = 0.25
 
 
 class Searched(Protocol):
@@ -62,6 +64,9 @@ class Searched(Protocol):
     def parts(self, lower: Array, upper: Array) -> tuple[OpenMounts, ...]:
         """The mounts of a box, whole and in halves."""
 
+    def near_numbers(self, mounts: OpenMounts, lower: Array, upper: Array) -> Array:
+        """s of the best design, or near it in a box."""
+
     def line(self, mounts: OpenMounts, order: Order, felt: Felt, lower: Array, upper: Array) -> Line:
         """Of an order over a box."""
 
@@ -73,6 +78,8 @@ class SpringBox:
         self.search, self.each, self.most, self.lower, self.upper = search, each, most, lower, upper
         self.parts = search.parts(lower, upper)
         self.mounts = self.parts[0]
+        self._stands = np.zeros(self.mounts.numbers)
+        self._near = search.near_numbers(self.mounts, lower, upper)
         self._stated: dict[int, tuple[Line, list[Held]]] = {}
         self._taken: dict[tuple[int, ...], list[list[AtMost]]] = {}
         self.modes = tuple(
@@ -93,21 +100,36 @@ class SpringBox:
             bound, pull, middle = self._together(heads, np.ones(1))
             found = heads[0].unit * math.sqrt(max(bound, 0.0)) - heads[0].loss
             return min(max(found, 0.0), most), pull, middle
-        roots = self._alone(heads, known)
+        roots = known
         if np.array_equal(self.lower, self.search.lower) and np.array_equal(self.upper, self.search.upper):
-            roots = self._together_again(heads, roots)
+            roots = self._together_again(heads, self._alone(heads, known))
             known[:] = roots
         mean = self._mean(heads, roots)
         if mean.floor >= most:
             return most, pull, None
         bound, pull, middle = self._together(heads, mean.prices, mean)
-        return max(min(bound + mean.constant, most), mean.floor), pull, middle
+        bound = max(min(bound + mean.constant, most), mean.floor)
+        return bound, self._with_hidden(heads, pull, most - bound), middle
+
+    def _with_hidden(self, heads: Sequence[Head], pull: Array, lacking: float) -> Array:
+        """Sides by what halving may bring: products that are apart, or odd multiples that are told too high (E62)."""
+        found = np.zeros(len(pull))
+        for head in heads:
+            for order, multiple in head.beside:
+                high = self._high(order)
+                if high is not None:
+                    hidden = high.hidden(self._stands) * head.share * head.factor / multiple / len(self.each.mounts)
+                    for j, own in enumerate(hidden):
+                        self._spread(found, [j], float(own))
+        return np.maximum(pull / max(float(pull.max()), 1e-300), found / max(WORTH * lacking, 1e-300))
 
     def _alone(self, heads: Sequence[Head], known: Array) -> Array:
         """What every root is at least by itself."""
-        found = [self._together([head], np.ones(1), near=ROUGH)[0] for head in heads]
-        units = np.array([head.unit for head in heads])
-        return np.array(np.maximum(units * np.sqrt(np.maximum(found, 0.0)), known))
+        units, found = np.array([head.unit for head in heads]), known.copy()
+        for k in np.flatnonzero(_matter(units * [head.share for head in heads])).tolist():
+            least = self._together([heads[k]], np.ones(1), near=ROUGH)[0]
+            found[k] = max(found[k], units[k] * math.sqrt(max(least, 0.0)))
+        return found
 
     def _together_again(self, heads: Sequence[Head], known: Array) -> Array:
         """What every root is at least with the others in what is left of the norm (E58)."""
@@ -115,13 +137,17 @@ class SpringBox:
         for _ in range(ROUNDS):
             for k in range(len(heads)):
                 mean = self._mean(heads, least)
-                if mean.floor < self.most and mean.prices[k] > SMALL * mean.prices.sum() and not passed():
+                if mean.floor >= self.most:
+                    return least
+                if _matter(mean.prices)[k] and not passed():
                     least[k] = max(least[k], units[k] * self._together(heads, mean.prices, mean, k)[0])
                     self._narrow(heads, heads[k], least)
         return least
 
     def _narrow(self, heads: Sequence[Head], head: Head, least: Array) -> None:
         """What designs that are no worse than the best known have at most of odd multiples."""
+        if self._mean(heads, least).floor >= self.most:
+            return
         shapes = np.zeros(5 * len(self.modes))
         for (order, _), line in zip(head.beside, self._of_head(head), strict=True):
             if np.any(line.slopes):
@@ -144,23 +170,23 @@ class SpringBox:
         return 1.0 - (float(mean.prices.sum()) + mean.constant) / size
 
     def _of_head(self, head: Head) -> list[AtMost]:
-        """What is felt of odd multiples at most, in the mean over mounts."""
-        found = []
-        for order, _ in head.beside:
-            mounts = self.parts[order.part]
-            plain = most_of(self.each, order, self.parts)
-            line = (
-                None
-                if self.each.is_travel or np.any(order.loads[1:])
-                else felt_at_most(mounts, order.loads[0], order.omega)
-            )
-            known = AtMost(plain, np.zeros(mounts.numbers))
-            if line is not None:
-                line = line.times(float(self.each.factors.max()))
-                known = line if line.largest < plain else known
-            known = known.times(1.0 / len(self.each.mounts))
-            found.append(replace(known, most=self.search.felt_at_most.get(id(order), math.inf)))
-        return found
+        """What is felt of odd multiples at most, in the mean over mounts (E62)."""
+        return [self._felt(order).times(1.0 / len(self.each.mounts)) for order, _ in head.beside]
+
+    def _high(self, order: Order) -> HighOrder | None:
+        """An order of which what springs of one loss do is known; None where it is not."""
+        found = HighOrder(self.parts[order.part], order.loads[0], order.omega, self._near)
+        return None if self.each.is_travel or np.any(order.loads[1:]) or not found.is_plain else found
+
+    def _felt(self, order: Order) -> AtMost:
+        """What is felt of one, in all."""
+        known, high = self.search.felt_at_most.get(id(order), math.inf), self._high(order)
+        most = min(most_of(self.each, order, self.parts), len(self.each.mounts) * known)
+        line = None if high is None else high.felt
+        if line is None:
+            return constant(most, self._near)
+        line = line.times(float(self.each.factors.max()))
+        return replace(line, most=min(most, line.largest))
 
     def _line(self, head: Head, order: Order) -> tuple[Line, list[Held]]:
         """Of an order, and what it has to keep."""
@@ -190,6 +216,7 @@ class SpringBox:
             aim = np.append(mean.along / size, np.zeros(5 * len(self.modes))) if root is None else None
             program = replace(program, aim=aim, goal=goal)
         bound, found = _best(program, near if mean is None else ROUGH)
+        self._stands = found.middle
         middle = self._design(found.middle) if self.search.stiffness_alone else None
         orders = [order for head in heads for order in head.orders]
         return bound if root is not None else size * bound, self._pull(orders, lines, found), middle
@@ -219,6 +246,7 @@ class SpringBox:
             if mean is not None:
                 own = lengths_of(head, self.each, lines[first:], at)
                 roots.append(Root(prices[number], float(mean.least[number]), float(mean.top[number]), own))
+        held += self._aside({order.part for head in heads for order in head.orders}, lines[0].size)
         more = self.search.limits.added(heads, len(heads), self._line_of, lines)
         lines += more.lines
         program = Program(
@@ -228,6 +256,11 @@ class SpringBox:
             np.append(np.full(len(heads), math.inf), more.tops),
         )  # fmt: skip
         return program, lines
+
+    def _aside(self, parts: Set[int], size: int) -> list[Held]:
+        """What stiffness has to keep in motions of a half that no order is followed in (E57)."""
+        others = [mounts for k, mounts in enumerate(self.parts) if k and k not in parts and 0 not in parts]
+        return [limit for mounts in others for limit in of_stiffness(mounts, size)]
 
     def _design(self, s: Array) -> Array:
         """Open numbers at s, where every number is one of them."""
@@ -264,6 +297,11 @@ class SpringBox:
         left = (self.upper - self.lower) / np.maximum(self.search.upper - self.search.lower, 1e-300)
         best = max(follows_, key=lambda j: left[j])
         pull[best] += share
+
+
+def _matter(shares: Array) -> Mask:
+    """Which of some parts of a mean are worth a relaxation."""
+    return np.asarray(shares > SMALL * shares.sum())
 
 
 def _best(program: Program, near: float) -> tuple[float, Proposed]:

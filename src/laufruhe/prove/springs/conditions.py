@@ -61,18 +61,22 @@ def conditions(order: int, mounts: OpenMounts, line: Line) -> list[Held]:
 def _spring_sides(order: int, numbers: int, spring: Spring, seen: ComplexArray, added: ComplexArray) -> list[Held]:
     """Every open stiffness between its bounds, and so is their product (E53)."""
     slopes = spring.slopes(numbers) / spring.size
-    pressed = [(given @ seen + sign * added) / spring.size for given, sign in spring.sides]
     found = [
-        held(order, given / spring.size, sign * slopes, seen, theirs)
-        for (given, sign), theirs in zip(spring.sides, pressed, strict=True)
+        held(order, given / spring.size, sign * slopes, seen, (given @ seen + sign * added) / spring.size)
+        for given, sign in spring.sides
     ]
-    first, second = pressed
+    spans = [((low @ seen + added) / spring.size, (high @ seen - added) / spring.size) for low, high in spring.spans]
     if len(seen) > 1:
-        return [*found, _between(order, numbers, product(first, second)[None, None])]
+        return [*found, *(_between(order, numbers, product(*pair)[None, None]) for pair in spans)]
+    return [*found, *(_between(order, numbers, _in_parts(*pair)) for pair in spans)]
+
+
+def _in_parts(first: ComplexArray, second: ComplexArray) -> Array:
+    """Products of real and imaginary parts, shape (2, 2, d, d)."""
     rows = [np.concatenate([each.real, each.imag]) for each in (first, second)]
     across = np.einsum("ax,by->abxy", *rows)
     across = across + across.transpose(1, 0, 2, 3)
-    return [*found, _between(order, numbers, 0.25 * (across + across.transpose(0, 1, 3, 2)))]
+    return np.asarray(0.25 * (across + across.transpose(0, 1, 3, 2)))
 
 
 def _between(order: int, numbers: int, moments: Array) -> Held:
@@ -133,21 +137,37 @@ def _bordering(plain: Array, pressed: Array) -> Array:
 
 
 def _limits_of_stiffness(order: int, mounts: OpenMounts, line: Line) -> list[Held]:
-    """A - L and U - A; where places move, A is not linear in s, and what A does to the motion alone counts."""
-    found, unit = [], mounts.highest
-    for sign, matrices in ((1.0, mounts.floors), (-1.0, mounts.ceilings)):
-        for matrix in matrices:
-            pressed = sign * (line.carried - matrix @ line.motion) / unit
-            given, slopes = sign * (mounts.middle - matrix) / unit, sign * mounts.slopes / unit
-            whole = held(order, given, slopes, line.motion, pressed)
-            found.append(_cornerless(whole) if mounts.places else whole)
+    """A - L and U - A; where places move, A itself only in motions that these do not touch (`OpenMounts.still`)."""
+    found, unit, still = [], mounts.highest, mounts.still
+    for sign, matrix in _edges(mounts):
+        pressed = sign * (line.carried - matrix @ line.motion) / unit
+        given, slopes = sign * (mounts.middle - matrix) / unit, sign * mounts.slopes / unit
+        whole = held(order, given, slopes, line.motion, pressed)
+        found.append(_seen_by(whole, still) if mounts.places else whole)
     return found
 
 
-def _cornerless(whole: Held) -> Held:
-    """The last two rows and columns of it."""
-    last = slice(whole.size - 2, whole.size)
-    return Held(whole.order, whole.constant[last, last], whole.slopes[:, last, last], whole.moments[last, last])
+def _edges(mounts: OpenMounts) -> list[tuple[float, Array]]:
+    """Floors and ceilings of stiffness."""
+    return [*((1.0, floor) for floor in mounts.floors), *((-1.0, ceiling) for ceiling in mounts.ceilings)]
+
+
+def of_stiffness(mounts: OpenMounts, size: int) -> list[Held]:
+    """A - L and U - A in motions that no order is followed in, beside moments of a size."""
+    unit, still, found = mounts.highest, mounts.still, []
+    for sign, matrix in _edges(mounts):
+        given, slopes = (still.T @ part @ still / unit for part in (mounts.middle - matrix, mounts.slopes))
+        none = np.zeros((len(given), len(given), size, size))
+        found.append(Held(0, sign * given, sign * slopes, none))
+    return found if still.size else []
+
+
+def _seen_by(whole: Held, still: Array) -> Held:
+    """Of its first rows and columns the part that lies in some motions."""
+    some = np.zeros((whole.size, still.shape[1] + 2))
+    some[: len(still), :-2], some[-2:, -2:] = still, np.eye(2)
+    moments = np.einsum("ax,abij,by->xyij", some, whole.moments, some, optimize=True)
+    return Held(whole.order, some.T @ whole.constant @ some, some.T @ whole.slopes @ some, moments)
 
 
 def _ranges(order: int, mounts: OpenMounts, line: Line) -> list[Held]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.prove.springs.bound import Goal
-from laufruhe.prove.springs.high_orders import AtMost
+from laufruhe.prove.springs.high_orders import AtMost, constant
 from laufruhe.prove.springs.orders import COSINE, Head
 
 # averages over two samples that are tried
@@ -48,6 +48,10 @@ class _Shown:
     taken: AtMost
     most: float
 
+    def worth(self, root: float) -> float:
+        """What it shows of the best design."""
+        return self.ratio * root - self.taken.near
+
 
 def mean_of(heads: Sequence[Head], felt: Sequence[Sequence[AtMost]], least: Array, most: float, numbers: int) -> Mean:
     """Of designs with a mean that is not over a number, with roots that are not under these.
@@ -68,26 +72,23 @@ def mean_of(heads: Sequence[Head], felt: Sequence[Sequence[AtMost]], least: Arra
     top = np.array([
         min((norm + each.most) / each.ratio for each in own) for own, norm in zip(shown, left, strict=True)
     ])  # fmt: skip
-    # what shows most of a design as good as the best where stiffness stands in the middle
-    chosen = [
-        max(own, key=lambda each: each.ratio * unit - each.taken.constant)
-        for own, unit in zip(shown, units, strict=True)
-    ]
+    # what shows most of the best design
+    chosen = [max(own, key=lambda each: each.worth(unit)) for own, unit in zip(shown, units, strict=True)]
     ratios = np.array([each.ratio for each in chosen])
     along = -sum((share * each.taken.slopes for share, each in zip(shares, chosen, strict=True)), np.zeros(numbers))
-    constant = -float(sum(share * each.taken.constant for share, each in zip(shares, chosen, strict=True)))
-    return Mean(shares * units * ratios, along, constant, floor, least / units, np.maximum(top, least) / units)
+    given = -float(sum(share * each.taken.constant for share, each in zip(shares, chosen, strict=True)))
+    return Mean(shares * units * ratios, along, given, floor, least / units, np.maximum(top, least) / units)
 
 
 def _shown(head: Head, felt: Sequence[AtMost], numbers: int) -> list[_Shown]:
     """By averages over two samples apart, by the plain order, and by its cosine."""
     none = np.zeros(numbers)
     if not felt:
-        return [_Shown(1.0, AtMost(head.loss, none), head.loss)]
-    found = [_Shown(COSINE / head.factor, AtMost(0.0, none), 0.0)]
+        return [_Shown(1.0, constant(head.loss, none), head.loss)]
+    found = [_Shown(COSINE / head.factor, constant(0.0, none), 0.0)]
     for shift in sorted({round(k * head.phases / 4 / SHIFTS) for k in range(SHIFTS)}):
         ratio, weights = head.shifted(shift)
         parts = [each.told.times(weight) for each, weight in zip(felt, weights, strict=True)]
-        total = AtMost(sum(each.constant for each in parts), sum((each.slopes for each in parts), none))
-        found.append(_Shown(ratio, total, sum(w * each.largest for each, w in zip(felt, weights, strict=True))))
+        most = sum(w * each.largest for each, w in zip(felt, weights, strict=True))
+        found.append(_Shown(ratio, sum(parts, AtMost(0.0, none, 0.0)), most))
     return found

@@ -7,8 +7,9 @@ an axis is one number more.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,11 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import DAMPING, LAG, LOSS, POSITION, STIFFNESS, TURNED
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.transmitted import SLACK, limited_stiffness, number_ranges
-from laufruhe.prove.springs.opened import Opened, Place, Spring, own_axes
+from laufruhe.prove.springs.opened import Framed, Opened, Place, Spring, own_axes
+from laufruhe.prove.springs.planes import Plane
 
+# what turns count as none beside the largest
+ALIKE = 1e-12
 # share of a square that is spent on the arms of mounts whose places are open
 STRETCH = 0.2
 
@@ -60,6 +64,8 @@ class OpenMounts:
         What loss is not under, damping that follows stiffness per frequency, and viscous damping, shape (k, k).
     softest
         Least stiffness of every spring in any direction, shape (springs,).
+    planes
+        Where mounts turn in a plane, by what these follow: their number, and what may be in them (E63).
     """
 
     root: Array
@@ -83,6 +89,7 @@ class OpenMounts:
     lagging: Array
     damping: Array
     softest: Array
+    planes: Mapping[Any, tuple[int, Plane]]
 
     @property
     def numbers(self) -> int:
@@ -112,7 +119,7 @@ class OpenMounts:
     @property
     def straight(self) -> list[int | None]:
         """Of every s the open number that it goes through from end to end; none where it is one of a matrix."""
-        along = {j for spring in self.springs if spring.axes.shape[1] == 1 for j, _ in spring.terms}
+        along = {j for spring in self.springs if spring.axes.shape[1] < 3 for j, _ in spring.terms}
         along |= {place.number for place in self.places}
         return [own[0] if j in along else None for j, own in enumerate(self.keys)]
 
@@ -120,6 +127,13 @@ class OpenMounts:
     def turns(self) -> Array:
         """Turns of the block per motion, shape (3, k)."""
         return np.asarray(self.root.T[3:])
+
+    @property
+    def still(self) -> Array:
+        """Motions that move no mount by another way where its place is another, as columns, shape (k, n)."""
+        turns = np.concatenate([np.zeros((1, self.size)), *(place.aside @ self.turns for place in self.places)])
+        _, sizes, across = np.linalg.svd(turns)
+        return np.asarray(across[np.count_nonzero(sizes > ALIKE * max(float(sizes[0]), ALIKE)) :].T)
 
     @property
     def middle(self) -> Array:
@@ -178,9 +192,9 @@ def is_lifted(problem: Problem) -> bool:
     return still and not np.any(damped & (moved | turned)) and bool(np.all(low[:, STIFFNESS] >= 0.0))
 
 
-def open_mounts(problem: Problem, lower: Array, upper: Array) -> OpenMounts:
+def open_mounts(problem: Problem, lower: Array, upper: Array, framed: Framed | None = None) -> OpenMounts:
     """The mounts of a problem that `is_lifted`, its open numbers between these."""
-    mounting, opened = mounting_in(problem.engine), Opened(problem, lower, upper)
+    mounting, opened = mounting_in(problem.engine), Opened(problem, lower, upper, framed)
     root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
     count, centre = len(opened.low), np.array(mounting.block.centre_of_gravity)
     motions = np.array([point_motion(NUMBERS, opened.middle(m)[POSITION] - centre) @ root.T for m in range(count)])
@@ -200,7 +214,7 @@ def open_mounts(problem: Problem, lower: Array, upper: Array) -> OpenMounts:
         mounting.dynamic, tuple(s for _, own in found for s in own), places, opened.numbers.keys, tuple(floors),
         tuple(ceilings), tuple(bands), low, high, lossy, lagging,
         np.asarray(sum(carried(g, c) for g, c in zip(motions, dampers, strict=True))),
-        opened.low[:, STIFFNESS].min(axis=1),
+        opened.low[:, STIFFNESS].min(axis=1), opened.planes,
     )  # fmt: skip
 
 

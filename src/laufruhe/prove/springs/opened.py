@@ -1,9 +1,9 @@
-"""Numbers that open springs and places of mounts follow (E42, E52)."""
+"""Numbers that open springs and places of mounts follow (E42, E52, E63)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations_with_replacement
 from typing import Any
@@ -16,10 +16,13 @@ from laufruhe.physics.rigid_body import turned_axes
 from laufruhe.problem.decision import LAG, LOSS, POSITION, STIFFNESS, TURNED
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.transmitted import number_ranges
+from laufruhe.prove.springs.planes import Plane
 
 # angle by which a mount is turned to see which of its axes stay [rad]
 ASIDE = 0.3
 STAYS = 1e-9
+# of the largest stiffness, widths that count as none
+TINY = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +39,8 @@ class Spring:
         Number j and matrix, shape (b, b) [N/m].
     sides
         Matrices C and signs: C + sign times the sum is nowhere indefinite.
+    spans
+        Matrices C and D: (C + the sum)(D - the sum) is nowhere indefinite.
     size
         Of the sum [N/m].
     """
@@ -44,6 +49,7 @@ class Spring:
     axes: Array
     terms: tuple[tuple[int, Array], ...]
     sides: tuple[tuple[Array, float], ...]
+    spans: tuple[tuple[Array, Array], ...]
     size: float
 
     def slopes(self, numbers: int) -> Array:
@@ -86,6 +92,22 @@ class Place:
         return np.cross(self.aside, self.axis)
 
 
+@dataclass(frozen=True, eq=False)
+class Framed:
+    """Axes in which planes are told, and boxes in them (E63).
+
+    Attributes
+    ----------
+    frames
+        Numbers of every spring whose angles these have, shape (springs, 14).
+    boxes
+        K11, K22 and K12 by what a plane follows, shape (3, 2) each; none where all is open.
+    """
+
+    frames: Array
+    boxes: Mapping[Any, Array] | None = None
+
+
 class _Numbers:
     """Numbers by what they follow, so that mirrored mounts share theirs."""
 
@@ -103,8 +125,13 @@ class _Numbers:
 class Opened:
     """One mount after the other."""
 
-    def __init__(self, problem: Problem, lower: Array, upper: Array) -> None:
+    def __init__(self, problem: Problem, lower: Array, upper: Array, framed: Framed | None = None) -> None:
         self.low, self.high = number_ranges(problem, lower, upper)
+        self.start = np.array(problem.mount_numbers, dtype=float)
+        self._frames = 0.5 * (self.low + self.high) if framed is None else framed.frames
+        self._boxes = None if framed is None else framed.boxes
+        self.planes: dict[Any, tuple[int, Plane]] = {}
+        self._ends: dict[int, tuple[Array, Array]] = {}
         self.half = 0.5 * (upper - lower)
         self.numbers = _Numbers()
         self.drives: list[dict[int, list[tuple[int, float]]]] = [{} for _ in self.low]
@@ -123,8 +150,10 @@ class Opened:
     def springs(self, m: int) -> tuple[Array, list[Spring]]:
         """Stiffness at the middle, shape (3, 3), and what is open of it."""
         middle, reach = self.middle(m), self.reach(m)
-        axes = own_axes(middle[TURNED])
         turned = reach[TURNED] > 0.0
+        if np.count_nonzero(turned) == 1:
+            middle[TURNED] = self._frames[m, TURNED]
+        axes = own_axes(middle[TURNED])
         if not turned.any():
             return self._along(m, axes, range(3))
         other = own_axes(middle[TURNED] + ASIDE * turned)
@@ -144,36 +173,59 @@ class Opened:
                 parts = [(j, gain * self.half[j]) for j, gain in self.drives[m][i]]
                 terms = tuple((self.numbers.of(("one", j), [j]), np.array([[h]])) for j, h in parts)
                 side = np.array([[reach[i]]])
-                springs.append(Spring(m, axes[i][:, None], terms, ((side, 1.0), (side, -1.0)), float(reach[i])))
+                sides = (side, 1.0), (side, -1.0)
+                springs.append(Spring(m, axes[i][:, None], terms, sides, ((side, side),), float(reach[i])))
         return total, springs
 
     def _in_plane(self, m: int, axes: Array, pair: list[int]) -> tuple[Array, Spring]:
-        """Two axes that turn about the third (E52), as they stand at the middle of the angle."""
+        """Two axes that turn about the third, in axes that do not (E52, E63)."""
+        key, plane, sign = self._plane(m, axes, pair)
+        box = plane.whole if self._boxes is None else self._boxes[key]
+        first = 3 * self.planes.setdefault(key, (len(self.planes), plane))[0]
+        (c1, c2, c3), halves = box.mean(axis=1), 0.5 * (box[:, 1] - box[:, 0])
+        one, two, both = np.diag([1.0, 0.0]), np.diag([0.0, 1.0]), sign * (np.ones((2, 2)) - np.eye(2))
+        terms = tuple(
+            (self.numbers.of((k, key), [len(self.half) + first + k]), halves[k] * matrix)
+            for k, matrix in enumerate((one, two, both))
+        )
+        centre = c1 * one + c2 * two + c3 * both
+        low, high = plane.own(box)
+        # of a box |K12| <= h3 is under any diag(h3 w, h3 / w)
+        w = math.sqrt((halves[0] + TINY * high) / (halves[1] + TINY * high))
+        near, size = np.diag([halves[0] + w * halves[2], halves[1] + halves[2] / w]), float(halves.max()) or 1.0
+        most = float(np.linalg.norm(np.array([[halves[0], halves[2]], [halves[2], halves[1]]]), 2))
+        sides = [(centre - low * np.eye(2), 1.0), (high * np.eye(2) - centre, -1.0)]
+        spans = [(sides[0][0], sides[1][0])]
+        if self._boxes is not None:
+            sides += [(near, 1.0), (near, -1.0)]
+            spans += [(most * np.eye(2), most * np.eye(2))]
+        spring = Spring(m, axes[pair].T, terms, tuple(sides), tuple(spans), size)
+        top = min(high * np.eye(2), centre + near, key=lambda each: float(np.trace(each)))
+        rest = np.delete(axes, pair, axis=0)
+        aside = {k: float(each[m, STIFFNESS][np.setdiff1d(range(3), pair)[0]]) * rest.T @ rest
+                 for k, each in enumerate((self.low, self.high))}  # fmt: skip
+        self._ends[m] = (
+            axes[pair].T @ (low * np.eye(2)) @ axes[pair] + aside[0], axes[pair].T @ top @ axes[pair] + aside[1]
+        )  # fmt: skip
+        return np.asarray(axes[pair].T @ centre @ axes[pair]), spring
+
+    def _plane(self, m: int, axes: Array, pair: list[int]) -> tuple[Any, Plane, float]:
+        """What is open of a plane, by what it follows, and the sign of K12 in these axes."""
         number = STIFFNESS.start + np.array(pair)
-        (low1, low2), (high1, high2) = self.low[m, number], self.high[m, number]
         turns = [(k, j, gain) for k in range(TURNED.start, TURNED.stop) for j, gain in self.drives[m].get(k, [])]
-        gain = turns[0][2]
+        axis, _, gain = turns[0]
         # what several numbers turn is its own
         turned = tuple((k, j, abs(gain)) for k, j, gain in turns) if len(turns) == 1 else (m, *turns)
-        angle = float(self.reach(m)[TURNED].max())
-        mixed = math.sin(min(angle, 0.5 * math.pi)) ** 2
-        apart = max(abs(high1 - low2), abs(high2 - low1))
-        sides = [
-            (min(a, (1.0 - mixed) * a + mixed * b), max(c, (1.0 - mixed) * c + mixed * d))
-            for a, b, c, d in ((low1, low2, high1, high2), (low2, low1, high2, high1))
-        ]
-        across = 0.5 * apart * math.sin(min(2.0 * angle, 0.5 * math.pi))
-        centre, halves = np.diag([0.5 * (a + b) for a, b in sides]), [0.5 * (b - a) for a, b in sides]
         drives = [drive for k in number for drive in self.drives[m].get(int(k), [])]
-        key = (tuple(drives), turned, angle, low1, high1, low2, high2)
-        follows = [*(j for _, j, _ in turns), *(j for j, _ in drives)]
-        one, two = np.diag([1.0, 0.0]), np.diag([0.0, 1.0])
-        both = math.copysign(1.0, gain) * (np.ones((2, 2)) - np.eye(2))
-        matrices = (halves[0] * one, halves[1] * two, across * both)
-        terms = tuple((self.numbers.of((k, key), follows), matrix) for k, matrix in enumerate(matrices))
-        bounds = ((centre - min(low1, low2) * np.eye(2), 1.0), (max(high1, high2) * np.eye(2) - centre, -1.0))
-        spring = Spring(m, axes[pair].T, terms, bounds, max(*halves, across))
-        return np.asarray(axes[pair].T @ centre @ axes[pair]), spring
+        side = math.copysign(1.0, gain)
+        angles = sorted(side * (float(each[m, axis]) - float(self._frames[m, axis])) for each in (self.low, self.high))
+        ahead = self._frames[m, TURNED].copy()
+        ahead[axis - TURNED.start] += side * ASIDE
+        sign = math.copysign(1.0, float(own_axes(ahead)[pair[0]] @ axes[pair[1]]))
+        given = (*self.start[m, number], side * (self.start[m, axis] - self._frames[m, axis]))
+        key = (tuple(drives), turned, tuple(round(float(each), 9) for each in given))
+        near = self._frames[m, number]
+        return key, Plane(self.low[m, number], self.high[m, number], (angles[0], angles[1]), near), sign
 
     def _in_space(self, m: int) -> tuple[Array, list[Spring]]:
         """A matrix between the least and the largest stiffness."""
@@ -186,15 +238,16 @@ class Opened:
             terms.append((self.numbers.of(("space", m, a, b), follows), matrix))
         side = half * np.eye(3)
         middle = 0.5 * (low + high) * np.eye(3)
-        return middle, [Spring(m, np.eye(3), tuple(terms), ((side, 1.0), (side, -1.0)), half)]
+        return middle, [Spring(m, np.eye(3), tuple(terms), ((side, 1.0), (side, -1.0)), ((side, side),), half)]
 
     def least_and_most(self, m: int) -> tuple[Array, Array]:
-        """Matrices that the mount's stiffness is not under and not over, shape (3, 3) each."""
-        low, high, axes = self.low[m, STIFFNESS], self.high[m, STIFFNESS], np.eye(3)
+        """Matrices that the mount's stiffness is not under and not over, shape (3, 3) each; after its springs."""
+        if m in self._ends:
+            return self._ends[m]
+        low, high = self.low[m, STIFFNESS], self.high[m, STIFFNESS]
         if np.any(self.reach(m)[TURNED] > 0.0):
-            low, high = np.full(3, low.min()), np.full(3, high.max())
-        else:
-            axes = own_axes(self.middle(m)[TURNED])
+            return float(low.min()) * np.eye(3), float(high.max()) * np.eye(3)
+        axes = own_axes(self._frames[m, TURNED])
         return np.asarray(axes.T @ np.diag(low) @ axes), np.asarray(axes.T @ np.diag(high) @ axes)
 
     def places(self) -> tuple[Place, ...]:

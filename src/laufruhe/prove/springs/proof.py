@@ -21,7 +21,7 @@ LEVELS = (0.1, 0.05, 0.02, 0.01, 0.003, 0.0)
 # relaxations where none are asked for, and how many times those that were needed so far have to be left for a level
 MOST_RELAXED, AHEAD = 100, 3
 # the same where odd multiples hide a mean: whole boxes alone are worth it
-FIRST, FEW_RELAXED = (0.3, 0.2, 0.15), 12
+FIRST, FEW_RELAXED = (0.3, 0.2, 0.15), 45
 # of the largest, pulls of sides that are not narrowed; of what is to be shown, what a round of these has to bring
 LITTLE, PROGRESS = 0.1, 0.1
 
@@ -64,14 +64,18 @@ def _by_levels(boxes: SpringBoxes, room: float) -> Divided:
     """Show that no design is under a value, and then under one that is nearer to that of the best (E59)."""
     asked_for, few = boxes.problem.search.boxes, not boxes.modes
     most = (FEW_RELAXED if few else MOST_RELAXED) if asked_for is None else asked_for
-    bound, spent, places = boxes.look(boxes.lower, boxes.upper)[0], 1, tuple[Array, ...]()
+    first = boxes.under(_level(boxes, LEVELS[0], room))
+    looked = first.look(boxes.lower, boxes.upper)
+    bound, spent, places = looked[0], 1, tuple[Array, ...]()
     for share in (*(FIRST if few else ()), *LEVELS):
-        shown = boxes.value - max(share * boxes.value, NEARLY * room)
+        shown = _level(boxes, share, room)
         if shown <= bound:
             continue
         if AHEAD * spent > most or passed():
             break
-        narrowing = _Narrowing(boxes.under(shown), most - spent)
+        narrowing = _Narrowing(first if share == LEVELS[0] else boxes.under(shown), most - spent)
+        if share == LEVELS[0]:
+            narrowing.looked = looked
         found = narrowing.run(narrowing.looked_at(boxes.lower, boxes.upper), most - spent)
         spent += narrowing.spent
         bound = max(bound, found.bound)
@@ -83,6 +87,11 @@ def _by_levels(boxes: SpringBoxes, room: float) -> Divided:
     return Divided(bound, spent, tuple(place[:count] for place in (*boxes.places, *places)) if left else ())
 
 
+def _level(boxes: SpringBoxes, share: float, room: float) -> float:
+    """So much less than the best."""
+    return boxes.value - max(share * boxes.value, NEARLY * room)
+
+
 class _Narrowing(Halving):
     """Boxes that are narrowed before they are halved.
 
@@ -90,6 +99,8 @@ class _Narrowing(Halving):
     ----------
     spent
         Relaxations that were solved.
+    looked
+        What is known of the first of all boxes.
     """
 
     what = "boxes of mounts and modes, by spring forces"
@@ -97,12 +108,17 @@ class _Narrowing(Halving):
     def __init__(self, search: SpringBoxes, most: int) -> None:
         super().__init__(search.value, 0.0)
         self._search, self._most, self.spent = search, most, 0
+        self.looked: tuple[float, Array] | None = None
 
     def looked_at(self, lower: Array, upper: Array) -> tuple[float, Box] | None:
         """A box as small as it becomes, and its bound; None where it holds no better design."""
         before = best = -math.inf
         while True:
-            bound, pull = self._search.look(lower, upper)
+            kept = self._search.kept(lower, upper)
+            if kept is None:
+                return None
+            lower, upper = kept
+            (bound, pull), self.looked = self.looked or self._search.look(lower, upper), None
             self.spent += 1
             before, best = best, max(best, bound)
             if best >= self.enough:
@@ -116,8 +132,6 @@ class _Narrowing(Halving):
             self.spent += solved
             if found is None:
                 return None
-            if whole:
-                self._search.lower, self._search.upper = found
             lower, upper = found
 
     def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
@@ -144,7 +158,7 @@ def narrowed(
     The box, and how many relaxations that took.
     """
     program, mounts = boxes.left(lower, upper)
-    numbers, count = program.numbers, len(boxes.problem.mount_decisions)
+    numbers, count = program.numbers, boxes.own[0].start if boxes.own else len(lower)
     least, most = lower.copy(), upper.copy()
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
     # numbers of shapes are not counted from the middle of a box

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import NEARLY
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divides
+from laufruhe.prove.mounts.transmitted import number_ranges
 from laufruhe.prove.springs.bound import Program
 from laufruhe.prove.springs.box import SpringBox
 from laufruhe.prove.springs.columns import columns_of
@@ -26,6 +29,7 @@ from laufruhe.prove.springs.lines import Felt, Line, line_of
 from laufruhe.prove.springs.mirrored import mirrored_parts
 from laufruhe.prove.springs.modes import modes_of
 from laufruhe.prove.springs.open_mounts import OpenMounts, open_mounts
+from laufruhe.prove.springs.opened import Framed
 from laufruhe.prove.springs.orders import Asked, Head, Order, asked, heads_of
 
 # what all relaxations may cost together, a number of moments squared being one, and how many they may be
@@ -45,7 +49,9 @@ class SpringBoxes:
     Attributes
     ----------
     lower, upper
-        Of the open numbers of the mounts.
+        Of the open numbers of the mounts, of matrices of planes (E63), and of modes.
+    near
+        Of the best design.
     places
         Where the first relaxation stands.
     """
@@ -56,6 +62,13 @@ class SpringBoxes:
         self.problem, self.value, self.enough = problem, value, value - NEARLY * room
         decisions = problem.mount_decisions
         lower, upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+        self._near = np.array([v for v, d in zip(near, problem.decisions, strict=True) if not d.is_affine], dtype=float)
+        self._frames = number_ranges(problem, self._near, self._near)[0]
+        self._planes = open_mounts(problem, lower, upper, Framed(self._frames)).planes
+        own = [np.append(plane.near, 0.0) for _, plane in self._planes.values()]
+        self.near = np.concatenate([self._near, *own])
+        turned = np.concatenate([np.zeros((0, 2)), *(plane.whole for _, plane in self._planes.values())])
+        lower, upper = np.append(lower, turned[:, 0]), np.append(upper, turned[:, 1])
         self._parts = self.parts(lower, upper)
         self.modes = modes_of(problem, self._parts[0])
         whole = np.ones(5 * len(self.modes))
@@ -63,7 +76,6 @@ class SpringBoxes:
         self.own = [slice(len(lower) + 5 * k, len(lower) + 5 * (k + 1)) for k in range(len(self.modes))]
         self.places: list[Array] = []
         self._plain = StiffnessBoxes(problem, 0.05 * room) if divides(problem) else None
-        self._near = np.array([v for v, d in zip(near, problem.decisions, strict=True) if not d.is_affine], dtype=float)
         self._model = AffineModel(off_resonance(problem))
         held = [value for value, d in zip(near, problem.decisions, strict=True) if d.is_affine]
         columns = columns_of(self._model.domains, held)
@@ -89,8 +101,32 @@ class SpringBoxes:
     def parts(self, lower: Array, upper: Array) -> tuple[OpenMounts, ...]:
         """The mounts of a box for all motions, and where they mirror each other for both halves of them (E57)."""
         count = len(self.problem.mount_decisions)
-        whole = open_mounts(self.problem, lower[:count], upper[:count])
+        boxes = {key: np.column_stack([lower[own], upper[own]]) for key, own in self._of_planes()}
+        whole = open_mounts(self.problem, lower[:count], upper[:count], Framed(self._frames, boxes))
         return (whole, *mirrored_parts(whole))
+
+    def _of_planes(self) -> list[tuple[Any, slice]]:
+        """Where the numbers of every plane stand (E63)."""
+        first = len(self.problem.mount_decisions)
+        return [(key, slice(first + 3 * k, first + 3 * (k + 1))) for key, (k, _) in self._planes.items()]
+
+    def kept(self, lower: Array, upper: Array) -> tuple[Array, Array] | None:
+        """The part of a box that holds all planes that are possible in it; None where there are none."""
+        lower, upper = lower.copy(), upper.copy()
+        for key, own in self._of_planes():
+            found = self._planes[key][1].kept(np.column_stack([lower[own], upper[own]]))
+            if found is None:
+                return None
+            lower[own], upper[own] = found.T
+        return lower, upper
+
+    def near_numbers(self, mounts: OpenMounts, lower: Array, upper: Array) -> Array:
+        """s of the best design, or of what is next to it in a box; zero where s is one of six of a matrix."""
+        found = np.zeros(mounts.numbers)
+        for j, side in enumerate(mounts.straight):
+            if side is not None and upper[side] > lower[side]:
+                found[j] = (2.0 * self.near[side] - lower[side] - upper[side]) / (upper[side] - lower[side])
+        return np.clip(found, -1.0, 1.0)
 
     @property
     def mount_numbers(self) -> int:
@@ -140,14 +176,18 @@ class SpringBoxes:
             )
         for k in np.flatnonzero(np.isfinite(known)):
             if known[k] < self.enough:
-                bound, pull = self.relaxed(lower[k], upper[k])
+                kept = self.kept(lower[k], upper[k])
+                bound, pull = (math.inf, np.zeros(0)) if kept is None else self.relaxed(*kept)
                 known[k] = max(known[k], bound)
                 sides[k] = int(np.argmax(pull)) if pull.max(initial=0.0) > 0.0 else sides[k]
         return known, sides
 
     def look(self, lower: Array, upper: Array) -> tuple[float, Array]:
         """The better of both bounds of one box, and the pull of its sides."""
-        known = 0.0
+        known, whole = 0.0, self.kept(lower, upper)
+        if whole is None:
+            return self.value, np.zeros(len(lower))
+        lower, upper = whole
         if self._plain is not None:
             count = len(self._near)
             known = float(self._plain.bounds(lower[None, :count], upper[None, :count])[0][0])
@@ -179,8 +219,8 @@ class SpringBoxes:
         found = copy(self)
         found.value = found.enough = value
         found._heads = [[replace(head, orders=self._needed(head, value)) for head in heads] for heads in self._heads]
-        found._least = [np.zeros(len(heads)) for heads in self._heads]
-        found.felt_at_most = {}
+        found._least = [least.copy() for least in self._least]
+        found.felt_at_most = dict(self.felt_at_most)
         return found
 
     def _needed(self, head: Head, value: float) -> tuple[Order, ...]:
