@@ -131,6 +131,9 @@ def test_engines_are_listed_and_shown() -> None:
     ("words", "line"),
     [
         (["examples", "tractor-fourr"], "is no ready problem"),
+        (["engines", "s85"], "did you mean 'bmw-s85'?"),
+        (["engines", "laverd"], "did you mean 'laverda-1000'?"),
+        (["engines", "bmw-b"], "use one of: bmw-b38, bmw-b48, bmw-b58"),
         (["engines", "bmw-b49"], "did you mean 'bmw-b48'?"),
         (["init", "--from", "bmw-b49"], "did you mean 'bmw-b48'?"),
     ],

@@ -217,6 +217,12 @@ BAD = [
         """constraints[1].max = "4 N": 'N' is not a unit of a mass; write for example"""),
     bad("negative limit", '"4 kg"', '"-4 kg"',
         'constraints[1].max = "-4 kg": is negative, and no norm is; give'),
+    bad("key of another table", "title =", 'stroke = "90 mm"\ntitle =',
+        'stroke = "90 mm": is not a key here; it stands in [engine]'),
+    bad("per cent", '"4 kg"', '"4 kg"\n[[counterweights]]\nname = "webs"\nbalance_factor = 50',
+        'counterweights[2].balance_factor = 50: must be at most 10; give a smaller value, or "50 %" if per cent is'),
+    bad("part of a quantity", '"mean mount force"', '"mean mount"',
+        """objective.minimise = "mean mount": is no quantity; use one of: mean mount force, mean mount t"""),
     bad("limit of nobody", '"4 kg"', "\"4 kg\"\nof = [\"lefty\"]",
         'constraints[1].of = "lefty": is no counterweight or balancer here; did'),
     bad("mass that is not known", "radius = \"20 mm\"\n", "",
@@ -299,6 +305,8 @@ class TestFiles:
     def test_missing(self, tmp_path: Path) -> None:
         path = tmp_path / "none.toml"
         assert complaint_about(path) == "file: does not exist; check the path"
+        (tmp_path / "missing.toml").write_text("", encoding="utf-8")
+        assert complaint_about(tmp_path / "misssing.toml").startswith("file: does not exist; did you mean '")
 
     def test_a_folder(self, tmp_path: Path) -> None:
         path = tmp_path / "folder.toml"

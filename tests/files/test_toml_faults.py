@@ -15,6 +15,7 @@ FAULTS = {
     "a key twice": ("a = 1\nb = 2\na = 3\n", "3:6: a is given twice, before in line 1; keep one"),
     "a list twice": ("a = [1,\n2]\na = [3,\n4]\nb = 1", "4:3: a is given twice, before in line 1"),
     "a table twice": ("[engine]\na = 1\n\n[engine]\nb = 2", "[engine] is given twice, before in line 1; join the two"),
+    "a value and a table": ('a = 1\n[a]\nb = 2', "2:3: a is a value in line 1 and a table here; keep one"),
     "a key of a small table twice": ("a = {b = 1, b = 2}", "'b' stands twice in one table; keep one of them"),
     "decimal comma": ("ratio = 0,26", "1:10: a comma divides the number; decimals follow a point, as in 0.26"),
     "unit without quotes": ("bore = 80 mm # wide", 'a number with its unit stands in quotes, as in "80 mm"'),

@@ -58,8 +58,7 @@ def _asked_for(file: Path) -> str | None:
 def _known(source: str) -> str:
     """What --from names; `InputError` where there is none of that name."""
     if source not in engines() and source.removesuffix(".toml") not in ready.ready():
-        remedy = nearest(source, [*engines(), *ready.ready()])
-        advice = remedy if remedy.startswith("did") else "laufruhe engines and laufruhe examples list them"
+        advice = nearest(source, [*engines(), *ready.ready()], "laufruhe engines and laufruhe examples list them")
         raise _refused("--from", source, "is no engine and no ready problem", advice)
     return source
 

@@ -67,10 +67,20 @@ def described() -> tuple[str, dict[str, Any]]:
     answers: dict[str, Any] = {}
     for question in _QUESTIONS:
         if _is_asked(question.key, answers):
-            words = f"{question.words} ({', '.join(question.among)})" if question.among else question.words
+            words = f"{question.words}{_hint(question, answers)}"
             usual = _order(answers) if question.key == "firing_order" else question.usual
             answers[question.key] = asked(words, usual, partial(_tried, question, dict(answers)))
     return title, {key: value for key, value in answers.items() if value != []}
+
+
+def _hint(question: _Question, answers: Answers) -> str:
+    """What stands behind the words of a question."""
+    if question.among:
+        return f" ({', '.join(question.among)})"
+    if question.key == "firing_order" and LAYOUTS[answers["layout"]].takes("bank_stagger"):
+        half = answers["cylinders"] // 2
+        return f" (1 to {half} are the left bank, front to rear)"
+    return ""
 
 
 def asked(words: str, usual: str, read: Callable[[str], Any]) -> Any:

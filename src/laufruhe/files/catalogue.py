@@ -79,8 +79,7 @@ def engine_named(name: object, where: str) -> CatalogueEngine:
     """An engine of the catalogue; `Refused` where there is none of that name."""
     found = engines().get(name) if isinstance(name, str) else None
     if found is None:
-        known = nearest(str(name), list(engines()))
-        remedy = known if known.startswith("did") else "laufruhe engines lists them"
+        remedy = nearest(str(name), list(engines()), "laufruhe engines lists them")
         raise Refused(where, name, "is no engine of the catalogue", remedy)
     return found
 

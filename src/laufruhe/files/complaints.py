@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, TypeAlias, get_args
 
 from pydantic import BaseModel, ValidationError
@@ -42,7 +43,7 @@ def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Compl
     for loc, tables, detail in details:
         if detail["type"] == "missing" and _is_misspelt(loc, unknown):
             continue
-        found.setdefault(key_path(loc), _complaint(detail, loc, tables))
+        found.setdefault(key_path(loc), _complaint(detail, loc, tables, _home(str(loc[-1]), model)))
     first = list(found.values())[:MOST_COMPLAINTS]
     rest = error.error_count() - len(told) + len(found) - len(first)
     more = [Complaint("file", "", f"has {rest} more such faults", "correct these first")] if rest else []
@@ -92,17 +93,40 @@ def short(value: Any) -> str:
     return printed(f'"{value}"' if isinstance(value, str) else str(value), 60)
 
 
-def nearest(word: str, words: Sequence[str]) -> str:
-    """A remedy that names the nearest right word, or all of them."""
-    close = difflib.get_close_matches(word, words, n=1, cutoff=_CLOSE)
-    return f"did you mean '{close[0]}'?" if close else "use one of: " + ", ".join(sorted(words))
+def nearest(word: str, words: Sequence[str], otherwise: str = "") -> str:
+    """A remedy that names the nearest right word, those that hold it, or all of them; `otherwise` in place of all."""
+    holding = sorted(each for each in words if len(word) >= _FEW and word.lower() in each.lower())
+    close = holding if len(holding) == 1 else difflib.get_close_matches(word, words, n=1, cutoff=_CLOSE)
+    if close and len(holding) < _FEW:
+        return f"did you mean '{close[0]}'?"
+    return "use one of: " + ", ".join(holding) if holding else otherwise or "use one of: " + ", ".join(sorted(words))
 
 
-def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]]) -> Complaint:
+def beside(path: Path, otherwise: str) -> str:
+    """A remedy that names the file most like one that is not there."""
+    names = [other.stem for other in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+    close = difflib.get_close_matches(path.stem, names, n=1, cutoff=_CLOSE)
+    return f"did you mean '{path.with_name(close[0])}.toml'?" if close else otherwise
+
+
+def _home(key: str, model: type[BaseModel]) -> str:
+    """In which tables of a file a key stands; empty where in none."""
+    found = []
+    for name, field in model.model_fields.items():
+        table = f"[[{name}]]" if field.annotation is not None and "list[" in str(field.annotation) else f"[{name}]"
+        found += [table] * any(key in inner.model_fields for inner in _tables_in(field.annotation))
+    return f"it stands in {' or '.join(found)}" if found else ""
+
+
+def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], home: str) -> Complaint:
     kind, where = detail["type"], key_path(loc)
     if kind == "extra_forbidden":
         keys = [field.alias or name for table in tables[:1] for name, field in table.model_fields.items()]
-        remedy = 'a unit stands beside its number, as in "120 mm"' if loc[-1] == "unit" else nearest(str(loc[-1]), keys)
+        remedy = (
+            'a unit stands beside its number, as in "120 mm"'
+            if loc[-1] == "unit"
+            else nearest(str(loc[-1]), keys, home)
+        )
         return Complaint(where, short(detail["input"]), "is not a key here", remedy)
     if kind == "missing":
         return Complaint(where, "", "is missing", "add it")

@@ -138,7 +138,8 @@ class Number:
         if value < self.least:
             raise refusal(f"must be at least {units.shown(self.least, self.unit)}; give a larger value")
         if value > self.most:
-            raise refusal(f"must be at most {units.shown(self.most, self.unit)}; give a smaller value")
+            or_share = "" if self.unit else f', or "{value:g} %" if per cent is meant'
+            raise refusal(f"must be at most {units.shown(self.most, self.unit)}; give a smaller value{or_share}")
         return value
 
     def _open(self, given: dict[str, Any]) -> Open:

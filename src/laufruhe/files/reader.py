@@ -22,7 +22,7 @@ from laufruhe.files.asked import limits_of, objectives_of
 from laufruhe.files.assembly import assembly_of
 from laufruhe.files.bearings import MainBearingTable, bearings_of, one_by_one
 from laufruhe.files.catalogue import with_catalogue
-from laufruhe.files.complaints import Refused, complaints_of, key_path
+from laufruhe.files.complaints import Refused, beside, complaints_of, key_path
 from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
 from laufruhe.files.fidelity import at_fidelity
 from laufruhe.files.flywheel import check_told_alike, flywheel_of
@@ -231,7 +231,7 @@ def _content(path: Path) -> bytes:
     except IsADirectoryError:
         raise _unreadable(path, "is a folder", "name a problem file in it") from None
     except FileNotFoundError:
-        raise _unreadable(path, "does not exist", "check the path") from None
+        raise _unreadable(path, "does not exist", beside(path, "check the path")) from None
     except OSError as error:
         raise _unreadable(path, f"cannot be read ({error.strerror})", "check its permissions") from None
 

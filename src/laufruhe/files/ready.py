@@ -62,8 +62,7 @@ def ready_named(name: str) -> Ready:
     """One of them; `InputError` where there is none of that name."""
     found = ready().get(name.removesuffix(".toml"))
     if found is None:
-        remedy = nearest(name, list(ready()))
-        advice = remedy if remedy.startswith("did") else "laufruhe examples lists them"
+        advice = nearest(name, list(ready()), "laufruhe examples lists them")
         raise InputError("laufruhe", (Complaint("name", name, "is no ready problem", advice),))
     return found
 

@@ -115,11 +115,10 @@ def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
 
 def _remedy(here: Any, parts: Sequence[str], k: int) -> str:
     """What to do where a path leads nowhere from its part `k` on."""
-    options = list(_options(here))
-    remedy = nearest(parts[k], options) if options else "name a number of the problem file"
-    if isinstance(here, dict) and not remedy.startswith("did") and field_at(".".join(parts)) is not None:
-        return "write it into the problem file first: only what stands there is changed"
-    return remedy
+    if not (options := list(_options(here))):
+        return "name a number of the problem file"
+    known = isinstance(here, dict) and field_at(".".join(parts)) is not None
+    return nearest(parts[k], options, "write it into the problem file first" if known else "")
 
 
 def parts_of(where: str) -> list[str]:

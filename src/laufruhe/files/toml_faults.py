@@ -146,6 +146,13 @@ def _twice(here: _Break) -> _Told:
         return here, f"{here.message.rpartition('key ')[2]} stands twice in one table", remedy
     own = name.strip("[]")
     others = [number for number, line in here.before() if (one := form.match(line)) and one.group(1) == own]
+    if not others and form is _HEAD:
+        entries = [number for number, line in here.before() if (one := _ENTRY.match(line)) and one.group(1) == own]
+        return (
+            here,
+            f"{own} is a value" + (f" in line {entries[-1]}" if entries else "") + " and a table here",
+            "keep one",
+        )
     # a value of several lines is read to its end
     others = others[1:] if form is _ENTRY and not _ENTRY.match(here.line) else others
     return here, f"{name} is given twice" + (f", before in line {others[0]}" if others else ""), remedy

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from laufruhe.errors import Complaint, InputError, ModelError
-from laufruhe.files.complaints import Refused, nearest
+from laufruhe.files.complaints import Refused, beside, nearest
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.files.study_tables import CaseTable, changed
 from laufruhe.machine import Role
@@ -79,12 +79,7 @@ class Scenes:
         path = self.folder / name
         if path not in self._files:
             if not path.exists():
-                remedy = nearest(name, [beside.name for beside in self.folder.glob("*.toml")] or [name])
-                advice = (
-                    remedy
-                    if remedy.startswith("did") and path.parent.is_dir()
-                    else "paths begin in the folder of the study"
-                )
+                advice = beside(path, "paths begin in the folder of the study")
                 raise InputError(
                     str(path), (Complaint("file", "", "is named by the study and does not exist", advice),)
                 )

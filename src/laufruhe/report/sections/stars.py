@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Container
 
 from laufruhe.machine.crank_names import name_of_crank
 from laufruhe.present.measures import objective_unit, ranking_of
@@ -31,13 +32,15 @@ def _stars(result: Result, phasing: PhasingResult) -> Grid:
     unit, factor = readable(objective_unit(result))
     scale = factor * (result.objective.initial if result.objective else 0.0)
     built = any(star.shafts for star in phasing.ranking)
-    rows = []
+    rows, decided = [], {decision.name for decision in result.decisions}
     for k, star in enumerate(phasing.ranking):
         pairs = [f"{number(f, 3, 1.0)} / {number(c, 3, 1.0)}" for f, c in zip(star.forces, star.couples, strict=True)]
         name = f"{k + 1}" + (" proven" if star.proven else "")
         shafts = (", ".join(star.shafts) or DASH,) if built else ()
         intervals = _span(star.firing_orders[0].intervals) if star.firing_orders else DASH
-        rows.append((name, _angles(star), *shafts, number(factor * star.value, scale=scale), *pairs, intervals))
+        rows.append(
+            (name, _angles(star, decided), *shafts, number(factor * star.value, scale=scale), *pairs, intervals)
+        )
     objective = f"objective [{unit}]" if unit else "objective"
     orders = (f"order {h}" for h in phasing.ranking[0].orders)
     head = ("rank", "throws [deg]", *(("shafts",) if built else ()), objective, *orders, "intervals [deg]")
@@ -48,10 +51,11 @@ def _stars(result: Result, phasing: PhasingResult) -> Grid:
     return Grid("Crank stars", head, tuple(rows), left=3 if built else 2, note=note)
 
 
-def _angles(star: RankedStar) -> str:
+def _angles(star: RankedStar, decided: Container[str]) -> str:
     text = " ".join(_degrees(angle, 5) for angle in star.throws)
-    named = (("bank", star.bank_angle), ("split", star.split_pin))
-    told = [name_of_crank(star.throws), *(f"{name} {_degrees(value)}" for name, value in named if value)]
+    named = (("bank", "bank angle", star.bank_angle), ("split", "split pin angle", star.split_pin))
+    told = [f"{word} {_degrees(value)}" for word, name, value in named if value is not None and name in decided]
+    told = [name_of_crank(star.throws), *told]
     extra = ", ".join(filter(None, told))
     return text + (f" ({extra})" if extra else "")
 
