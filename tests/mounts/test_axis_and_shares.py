@@ -13,12 +13,13 @@ from scipy.optimize import lsq_linear, minimize_scalar
 from laufruhe.errors import InputError
 from laufruhe.machine import Block
 from laufruhe.physics.mount_numbers import decoupling_shortfall, raw_residual, residual_of, torque_roll_frequency
-from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.channels import motion_indices, mounting_in
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.box_numbers import RANGES
 from laufruhe.prove.mounts.box_response import BoxModel
+from laufruhe.prove.mounts.box_shares import most_shares, shortfall
 from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
 from mounts.powertrain import powertrain, random_mounting
@@ -146,6 +147,29 @@ def test_the_least_shortfall_is_that_of_a_grid(decoupled):
     assert result.objective.value <= values.min() * (1.0 + 1e-6)
     assert result.objective.value == pytest.approx(values.min(), rel=0.05)
     assert result.certificate.lower_bound <= result.objective.value * (1.0 + 1e-9)
+    assert result.certificate.gap <= problem.tolerance
+
+
+@pytest.mark.parametrize("size", [1.0, 0.1, 1e-2, 1e-4, 1e-8])
+def test_no_shares_of_a_box_are_over_what_it_has_at_most(tmp_path, size):
+    """Nor is their shortfall under its least, where modes nearly cross too."""
+    problem = problem_of(tmp_path, ENGINE, TILTED, MOUNTS, SHORT + "wanted = 0.9")
+    measure, generator = problem.objective[0].measure, np.random.default_rng(5)
+    model = BoxModel(problem, evaluate_start(problem))
+    low, wide = model.lower, model.upper - model.lower
+    drawn = low + generator.random((2000, 2)) * wide
+    squares = np.linalg.eigvalsh(model.stiffness(drawn))
+    crossing = drawn[np.argsort((np.diff(squares) / squares[:, 1:]).min(axis=1))[:20]]
+    middle, half = np.concatenate([crossing, drawn[:20]]), 0.5 * size * generator.random((40, 2)) * wide
+    lower, upper = np.maximum(middle - half, low), np.minimum(middle + half, model.upper)
+    least, most = shortfall(model, measure, lower, upper), most_shares(model, measure, lower, upper)
+    inside = lower + generator.random((30, 1, 1)) * (upper - lower)
+    inside[:4] = lower, upper, np.stack([lower[:, 0], upper[:, 1]], 1), np.stack([upper[:, 0], lower[:, 1]], 1)
+    modes = np.linalg.eigh(model.stiffness(inside.reshape(-1, 2)))[1]
+    along = model.root.T @ modes * (np.linalg.inv(model.root) @ modes)
+    shares = along[:, motion_indices(measure)].max(axis=2).reshape(30, 40, -1)
+    assert np.all(shares <= most.T + 1e-10)
+    assert np.all(np.maximum(0.9 - shares, 0.0).sum(axis=2) >= least - 1e-10)
 
 
 def test_the_shortfall_is_what_shares_lack(decoupled):

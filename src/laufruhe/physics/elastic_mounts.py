@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
@@ -279,12 +280,18 @@ class ElasticMounting:
 
 def _refuse_singular(omegas: Array, impedance: ComplexArray, drive: ComplexArray) -> None:
     """Refuse a frequency at which the block and the fluid of its mounts move by themselves."""
-    for omega, matrix, own in zip(omegas, impedance, drive, strict=True):
-        if omega > 0.0 and np.any(own) and np.linalg.svd(matrix, compute_uv=False)[-1] <= RESONANCE * omega**2:
-            raise ResonanceError(
-                f"block and fluid tracks are driven at {omega / math.tau:.6g} Hz, a natural frequency of theirs, and "
-                "nothing damps it; give the tracks damping, or the mounts a loss factor"
-            )
+    driven = np.flatnonzero((omegas > 0.0) & drive.any(axis=1))
+    matrices, least = impedance[driven], RESONANCE * omegas[driven] ** 2
+    with suppress(np.linalg.LinAlgError):
+        # no singular value is less than one over the Frobenius norm of the inverse, which is found sooner
+        doubtful = ~(np.linalg.norm(np.linalg.inv(matrices), axis=(1, 2)) * least < 1.0)
+        driven, matrices, least = driven[doubtful], matrices[doubtful], least[doubtful]
+    struck = driven[np.linalg.svd(matrices, compute_uv=False)[:, -1] <= least]
+    if len(struck):
+        raise ResonanceError(
+            f"block and fluid tracks are driven at {omegas[struck[0]] / math.tau:.6g} Hz, a natural frequency of "
+            "theirs, and nothing damps it; give the tracks damping, or the mounts a loss factor"
+        )
 
 
 def _coupled(matrix: Array) -> bool:

@@ -165,6 +165,8 @@ class PhasingOf(Generic[P]):
         Of the search [s].
     method
         Of the search.
+    thorough
+        Whether throws are sought by boxes too, and with less unevenness than is allowed for what it is worth.
     realise
         The problem with a candidate's numbers in it.
     """
@@ -185,6 +187,7 @@ class PhasingOf(Generic[P]):
     criteria: tuple[OrderCriterion, ...] = (OrderCriterion.NEIGHBOURS, OrderCriterion.LONGEST_GAP)
     time_limit: float = 600.0
     method: Method = Method.AUTO
+    thorough: bool = True
 
     def layout_of(self, candidate: Candidate) -> Layout:
         """The layout of a design."""

@@ -36,7 +36,7 @@ from laufruhe.studies.rigid_digits import RigidPart, rigid_part
 REFERENCE_STEPS = 1440
 """Steps over the period at which the optimum beside which a regret is counted is solved."""
 REFERENCE_NAME = f"exact, every order, {REFERENCE_SAMPLES} steps"
-STARTS_OF_MOUNTS, STARS_ON_OPEN_MOUNTS = 3, 2
+STARTS_OF_MOUNTS, STARS_ON_OPEN_MOUNTS, STARS_OF_OPEN_THROWS = 3, 2, 2
 """Each of them takes a search, at every fidelity."""
 _LEAST_TIME, _MOST_REPEATS = 0.02, 50
 
@@ -176,6 +176,9 @@ def optimum(problem: Problem, samples: int | None = None) -> Engine | None:
         one = replace(problem, search=replace(problem.search, starts=starts, boxes=boxes))
         if one.phasing is not None and one.mount_decisions:
             one = replace(one, phasing=replace(one.phasing, best=STARS_ON_OPEN_MOUNTS))
+        elif one.phasing is not None and one.phasing.continuous:
+            few = min(one.phasing.best, STARS_OF_OPEN_THROWS)
+            one = replace(one, phasing=replace(one.phasing, best=few, thorough=False))
         result = solve(one)
     except (SolverError, ModelError):
         # cheap physics may leave nothing that solves: it is no choice for deciding then

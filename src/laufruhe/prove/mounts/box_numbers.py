@@ -12,15 +12,14 @@ from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.mount_numbers import total_stiffness
 from laufruhe.problem import channels
-from laufruhe.problem.channels import Channel, motion_indices
+from laufruhe.problem.channels import Channel
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.prove.mounts.box_cases import held_loads
 from laufruhe.prove.mounts.box_response import BoxModel
+from laufruhe.prove.mounts.box_shares import most_shares, shortfall
 
 SLACK = 1e-6
 """Designs count as allowed when they break a limit by less."""
-# parts of other modes from which these count together
-NEAR = 0.25
 
 
 def sag(model: BoxModel, x: Array) -> Array:
@@ -44,36 +43,6 @@ def axis_residual(model: BoxModel, asked: Measure, lower: Array, upper: Array) -
         least = float(y @ axis.answer(matrix)) - taken - np.abs(slopes @ y) @ (0.5 * (upper[k] - lower[k]))
         found[k] = max(float(least), 0.0)
     return found
-
-
-def most_shares(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
-    """What the shares of motions in a mode of their own are not over in boxes, shape (motions, boxes) (E7, E39)."""
-    squares, modes = np.linalg.eigh(model.stiffness(0.5 * (lower + upper)))
-    half = 0.5 * (upper - lower)
-    change = half @ np.linalg.norm(model.stiffness_slopes, ord=2, axis=(1, 2))
-    bent = np.einsum("bn,bnj->bj", half, np.linalg.norm(model.stiffness_slopes @ modes[:, None], axis=2))
-    apart = np.abs(squares[:, :, None] - squares[:, None, :]) - change[:, None, None]
-    parts = np.where(apart > 0.0, np.minimum(bent[:, None] / np.where(apart > 0.0, apart, 1.0), 1.0), 1.0)
-    parts = np.where(np.eye(6) > 0.0, 1.0, parts)
-    found = []
-    for motion in motion_indices(asked):
-        shape, momentum = model.root[:, motion], np.linalg.inv(model.root)[motion]
-        found.append((_most_along(shape, modes, parts) * _most_along(momentum, modes, parts)).max(axis=1))
-    return np.array(found)
-
-
-def _most_along(vector: Array, modes: Array, parts: Array) -> Array:
-    """What |vector' v| of no mode of a box is over, v having at most these parts of the modes at its middle."""
-    along = np.abs(vector @ modes)[:, None]
-    near = parts > NEAR
-    together = np.sqrt(np.sum(np.where(near, along, 0.0) ** 2, axis=2))
-    together += np.sum(np.where(near, 0.0, along * parts), axis=2)
-    return np.asarray(np.minimum(together, np.sum(along * parts, axis=2)))
-
-
-def shortfall(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
-    """Least over boxes, shape (boxes,) (E47)."""
-    return np.asarray(np.maximum(asked.wanted - most_shares(model, asked, lower, upper), 0.0).sum(axis=0))
 
 
 def stiffness_in_all(model: BoxModel, x: Array) -> Array:

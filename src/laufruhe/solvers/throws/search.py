@@ -17,6 +17,7 @@ from laufruhe.problem.measure import load_rows
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.prove.certificate import room_of
 from laufruhe.solvers.boxes.search import divided
 from laufruhe.solvers.stars.design import StarDesign
 from laufruhe.solvers.stars.ranking import ranked_orders
@@ -115,7 +116,9 @@ def search_throws(
     improve
         Told of throws that look good.
     """
-    if not knows(problem):
+    nothing = nothing_of(problem)
+    proven = best is not None and best.value - floor <= room_of(best.value, problem.tolerance, nothing)
+    if proven or not knows(problem):
         return None
     windows = windows_of(problem, phasing)
     if windows is None:
@@ -134,9 +137,7 @@ def search_throws(
         # a throw alone may drive what no mount carries
         return None
     most = len(search.roots) + (MOST_BOXES if problem.search.boxes is None else problem.search.boxes)
-    found, bound, boxes = divided(
-        search, _Part(floor), _Best(best), nothing_of(problem), search.reached, most, search.what
-    )
+    found, bound, boxes = divided(search, _Part(floor), _Best(best), nothing, search.reached, most, search.what)
     return Searched(min(bound, search.cut(found.value)), found.design, boxes, search.conflict, search.what)
 
 

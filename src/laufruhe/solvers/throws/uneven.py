@@ -70,14 +70,17 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         why, proven = none_fires(phasing)
         if proven:
             return no_star(problem, why)
-    steps = TRADE_STEPS if even is not None and phasing.intervals.most < math.inf else (1.0,)
+    narrows = phasing.thorough and even is not None and phasing.intervals.most < math.inf
+    steps = TRADE_STEPS if narrows else (1.0,)
     found: list[StarDesign] = []
     trade = []
     for k, share in enumerate(in_time(steps)):
         tell("shares of the deviation allowed", k, len(steps), found[0].value if found else math.inf)
         allowed = _narrowed(phasing, share)
         # what is best with less freedom is a start, so that more of it is never worse
-        own = [design.candidate for design in found[:1]] + starts[: STARTS if share == 1.0 else TRADE_STARTS]
+        own = [design.candidate for design in found[:1]] + starts[
+            : STARTS if share == 1.0 and phasing.thorough else TRADE_STARTS
+        ]
         answers = [answer for start in in_time(own) if (answer := local_optimum(phasing, start, allowed)) is not None]
         found = sorted(answers, key=lambda answer: answer.value)
         if found and len(steps) > 1:
@@ -99,6 +102,8 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
 
 def _searched(problem: Problem, phasing: Phasing, first: StarDesign | None, floor: float) -> Searched | None:
     """What boxes of throws, bank angle and split pins told; None where they say nothing."""
+    if first is not None and not phasing.thorough:
+        return None
     other = bounding(problem, first.value if first is not None else math.inf)
     return search_throws(other(problem), of_other(phasing, other), first, floor, partial(_near, phasing))
 
