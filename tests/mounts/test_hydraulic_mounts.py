@@ -15,9 +15,10 @@ from laufruhe.load_models.mount_symbols import response, symbolic_mounts
 from laufruhe.machine.dynamic import FluidTrack, MeasuredStiffness
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ResonanceError, elastic_mounting
+from laufruhe.physics.linear_run import LinearRun
 from laufruhe.physics.mounting import mount_maps
 from laufruhe.physics.run_up import periodic_state, run_through
-from laufruhe.physics.runs import linear_steps
+from laufruhe.physics.runs import sweep_of
 from laufruhe.physics.time_model import frequencies_with_fluid, time_model
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -143,8 +144,8 @@ def test_the_steady_state_in_time_is_that_of_every_order() -> None:
 def test_a_run_up_in_equal_steps_is_that_of_scipy() -> None:
     mounting, load = _hydraulic(0, damping=200.0), wrench(0, orders=2)
     sized = load.each(lambda values: values / 60.0**2)
-    steps = linear_steps(mounting, 0.0, 60.0, 1.0)
-    assert steps is not None
+    steps = LinearRun(time_model(mounting), sweep_of(0.0, 60.0, 1.0))
+    assert steps.is_known
     own = steps.response(steps.sweep.wrenches([(sized.orders, sized.coefficients)]))
     theirs = run_through(mounting, sized, None, 0.0, 60.0, 1.0, tolerance=1e-8)
     assert np.linalg.norm(own.force, axis=-1).max() == pytest.approx(theirs.worst_force, rel=5e-3)

@@ -10,10 +10,13 @@ import pytest
 
 import laufruhe
 from laufruhe.files.reader import load_tables, tables_of
+from laufruhe.load_models.run_look import run_measures
+from laufruhe.load_models.run_rows import RunRows
 from laufruhe.physics.run_up import run_through
-from laufruhe.physics.runs import responses_of, runs_of
+from laufruhe.physics.runs import runs_of
 from laufruhe.physics.speed_map import split_loads
 from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
@@ -95,15 +98,17 @@ def test_what_no_design_keeps_is_named() -> None:
 
 @pytest.mark.slow
 def test_loads_add_up_and_on_bump_stops_they_do_not() -> None:
-    """Motion of the sum of two weights is the sum of theirs; with stops no rows tell it."""
-    problem = problem_of()
-    run, point = problem.engine.run, problem.points[0]
-    designs = ([0.0, 0.0], [1.0, 0.0], [0.0, 0.02j], [1.0, 0.02j])
-    bare, one, other, both = (
-        responses_of(problem.design(values), point, problem.fidelity, run)[0].force for values in designs
-    )
-    assert one + other - bare == pytest.approx(both, abs=1e-9 * np.abs(both).max())
+    """Motion of a design is the sum of what rows tell of its weights; with stops no rows tell it."""
+    asked = "run-up travel", "1 mm"
+    problem = problem_of(asked)
+    (measure,) = run_measures(problem)
+    rows = RunRows.of(problem, [measure])
+    values = [1.0, 0.02j]
+    x = np.concatenate([domain.columns_of(u) for domain, u in zip(domains_of(problem.decisions), values, strict=True)])
+    point, worst = problem.points[0], rows.worst(measure, x)
+    up, down = runs_of(problem.design(values), point, problem.fidelity, problem.engine.run)
+    assert worst == pytest.approx(max(up.worst_travel, down.worst_travel), rel=1e-9)
     mounts = tables_of(READY)["mounts"]
     stop = {"gap": "1 mm", "stiffness": "500 N/mm"}
     stopped = {**mounts, "places": [{**place, "stop": stop} for place in mounts["places"]]}
-    assert responses_of(problem_of(mounts=stopped).engine, point, problem.fidelity, run) is None
+    assert RunRows.of(problem_of(asked, mounts=stopped), [measure]) is None

@@ -6,6 +6,7 @@ over, that length is smooth, and its slope is that of the motion at its own mome
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -81,9 +82,22 @@ class RunPeaks:
         """Of those peaks, shape (peaks, numbers), by differences of the motion at their moments."""
         return self._at(asked)[2]
 
+    def rows(self, points: Sequence[Array]) -> list[dict[Measure, Array]] | None:
+        """Of designs what measures are the lengths of, at every step and place of both runs, one after the other.
+
+        None where that is not linear in the loads, as on bump stops.
+        """
+        found = [] if self._is_stopped else self._found(points)
+        told = [both for both in found if both is not None]
+        if not told or len(told) < len(points):
+            return None
+        pairs = [dict(zip(self.measures, zip(both[::2], both[1::2], strict=True), strict=True)) for both in told]
+        return [{measure: np.concatenate(runs) for measure, runs in each.items()} for each in pairs]
+
     @cached_property
     def _is_stopped(self) -> bool:
-        return any(spring.stop_stiffness > 0.0 for _, spring in every_spring(self._problem.engine.mounts))
+        springs = (spring for _, spring in every_spring(self._problem.engine.mounts))
+        return any(spring.stop_stiffness > 0.0 and spring.stop_gap < math.inf for spring in springs)
 
     @property
     def _none(self) -> Array:

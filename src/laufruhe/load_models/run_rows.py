@@ -8,14 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Engine
+from laufruhe.load_models.run_peaks import RunPeaks
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.linear_run import Response
-from laufruhe.physics.runs import STRETCHES, point_of, responses_of
+from laufruhe.physics.runs import STRETCHES
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import KnownRows, Problem
-from laufruhe.problem.sets import Value
 
 NEAR = 0.98
 """Share of a limit from which a row counts."""
@@ -37,21 +35,13 @@ class RunRows:
     @classmethod
     def of(cls, problem: Problem, measures: Sequence[Measure]) -> RunRows | None:
         """Of some measures; None where run-ups are not linear in the loads."""
-        bare = _responses(problem, problem.design([0.0] * len(problem.decisions)))
-        if bare is None:
+        count = sum(domain.width for domain in domains_of(problem.unbalances))
+        found = RunPeaks(problem, measures).rows([np.zeros(count), *np.eye(count)])
+        if found is None:
             return None
-        domains = domains_of(problem.decisions)
-        units = [(k, direction) for k, domain in enumerate(domains) for direction in domain.set.directions]
-        constants = {measure: _rows(measure, bare) for measure in measures}
-        slopes: dict[Measure, list[Array]] = {measure: [] for measure in measures}
-        for k, direction in units:
-            values: list[Value] = [direction if j == k else 0.0 for j in range(len(problem.decisions))]
-            moved = _responses(problem, problem.design(values))
-            if moved is None:
-                return None
-            for measure, rows in slopes.items():
-                rows.append(_rows(measure, moved) - constants[measure])
-        return cls(constants, {measure: np.stack(rows, axis=-1) for measure, rows in slopes.items()})
+        constants, *moved = found
+        slopes = {m: np.stack([each[m] - bare for each in moved], axis=-1) for m, bare in constants.items()}
+        return cls(constants, slopes)
 
     def worst(self, measure: Measure, x: Array) -> float:
         """The largest length at x."""
@@ -77,17 +67,3 @@ class RunRows:
 
     def _lengths(self, measure: Measure, x: Array) -> Array:
         return np.asarray(np.linalg.norm(self.constants[measure] + self.slopes[measure] @ x, axis=-1))
-
-
-def _responses(problem: Problem, engine: Engine) -> tuple[Response, ...] | None:
-    run = engine.run
-    if run is None:
-        return None
-    return responses_of(engine, point_of(run, problem.points), problem.fidelity, run)
-
-
-def _rows(measure: Measure, responses: Sequence[Response]) -> Array:
-    of_run = measure.channel.of_run
-    if of_run is None:
-        raise TypeError(f"{measure.name} is not of a run-up")
-    return np.concatenate([of_run(response) for response in responses])

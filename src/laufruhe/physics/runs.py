@@ -17,7 +17,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.linear_run import LinearRun, Response, Sweep
+from laufruhe.physics.linear_run import Response, Sweep
 from laufruhe.physics.run_up import LEAST_STEPS, MOST_STEPS, STEPS_PER_PERIOD, RunUp, run_through
 from laufruhe.physics.speed_map import split_loads
 from laufruhe.physics.stopped_run import responses_to
@@ -64,28 +64,6 @@ def _found_runs(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: 
         return run_through(mounting, inertia, gas, first, last, seconds, STRETCHES, *followed)
 
     return through(0.0, run.speed, run.up), through(run.speed, 0.0, run.down)
-
-
-def responses_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run) -> tuple[Response, ...] | None:
-    """Motion in run-up and shut-down at equal steps of time, linear in the loads; None with bump stops (E28a)."""
-    engine = replace(engine, bearings=(), flywheel=None, torsion=None, run=None)
-    mounting, loads = _elastic(engine), run_loads(engine, point, fidelity)
-    found = []
-    for first, last, seconds in ((0.0, run.speed, run.up), (run.speed, 0.0, run.down)):
-        steps = linear_steps(mounting, first, last, seconds)
-        if steps is None:
-            return None
-        found.append(steps.response(_wrenches(steps.sweep, *loads)))
-    return tuple(found)
-
-
-def linear_steps(mounting: ElasticMounting, first: float, last: float, seconds: float) -> LinearRun | None:
-    """Equal steps that follow the fastest order that any load may have; None where they are no answer."""
-    sweep = sweep_of(first, last, seconds)
-    if sweep is None:
-        return None
-    run = LinearRun(time_model(mounting), sweep)
-    return run if run.is_known else None
 
 
 def sweep_of(first: float, last: float, seconds: float, coarser: int = 1) -> Sweep | None:
