@@ -206,33 +206,30 @@ def _upright(decision: Decision) -> Decision:
     return replace(decision, drives=drives, start=decision.start * turn)
 
 
-def compressed(norm: StarNorm) -> StarNorm:
-    """The same root mean square in as few rows as there are columns: Q of a QR keeps every length (S12)."""
-    k, d = norm.constant.shape
-    throws, steps = norm.moves.shape[:2]
-    columns = norm.slope.shape[-1]
-    scaled = np.sqrt(norm.grid.weights)[:, None]
-    parts = [
-        (norm.constant * scaled).reshape(1, -1),
-        (norm.moves * scaled).reshape(throws * steps, -1),
-        np.moveaxis(norm.slope * scaled[..., None], -1, 0).reshape(columns, k * d),
-    ]
-    if norm.turns is not None:
-        parts.append(np.moveaxis(norm.turns * scaled[..., None], -1, 2).reshape(throws * steps * columns, k * d))
-    matrix = np.concatenate(parts).T
+def in_few_rows(parts: Sequence[Array]) -> list[Array] | None:
+    """Sums of these, shape (..., k, d), are as long in as few rows as they are: Q of a QR keeps every length (S12).
+
+    None where they are as many as their numbers.
+    """
+    k, d = parts[0].shape[-2:]
+    flat = [part.reshape(-1, k * d) for part in parts]
+    matrix = np.concatenate(flat).T
     if len(matrix) <= matrix.shape[1]:
-        return norm
-    small = np.asarray(np.linalg.qr(matrix, mode="r"))
-    rows = len(small)
-    cut = np.cumsum([len(part) for part in parts])
-    turns = None
+        return None
+    small = np.asarray(np.linalg.qr(matrix, mode="r")).T
+    own = np.split(small, np.cumsum([len(part) for part in flat])[:-1])
+    return [few.reshape(*part.shape[:-2], small.shape[1], 1) for few, part in zip(own, parts, strict=True)]
+
+
+def compressed(norm: StarNorm) -> StarNorm:
+    """The same root mean square in as few rows as there are columns (S12)."""
+    root = np.sqrt(norm.grid.weights)[:, None]
+    parts = [norm.constant * root, norm.moves * root, np.moveaxis(norm.slope * root[..., None], -1, 0)]
     if norm.turns is not None:
-        turns = np.moveaxis(small[:, cut[2] :].T.reshape(throws, steps, columns, rows, 1), 2, -1)
-    return StarNorm(
-        norm.norm,
-        small[:, :1],
-        small[:, 1 : cut[1]].T.reshape(throws, steps, rows, 1),
-        small[:, None, cut[1] : cut[2]],
-        turns,
-        Grid(np.ones(rows), rows),
-    )
+        parts.append(np.moveaxis(norm.turns * root[..., None], -1, 2))
+    few = in_few_rows(parts)
+    if few is None:
+        return norm
+    (constant, moves, slope), turns = few[:3], None if norm.turns is None else np.moveaxis(few[3], 2, -1)
+    grid = Grid(np.ones(len(constant)), len(constant))
+    return StarNorm(norm.norm, constant, moves, np.moveaxis(slope, 0, -1), turns, grid)

@@ -15,6 +15,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import MOST_NUMBERS, AffineNorm, AffineProblem
+from laufruhe.load_models.star_model import in_few_rows
 from laufruhe.load_models.throw_waves import ThrowWaves, WaveNorm
 from laufruhe.machine.firing_windows import SLACK, FiringBounds, FiringWindow
 from laufruhe.numerics.arrays import Array
@@ -58,16 +59,6 @@ class ThrowBox:
         return bool(np.all(self.upper - self.lower <= NARROWEST))
 
 
-@dataclass(frozen=True, eq=False)
-class _Turned:
-    """Norms with the whole turns of every cylinder, of all orders and of the heavy ones, and what weighs in them."""
-
-    rows: AffineProblem
-    heavy: AffineProblem
-    weights: Array
-    pulls: Array
-
-
 class ThrowPrograms:
     """Cone programs of boxes of throws.
 
@@ -98,7 +89,7 @@ class ThrowPrograms:
         if not all(np.isfinite(norm.waves).all() and np.isfinite(norm.fixed.constant).all() for norm in every):
             raise ModelError("a load on an undamped resonance has no finite response")
         self._low = self._told_apart()
-        self._turned: dict[tuple[int, ...], _Turned] = {}
+        self._turned: dict[tuple[int, ...], Program] = {}
         self._proofs: list[Multipliers] = []
         self.told: set[str] = set()
 
@@ -118,15 +109,14 @@ class ThrowPrograms:
     def program(self, window: FiringWindow) -> Program:
         """Of one order of firing."""
         if window.laps not in self._turned:
-            self._turned[window.laps] = self._with_laps(window.laps)
+            self._turned[window.laps] = self._with_laps(window)
         own = self._turned[window.laps]
-        names = tuple(limit.name for limit, _ in self._limits)
         if not window.order:
-            return Program(window, own.rows, own.heavy, names, own.weights, own.pulls)
+            return replace(own, window=window)
         intervals = self._intervals(window)
         rows = replace(own.rows, limits=(*own.rows.limits, (1.0, intervals)))
         heavy = replace(own.heavy, limits=(*own.heavy.limits, (1.0, self._heavy(intervals))))
-        return Program(window, rows, heavy, (*names, ""), own.weights, own.pulls)
+        return replace(own, window=window, rows=rows, heavy=heavy, names=(*own.names, ""))
 
     def _heavy(self, norm: AffineNorm) -> AffineNorm:
         """Without the columns of orders that are next to nothing."""
@@ -137,8 +127,9 @@ class ThrowPrograms:
         columns = np.concatenate([np.arange(self._riders.size), np.add.outer(throws, own).ravel(), beside])
         return replace(norm, slope=norm.slope[..., columns])
 
-    def _with_laps(self, laps: tuple[int, ...]) -> _Turned:
-        """Rows of all orders of firing that share these whole turns."""
+    def _with_laps(self, window: FiringWindow) -> Program:
+        """Of all orders of firing that share whole turns, without what is asked of intervals."""
+        laps = window.laps
         terms = tuple((weight, self._rows(norm, laps)) for weight, norm in self._terms)
         limits = tuple((limit.maximum + norm.left_out, self._rows(norm, laps)) for limit, norm in self._limits)
         count = len(self.waves.orders)
@@ -153,7 +144,8 @@ class ThrowPrograms:
             tuple((weight, self._heavy(norm)) for weight, norm in terms),
             tuple((most, self._heavy(norm)) for most, norm in limits), (), 1,
         )  # fmt: skip
-        return _Turned(AffineProblem(terms, limits, (), 1), heavy, weights, pulls)
+        names = tuple(limit.name for limit, _ in self._limits)
+        return Program(window, AffineProblem(terms, limits, (), 1), heavy, names, weights, pulls)
 
     def _by_throw(self, columns: Array) -> Array:
         """Columns of the waves and the angle of every throw."""
@@ -291,7 +283,7 @@ class ThrowPrograms:
 
 
 def _small(norm: WaveNorm) -> WaveNorm:
-    """The same root mean square in as few rows as there are columns: Q of a QR keeps every length (S12)."""
+    """The same root mean square in as few rows as there are columns (S12); others without what does not act."""
     fixed = norm.fixed
     if not fixed.norm.is_euclidean:
         sizes = np.abs(fixed.constant).sum(axis=0) + np.abs(fixed.slope).sum(axis=(0, 2))
@@ -299,21 +291,12 @@ def _small(norm: WaveNorm) -> WaveNorm:
         acts = np.flatnonzero(sizes) if sizes.any() else np.arange(1)
         own = replace(fixed, constant=fixed.constant[:, acts], slope=fixed.slope[:, acts])
         return WaveNorm(own, norm.waves[..., acts], norm.left_out)
-    k, d = fixed.constant.shape
     scaled = np.sqrt(fixed.grid.weights)[:, None]
-    flat = (norm.waves * scaled).reshape(-1, k * d)
-    parts = [
-        (fixed.constant * scaled).reshape(1, -1),
-        np.moveaxis(fixed.slope * scaled[..., None], -1, 0).reshape(-1, k * d),
-        flat.real,
-        flat.imag,
-    ]
-    matrix = np.concatenate(parts).T
-    if len(matrix) <= matrix.shape[1]:
+    waves = norm.waves * scaled
+    few = in_few_rows([fixed.constant * scaled, np.moveaxis(fixed.slope * scaled[..., None], -1, 0),
+                       waves.real, waves.imag])  # fmt: skip
+    if few is None:
         return norm
-    small = np.asarray(np.linalg.qr(matrix, mode="r"))
-    columns, rows = fixed.slope.shape[-1], len(small)
-    cut = 1 + columns
-    waves = small[:, cut : cut + len(flat)] + 1j * small[:, cut + len(flat) :]
-    own = AffineNorm(fixed.norm, small[:, :1], small[:, None, 1:cut], Grid(np.ones(rows), rows))
-    return WaveNorm(own, waves.T.reshape(*norm.waves.shape[:2], rows, 1), norm.left_out)
+    constant, slope, real, imaginary = few
+    own = AffineNorm(fixed.norm, constant, np.moveaxis(slope, 0, -1), Grid(np.ones(len(constant)), len(constant)))
+    return WaveNorm(own, real + 1j * imaginary, norm.left_out)
