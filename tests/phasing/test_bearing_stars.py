@@ -104,8 +104,9 @@ def test_the_best_order_is_that_of_all_solved_one_by_one(name: str) -> None:
     """Its value, and no bound over the least of any: what is proven of all holds for each."""
     whole = {**CASES[name], "tolerance": 1e-3}
     result = laufruhe.solve(problem_of(whole))
-    # at as many angles as the search found necessary
-    samples = {"samples": result.problem.fidelity.samples}
+    # at as many angles as the search found necessary, the gas at those of the file
+    found = result.problem.fidelity
+    samples = {"samples": found.samples, "gas_samples": found.gas_steps}
     every = one_by_one({**whole, "fidelity": {**whole["fidelity"], **samples}})
     values = {order: value_of(each) for order, each in every.items()}
     least = min(values.values())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 
 import casadi as ca
 import numpy as np
@@ -44,16 +44,6 @@ class SymbolicLoads:
     imaginary: Any
 
 
-class Loads(Protocol):
-    """Loads of a problem in symbols."""
-
-    def wrenches(self, moved: Array) -> list[SymbolicLoads]:
-        """Per operating point, times a matrix of shape (6, 6)."""
-
-    def rows(self, quantity: Measure) -> tuple[Any, Grid]:
-        """Vectors whose norm a quantity is that is not one of mounts, shape (k, d), and their weights (P1)."""
-
-
 class FixedThrows:
     """Affine in the unbalances, the crank as given."""
 
@@ -62,7 +52,7 @@ class FixedThrows:
         self._reach = np.concatenate([np.full(d.width, d.scale) for d in model.domains] or [np.zeros(0)])
 
     def wrenches(self, moved: Array) -> list[SymbolicLoads]:
-        """Bare design and every column, the orders that matter."""
+        """Per operating point, times a matrix of shape (6, 6): bare design and every column, the orders that matter."""
         return [self._at(bare, slopes, moved) for bare, slopes in self._model.wrenches()]
 
     def _at(self, bare: Any, slopes: Sequence[Any], moved: Array) -> SymbolicLoads:
@@ -87,7 +77,7 @@ class FixedThrows:
         return total
 
     def rows(self, quantity: Measure) -> tuple[Any, Grid]:
-        """As `AffineModel` has them."""
+        """Vectors whose norm a quantity is that is not one of mounts, shape (k, d), and their weights (P1)."""
         affine = self._model.norm(quantity, self._model.full_samples)
         k, d = affine.constant.shape
         rows = ca.MX(ca.DM(affine.constant))
@@ -128,6 +118,10 @@ class MovedThrows:
     def rows(self, quantity: Measure) -> tuple[Any, Grid]:
         """As `UnevenModel` has them."""
         return self._model.rows(quantity, self._at)
+
+
+Loads: TypeAlias = FixedThrows | MovedThrows
+"""Loads of a problem in symbols."""
 
 
 def _felt(sizes: Array, orders: Array) -> NDArray[np.intp]:

@@ -48,9 +48,15 @@ class RodSeries:
     slope: Array
     rest: Array
 
+    @classmethod
+    def still(cls, piece: Piece, length: float) -> RodSeries:
+        """Of a rod whose length is given: one term, and nothing is left out."""
+        own = piece.affine
+        return cls(piece, length, length, own.constant[None], own.slope[None], np.zeros(1 + own.slope.shape[-1]))
+
     def at(self, length: float) -> AffineNorm:
         """At one length."""
-        (shares,) = _shares(np.array([self._place(length)]))
+        (shares,) = _shares(np.array([self._place(length)]), len(self.constant))
         constant = np.tensordot(shares, self.constant, axes=1)
         return replace(self.piece.affine, constant=constant, slope=np.tensordot(shares, self.slope, axes=1))
 
@@ -63,14 +69,17 @@ class RodSeries:
     def pulled(self, z: Array) -> Array:
         """<Z, V> at the nodes: of the constant, then of each column, shape (n, 1 + columns)."""
         flat, count = z.ravel(), len(self.constant)
-        columns = np.einsum("i,nij->nj", flat, self.slope.reshape(count, z.size, -1))
+        columns = flat @ self.slope.reshape(count, z.size, -1)
         return np.concatenate([(self.constant.reshape(count, -1) @ flat)[:, None], columns], axis=1)
 
     def terms(self, low: float, high: float) -> Array:
         """What makes the terms of a series between two lengths of values at the nodes, shape (n, n)."""
-        return _terms() @ _shares(np.array([self._place(length) for length in _lengths(low, high)]))
+        count = len(self.constant)
+        return _terms(count) @ _shares(np.array([self._place(at) for at in _lengths(low, high, count)]), count)
 
     def _place(self, length: float) -> float:
+        if self.low == self.high:
+            return 0.0
         ends = 1.0 / self.low, 1.0 / self.high
         return (2.0 / length - ends[0] - ends[1]) / (ends[0] - ends[1])
 
@@ -95,7 +104,7 @@ def rod_series(
         If the series of a load does not end: a bend of it moves with the length.
     """
     given = pieces(start)
-    told = [_like(given, pieces(length), kept) for length in _lengths(low, high)]
+    told = [_like(given, pieces(length), kept) for length in _lengths(low, high, TERMS)]
     found = []
     for k, piece in enumerate(given):
         constant, slope = (np.stack([getattr(each[k], part) for each in told]) for part in ("constant", "slope"))
@@ -121,7 +130,7 @@ def _with_rest(own: RodSeries, lengths: Sequence[float], exact: Sequence[AffineN
     rest = []
     parts = [own.constant, *np.moveaxis(own.slope, -1, 0)]
     for part, j in zip(parts, range(-1, own.slope.shape[-1]), strict=True):
-        series = np.tensordot(_terms(), part, axes=1)
+        series = np.tensordot(_terms(TERMS), part, axes=1)
         left = max(size(each) for each in series[-LAST:])
         for length, known in zip(lengths, exact, strict=True):
             at, true = own.at(length), known
@@ -133,20 +142,20 @@ def _with_rest(own: RodSeries, lengths: Sequence[float], exact: Sequence[AffineN
     return replace(own, rest=np.array(rest))
 
 
-def _lengths(low: float, high: float) -> list[float]:
+def _lengths(low: float, high: float, count: int) -> list[float]:
     """Of the nodes of a series between two."""
-    places = np.cos(np.pi * (np.arange(TERMS) + 0.5) / TERMS)
+    places = np.cos(np.pi * (np.arange(count) + 0.5) / count)
     return [float(2.0 / ((1.0 + x) / low + (1.0 - x) / high)) for x in places]
 
 
-@lru_cache(maxsize=1)
-def _terms() -> Array:
+@lru_cache(maxsize=2)
+def _terms(count: int) -> Array:
     """Terms of a series from values at its nodes, shape (n, n)."""
-    k, i = np.arange(TERMS)[:, None], np.arange(TERMS) + 0.5
-    return np.asarray(np.cos(np.pi * k * i / TERMS) * np.where(k == 0, 1.0, 2.0) / TERMS)
+    k, i = np.arange(count)[:, None], np.arange(count) + 0.5
+    return np.asarray(np.cos(np.pi * k * i / count) * np.where(k == 0, 1.0, 2.0) / count)
 
 
-def _shares(places: Array) -> Array:
+def _shares(places: Array, count: int) -> Array:
     """Shares of the nodes in the value of the series at places in -1 ... 1, shape (places, n)."""
-    waves = np.cos(np.arange(TERMS) * np.arccos(np.clip(places, -1.0, 1.0))[:, None])
-    return np.asarray(waves @ _terms())
+    waves = np.cos(np.arange(count) * np.arccos(np.clip(places, -1.0, 1.0))[:, None])
+    return np.asarray(waves @ _terms(count))

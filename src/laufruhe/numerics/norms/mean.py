@@ -70,10 +70,6 @@ class Mean(Norm):
         small = size <= 1e-6 * float(size.max(initial=0.0))
         return np.where(small[:, None], z, self.subgradient(grid, rows))
 
-    def spread(self, z: Array, steps: int, times: int) -> Array:
-        """Straight from angle to angle."""
-        return between(z, steps, times)
-
     def of_lengths(self, lengths: Array, weights: Array) -> Array:
         """Lengths times weights."""
         return np.asarray(np.dot(lengths, weights))
@@ -93,12 +89,6 @@ class Mean(Norm):
         import casadi as ca
 
         return ca.dot(ca.DM(grid.weights), softened_lengths(rows, share * unit))
-
-    def limited(
-        self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
-    ) -> tuple[Any, float, float]:
-        """Softened lengths."""
-        return self.least(program, grid, rows, 1.0, share), most, 1.0
 
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Not above the root mean square of the same place."""
@@ -121,12 +111,3 @@ class Mean(Norm):
     def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
         """At every operating point no less than its strongest order."""
         return float(sum(share * max(each.values(), default=0.0) for share, each in zip(shares, roots, strict=True)))
-
-
-def between(z: Array, steps: int, times: int) -> Array:
-    """Dual rows on a finer grid, straight from angle to angle."""
-    blocks = z.reshape(-1, steps, z.shape[-1])
-    share = np.arange(times) / times
-    following = np.roll(blocks, -1, axis=1)
-    mixed = blocks[:, :, None] * (1.0 - share[:, None]) + following[:, :, None] * share[:, None]
-    return np.asarray(mixed.reshape(-1, z.shape[-1]) / times)

@@ -172,9 +172,9 @@ class Norm(ABC):
     def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
         """Dual rows along the rows of a design where that is at least as good as a solver's Z (P6)."""
 
-    @abstractmethod
     def spread(self, z: Array, steps: int, times: int) -> Array:
-        """Dual rows at `steps` angles of each signal on a grid `times` as fine (P6)."""
+        """Dual rows at `steps` angles of each signal on a grid `times` as fine, straight from angle to angle (P6)."""
+        return between(z, steps, times)
 
     def of_lengths(self, lengths: Array, weights: Array) -> Array:
         """Of many designs from the lengths of their rows, shape (..., k) to (...); the lengths are used up."""
@@ -197,14 +197,14 @@ class Norm(ABC):
     def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """A smooth expression to minimise, off by no more than the share of `unit` (N3, E22)."""
 
-    @abstractmethod
     def limited(
         self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
     ) -> tuple[Any, float, float]:
         """A smooth expression, what it may not exceed where the norm may not exceed `most`, and the slope of that.
 
-        Smooth where the rows are zero too, and off by no more than the share of one.
+        Smooth where the rows are zero too, and off by no more than the share of one; that to minimise where it is so.
         """
+        return self.least(program, grid, rows, 1.0, share), most, 1.0
 
     @abstractmethod
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
@@ -225,6 +225,15 @@ class Norm(ABC):
         roots
             Of the mean over places of the mean length.
         """
+
+
+def between(z: Array, steps: int, times: int) -> Array:
+    """Dual rows on a finer grid, straight from angle to angle."""
+    blocks = z.reshape(-1, steps, z.shape[-1])
+    share = np.arange(times) / times
+    following = np.roll(blocks, -1, axis=1)
+    mixed = blocks[:, :, None] * (1.0 - share[:, None]) + following[:, :, None] * share[:, None]
+    return np.asarray(mixed.reshape(-1, z.shape[-1]) / times)
 
 
 def lengths(rows: Array) -> Array:

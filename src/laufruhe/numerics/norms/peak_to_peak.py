@@ -88,12 +88,6 @@ class PeakToPeak(Norm):
         """A variable over all radii (E22)."""
         return 2.0 * unit * self._radius(program, grid, rows / unit, share)
 
-    def limited(
-        self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
-    ) -> tuple[Any, float, float]:
-        """Twice the largest radius."""
-        return 2.0 * self._radius(program, grid, rows, share), most, 1.0
-
     def _radius(self, program: SmoothProgram, grid: Grid, rows: Any, share: Any) -> Any:
         import casadi as ca
 

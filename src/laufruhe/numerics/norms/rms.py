@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.norms.mean import between
 from laufruhe.numerics.norms.norm import Cones, Grid, Norm, OrderBounds, SmoothProgram, lengths, mean_square
 from laufruhe.numerics.spectrum import Spectrum
 
@@ -46,10 +45,6 @@ class RootMeanSquare(Norm):
     def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
         """The design's own direction."""
         return self.subgradient(grid, rows)
-
-    def spread(self, z: Array, steps: int, times: int) -> Array:
-        """Straight from angle to angle."""
-        return between(z, steps, times)
 
     def of_lengths(self, lengths: Array, weights: Array) -> Array:
         """The root of squares times weights."""

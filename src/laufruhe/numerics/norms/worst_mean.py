@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.norms.mean import Mean, between
+from laufruhe.numerics.norms.mean import Mean
 from laufruhe.numerics.norms.norm import Cones, Grid, Norm, OrderBounds, SmoothProgram, lengths, softened_lengths
 from laufruhe.numerics.spectrum import Spectrum
 
@@ -50,10 +50,6 @@ class WorstMean(Norm):
         along = rows * (prices * shares / np.where(size > 0.0, size, 1.0))[:, None]
         return np.where(small[:, None], z, along)
 
-    def spread(self, z: Array, steps: int, times: int) -> Array:
-        """Straight from angle to angle."""
-        return between(z, steps, times)
-
     def cones(self, grid: Grid) -> Cones:
         """A head for each row, and one over the mean of every operating point."""
         count, size = len(grid.weights), _size(grid)
@@ -77,12 +73,6 @@ class WorstMean(Norm):
         top = program.head(ca.mmax(means))
         program.hold(means - top)
         return top * unit
-
-    def limited(
-        self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
-    ) -> tuple[Any, float, float]:
-        """The same variable."""
-        return self.least(program, grid, rows, 1.0, share), most, 1.0
 
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """The largest of what the means do not exceed."""

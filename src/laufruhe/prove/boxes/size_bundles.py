@@ -13,9 +13,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from laufruhe.load_models.affine import AffineNorm
 from laufruhe.load_models.rod_series import RodSeries
-from laufruhe.load_models.sized_model import MASSES, Piece
+from laufruhe.load_models.sized_model import MASSES
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Domain
 from laufruhe.problem.measure import Measure
@@ -50,48 +49,7 @@ class Reach(NamedTuple):
         return np.asarray(found)
 
 
-@dataclass(frozen=True, eq=False)
-class Still:
-    """A piece of a measure where the length of the rod is given: a series of one term."""
-
-    piece: Piece
-    affine: AffineNorm
-
-    @property
-    def rest(self) -> Array:
-        """Nothing is left out."""
-        return np.zeros(1 + self.affine.slope.shape[-1])
-
-    @property
-    def constant(self) -> Array:
-        """Rows without any column, shape (1, k, d)."""
-        return self.affine.constant[None]
-
-    @property
-    def slope(self) -> Array:
-        """Of every column, shape (1, k, d, columns)."""
-        return self.affine.slope[None]
-
-    def at(self, _: float) -> AffineNorm:
-        """At the one length."""
-        return self.affine
-
-    def scaled(self, factors: Sequence[Array]) -> Still:
-        """With other factors of its rows."""
-        return Still(self.piece, self.piece.scaled(factors))
-
-    def pulled(self, z: Array) -> Array:
-        """<Z, V>: of the constant, then of each column, shape (1, 1 + columns)."""
-        return np.append(float(np.vdot(z, self.affine.constant)), self.affine.pulled(z))[None]
-
-    def terms(self, _low: float, _high: float) -> Array:
-        """The one term is the one value."""
-        return np.ones((1, 1))
-
-
 Ways: TypeAlias = Array
-Lengths: TypeAlias = Still | RodSeries
-"""A piece of a measure at the lengths of the rod."""
 
 
 def least_of(nodes: Array, terms: Array, rest: Array, reach: Reach) -> Array:
@@ -115,7 +73,7 @@ def least_of(nodes: Array, terms: Array, rest: Array, reach: Reach) -> Array:
 class Bundle:
     """Affine functions of the columns that a norm is nowhere under, as many as were asked for (P4)."""
 
-    def __init__(self, lengths: Lengths) -> None:
+    def __init__(self, lengths: RodSeries) -> None:
         self.piece, self.lengths = lengths.piece, lengths
         self.nodes = np.zeros((0, len(lengths.constant), 1 + lengths.slope.shape[-1]))
 
@@ -151,12 +109,12 @@ class Grouped:
         Dual norm of Z.
     """
 
-    lengths: Lengths
+    lengths: RodSeries
     groups: tuple[Array, ...]
     price: float
 
     @classmethod
-    def of(cls, lengths: Lengths, z: Array) -> Grouped:
+    def of(cls, lengths: RodSeries, z: Array) -> Grouped:
         """Of dual rows of a piece, its factors as at the start."""
         price = lengths.piece.affine.dual_norm(z)
         whole = np.concatenate([lengths.constant[..., None], lengths.slope], axis=-1)

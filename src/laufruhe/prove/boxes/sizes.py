@@ -17,13 +17,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from laufruhe.load_models.rod_series import rod_series
+from laufruhe.load_models.rod_series import RodSeries, rod_series
 from laufruhe.load_models.sized_model import SizeModel
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.prove.best_first import Box, Divided, Halving, halves, widest
-from laufruhe.prove.boxes.size_bundles import Bundle, Number, Reach, Still, Ways, corner
+from laufruhe.prove.boxes.size_bundles import Bundle, Number, Reach, Ways, corner
 from laufruhe.prove.boxes.size_programs import Ask, SizePrograms, Together
 
 MOST_BOXES = 3000
@@ -97,7 +97,7 @@ class SizeBoxes:
             return np.concatenate(found) if found else np.zeros(1)
 
         if not self.model.moves_rod:
-            still = tuple(Bundle(Still(piece, piece.affine)) for piece in pieces)
+            still = tuple(Bundle(RodSeries.still(piece, self.model.rod_span[0])) for piece in pieces)
             return Number(measure, sense, self._ways(factors), still)
         start = self.model.problem.engine.slider_cranks[0].rod_length
         kept = self.model.still_rows(measure)

@@ -12,7 +12,6 @@ import numpy as np
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem import channels
-from laufruhe.problem.decision import columns_of, domains_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
@@ -29,6 +28,7 @@ from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.mounts.bounds import divided_by
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mounts.search import Found, MountSearch, judged_at
+from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct
 from laufruhe.solvers.smooth.program import SmoothProgram
@@ -73,12 +73,7 @@ def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tup
     even
         Result of the star itself, to start from first.
     """
-    first = None
-    if even is not None and even.decisions:
-        found = {decision.name: decision.value for decision in even.decisions}
-        domains = domains_of(problem.unbalances)
-        mounts = [found[decision.name] for decision in problem.mount_decisions]
-        first = mounts, columns_of(domains, unbalances_of(problem, even))
+    first = place_of(problem, even) if even is not None and even.decisions else None
     # throws that move are in no bound
     result, turns = _solved(problem, None, moves, first, True)
     return result, moves.candidate(turns)

@@ -8,14 +8,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from laufruhe.machine.mount import every_spring
-from laufruhe.numerics.arrays import Array
-from laufruhe.problem.decision import columns_of, domains_of
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach
-from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, none_within, unbalances_of
+from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, none_within
 from laufruhe.solvers.mounts.search import NEAR, Found, MountSearch
+from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct
 
@@ -36,7 +35,7 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     stopped = any(spring.stop_stiffness > 0.0 for _, spring in every_spring(problem.engine.mounts))
     starts = min(problem.search.starts, STOPPED_STARTS if stopped else STARTS)
     few = replace(problem, search=replace(problem.search, starts=starts))
-    search = MountSearch(few, initial, first=None if relaxed is None else _place(problem, relaxed), beside=True)
+    search = MountSearch(few, initial, first=None if relaxed is None else place_of(problem, relaxed), beside=True)
     search.run()
     if not stopped and search.best is not None and search.best.design.excess <= NEAR:
         search.refined()
@@ -55,13 +54,6 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     )
     design = replace(found.design, problem=problem)
     return concluded(design, initial, shown, timing)
-
-
-def _place(problem: Problem, relaxed: Result) -> tuple[list[float], Array]:
-    """Mounts and columns of unbalances of a result."""
-    found = {decision.name: decision.value for decision in relaxed.decisions}
-    mounts = [found[decision.name] for decision in problem.mount_decisions]
-    return mounts, columns_of(domains_of(problem.unbalances), unbalances_of(problem, relaxed))
 
 
 def _method(optima: Sequence[LocalOptimum], scale: float, is_bounded: bool) -> str:

@@ -17,6 +17,7 @@ from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import unbalances_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
+from laufruhe.solvers.result import Result
 
 # starts at most for each open number, and candidates for each start: so many cost about as much as its search
 STARTS = 4
@@ -37,6 +38,13 @@ def spread_starts(lower: Array, upper: Array, count: int, seed: int = 0) -> Arra
     generator = np.random.default_rng(seed)
     cells = np.array([generator.permutation(count) for _ in lower]).T.reshape(count, len(lower))
     return lower + (cells + generator.random(cells.shape)) / count * (upper - lower)
+
+
+def place_of(problem: Problem, result: Result) -> tuple[list[float], Array]:
+    """Mounts and columns of unbalances of a result."""
+    found = {decision.name: decision.value for decision in result.decisions}
+    mounts = [found[decision.name] for decision in problem.mount_decisions]
+    return mounts, columns_of(domains_of(problem.unbalances), unbalances_of(problem, result))
 
 
 def _balanced(problem: Problem) -> list[complex] | None:

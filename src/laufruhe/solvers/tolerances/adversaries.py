@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,17 +52,6 @@ class Found:
     excess: float
     divisions: int
     proven: bool
-
-
-class Adversary(Protocol):
-    """Seeks the worst engines of a design."""
-
-    @property
-    def samples(self) -> int:
-        """Steps over the cycle."""
-
-    def at(self, values: Sequence[Value], proven: bool) -> Found:
-        """Of a design; where it is to be proven, with a bound that is worth the time."""
 
 
 def moved_limits(problem: Problem) -> tuple[Limit, ...]:
@@ -148,3 +137,7 @@ class DrawnEngines:
         return np.array([
             objective_value(self.problem, each) if limit is None else each.value(limit.measure) for each in found
         ])  # fmt: skip
+
+
+Adversary: TypeAlias = EveryError | DrawnEngines
+"""Seeks the worst engines of a design; where it is to be proven, with a bound that is worth the time."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -29,25 +28,31 @@ STEP = 0.05
 """Share of a tolerance by which it is moved to price it."""
 
 
-class Holding(Protocol):
-    """What holds a design."""
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What holds a design: sets of errors, and the multipliers of their objectives and limits.
 
-    @property
-    def errors(self) -> tuple[Array, ...]:
-        """Of every set."""
+    Attributes
+    ----------
+    errors
+        Shape (columns,) each.
+    shares
+        Of each in the largest objective, adding up to one.
+    prices
+        Of each the multipliers of its limits.
+    residual
+        Of the optimality conditions (P5).
+    """
 
-    @property
-    def shares(self) -> tuple[float, ...]:
-        """Of every set in the largest objective."""
-
-    @property
-    def prices(self) -> tuple[tuple[tuple[Limit, float], ...], ...]:
-        """Multipliers of the limits of every set."""
+    errors: tuple[Array, ...] = ()
+    shares: tuple[float, ...] = ()
+    prices: tuple[tuple[tuple[Limit, float], ...], ...] = ()
+    residual: float = 0.0
 
 
 def compared(
     problem: Problem, seeker: Adversary, nominal: Sequence[Value], robust: Sequence[Value], found: Found,
-    held: Holding, scenarios: int,
+    held: Held, scenarios: int,
 ) -> RobustResult:  # fmt: skip
     """The best drawing and the design decided, each built many times, and the price of every tolerance."""
     over = problem.over or Over()
@@ -120,7 +125,7 @@ def _at_most(exceeding: int, engines: int) -> float:
 
 
 def _priced(
-    problem: Problem, values: Sequence[Value], held: Holding, sample: _Sample, share: float
+    problem: Problem, values: Sequence[Value], held: Held, sample: _Sample, share: float
 ) -> tuple[PricedTolerance, ...]:
     """Every tolerance with its price, the dearest first."""
     told = []
@@ -135,7 +140,7 @@ def _priced(
 
 
 def _taken(
-    problem: Problem, values: Sequence[Value], held: Holding, sample: _Sample, share: float, tolerance: Tolerance,
+    problem: Problem, values: Sequence[Value], held: Held, sample: _Sample, share: float, tolerance: Tolerance,
     factor: float,
 ) -> float:  # fmt: skip
     """What holds the design, with one tolerance so many times as wide and all else as it is (R11)."""
@@ -159,7 +164,7 @@ def _limited(own: LimitValue, worst: float, price: float, tolerance: float) -> L
 
 
 def robust_result(
-    problem: Problem, design: Design, given: Found, found: Found, held: Holding, shown: Shown, details: RobustResult,
+    problem: Problem, design: Design, given: Found, found: Found, held: Held, shown: Shown, details: RobustResult,
     timing: dict[str, float],
 ) -> Result:  # fmt: skip
     """The result of a design whose objective and limits are those of built engines; `given` is of the one given."""

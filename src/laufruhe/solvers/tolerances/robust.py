@@ -33,8 +33,8 @@ from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, judged, none_with
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import conflict_of, tightened
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.tolerances.adversaries import DrawnEngines, EveryError, Found
-from laufruhe.solvers.tolerances.conclusion import compared, robust_result
+from laufruhe.solvers.tolerances.adversaries import Adversary, DrawnEngines, EveryError, Found
+from laufruhe.solvers.tolerances.conclusion import Held, compared, robust_result
 
 Solve = Callable[[Problem], Result]
 
@@ -49,28 +49,6 @@ MOST_MARGINS, MOST_DOUBLINGS = 3, 3
 """Times that limits are lowered, and that the angles of the fidelity are doubled, where its own leave a gap."""
 OUTER = 12
 """Rounds in which the engines that may be above are chosen anew."""
-
-
-@dataclass(frozen=True, eq=False)
-class Held:
-    """What holds a design: sets of errors, and the multipliers of their objectives and limits.
-
-    Attributes
-    ----------
-    errors
-        Shape (columns,) each.
-    shares
-        Of each in the largest objective, adding up to one.
-    prices
-        Of each the multipliers of its limits.
-    residual
-        Of the optimality conditions (P5).
-    """
-
-    errors: tuple[Array, ...] = ()
-    shares: tuple[float, ...] = ()
-    prices: tuple[tuple[tuple[Limit, float], ...], ...] = ()
-    residual: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,9 +121,7 @@ def solve_robust(problem: Problem, solve: Solve) -> Result:
     return robust_result(problem, design, given, found.found, found.held, shown, details, timing)
 
 
-def _found(
-    problem: Problem, over: Over, start: tuple[Value, ...], drawing: Result
-) -> tuple[EveryError | DrawnEngines, Least]:
+def _found(problem: Problem, over: Over, start: tuple[Value, ...], drawing: Result) -> tuple[Adversary, Least]:
     """Who seeks the worst engines, and the design that is best against it."""
     tolerances, samples = problem.tolerances, problem.fidelity.samples
     nothing, random = nothing_of(problem, drawing.final.engine), np.random.default_rng(over.seed)
@@ -270,9 +246,7 @@ class _Program:
         return max(objective_value(self.problem, each) for each in found)
 
 
-def _least_worst(
-    problem: Problem, seeker: EveryError | DrawnEngines, start: tuple[Value, ...], nothing: float
-) -> Least:
+def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], nothing: float) -> Least:
     """The design whose worst engine is least, from a given one (R8)."""
     found = seeker.at(start, proven=not problem.decisions)
     best = Least(start, found, 0.0, Held((found.errors[0],), (1.0,), ((),)), 1, 0, seeker.samples)
