@@ -198,10 +198,11 @@ def test_eyes_of_the_rod_are_limits_on_its_pull(tmp_path: Path) -> None:
     allowed, area, arm, modulus = 40e6, 0.8e-4, 0.012, 0.4e-6
     free = '[[operating_points]]\nname = "exchange"\nspeed = "3000 rpm"\ngas = false\n[gas]'
     limits = "".join(
-        f'[[constraints]]\nlimit = "{name}"\noperating_points = ["exchange"]\nmax = "{most} N"\n'
-        for name, most in (
-            ("maximum rod force", 2.0 * area * allowed), ("maximum rod force", 2.0 * modulus * allowed / arm),
-            ("maximum crank-pin force", 2.0 * area * allowed),
+        f'[[constraints]]\nname = "{eye}"\nlimit = "{name}"\noperating_points = ["exchange"]\nmax = "{most} N"\n'
+        for eye, name, most in (
+            ("small eye pulled", "maximum rod force", 2.0 * area * allowed),
+            ("small eye bent", "maximum rod force", 2.0 * modulus * allowed / arm),
+            ("bolts", "maximum crank-pin force", 2.0 * area * allowed),
         )
     )  # fmt: skip
     problem = loaded(tmp_path, TEXT.replace("[gas]", free) + limits + '[objective]\nminimise = "rms shaking force"\n')

@@ -166,7 +166,7 @@ def test_only_boxes_without_an_allowed_design_are_ruled_out(tmp_path: Path) -> N
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "text",
+    "asked",
     [ASKED["rms"], 'minimise = "transmissibility"\norders = [2]', 'minimise = "mean mount travel"\norders = [2]'],
 )
 def test_few_open_stiffnesses_are_decided_with_proof(asked: str, tmp_path: Path) -> None:

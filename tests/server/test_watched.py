@@ -29,7 +29,7 @@ def test_changes_are_told_and_what_is_wrong_leaves_the_last_good_state(watched: 
     assert watched.later(1, PATIENCE) == 2
     assert watched.source is first
     line = TEXT.splitlines().index('speed = "2500 rpm"') + 1
-    assert f"at line {line}" in watched.complaint
+    assert f"line {line}, " in watched.complaint
     watched.path.write_text(TEXT.replace("2500", "10000000"), encoding="utf-8")
     assert watched.later(2, PATIENCE) == 3
     assert "rpm" in watched.complaint or watched.source is not first

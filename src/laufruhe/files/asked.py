@@ -167,7 +167,7 @@ def _band(table: ConstraintTable, measure: Measure, where: str) -> tuple[float, 
 
 
 def _check_once(limits: Sequence[Limit]) -> None:
-    """Refuse two limits of one side of one measure: of several bands each is its own."""
+    """Refuse two limits of one side of one measure, unless names tell them apart: of several bands each is its own."""
     given: dict[tuple[Any, ...], int] = {}
     for k, limit in enumerate(limits):
         sides = {
@@ -176,14 +176,14 @@ def _check_once(limits: Sequence[Limit]) -> None:
             "outside": limit.outside is not None,
         }
         for side in (side for side, is_given in sides.items() if is_given):
-            other = given.setdefault((limit.measure, side, limit.outside if side == "outside" else None), k)
+            other = given.setdefault((limit.measure, limit.name, side, limit.outside if side == "outside" else None), k)
             if other != k:
                 names = f"constraints[{other + 1}] ('{limits[other].name}')"
                 raise Refused(
                     f"constraints[{k + 1}].{side}",
                     None,
                     f"limits '{limit.name}' once more, beside {names}",
-                    "keep the tighter one",
+                    "keep the tighter one, or give each a name",
                 )
 
 
