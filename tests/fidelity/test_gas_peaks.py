@@ -30,7 +30,7 @@ from one_cylinder import cylinder_pressure
 
 FAST, USUAL, QUICK = 12, 25, 20_000
 SUBJECTS = channels.MOUNT_FORCE, channels.ROLL_MOMENT
-ANGLES = 40_000
+ANGLES = 30_000
 BEND = """
 title = "Single cylinder whose largest force stands at the cut-off"
 [engine]

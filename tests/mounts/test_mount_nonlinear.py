@@ -55,7 +55,7 @@ TURNED = MOUNTS.replace(
 SEARCH = "[search]\nstarts = 2\n"
 
 
-def joint_problem(tmp_path, measure: str = "mean", limits: str = LIMITS, search: str = SEARCH + "boxes = 4\n"):
+def joint_problem(tmp_path, measure: str = "mean", limits: str = LIMITS, search: str = SEARCH + "boxes = 0\n"):
     return problem_of(tmp_path, ENGINE, BLOCK, TURNED, SHAFTS, FORCE.format(measure=measure), limits, search)
 
 
@@ -239,7 +239,7 @@ def test_bounds_a_thousand_million_apart_are_searched_by_ratio(start, tmp_path):
 @pytest.mark.parametrize("seed", first_fast(range(10), 0, long=range(1, 10)))
 def test_ten_seeds_find_the_best_known_optimum_of_the_tractor(seed):
     problem = load(PROBLEMS / "tractor-four-elastic.toml")
-    problem = replace(problem, search=replace(problem.search, starts=2, seed=seed, boxes=1))
+    problem = replace(problem, search=replace(problem.search, starts=2, seed=seed, boxes=0))
     assert solve_joint(problem).objective.value == pytest.approx(4.0870, rel=1e-3)
 
 
@@ -248,5 +248,5 @@ def test_ten_seeds_find_the_best_known_optimum_of_the_tractor(seed):
 def test_few_starts_find_the_best_known_optimum_of_the_powertrain(seed):
     """Its six modes stand on either side of a band in many ways; more seeds in docs/theory/elastic-mounts.md."""
     problem = load(PROBLEMS / "powertrain-least-force.toml")
-    problem = replace(problem, search=replace(problem.search, starts=2, seed=seed, boxes=1))
+    problem = replace(problem, search=replace(problem.search, starts=2, seed=seed, boxes=0))
     assert solve_joint(problem).objective.value == pytest.approx(13.106325, rel=1e-5)

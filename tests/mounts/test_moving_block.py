@@ -8,6 +8,7 @@ and the loads of a block at rest; it leaves out that the pistons ride on a block
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import exudyn as exu
 import numpy as np
@@ -68,6 +69,7 @@ def _body(system, place: float, mass: float, inertia: float, velocity: float = 0
     return node, system.AddObject(ObjectRigidBody2D(mass=mass, inertia=inertia, nodeNumber=node))
 
 
+@cache
 def simulated_forces(piston: float, flywheel: float = 1e-3, steps: int = STEPS) -> np.ndarray:
     """The same from exudyn over the last turn, shape (steps, 2, 2) [N]."""
     system = exu.SystemContainer().AddSystem()

@@ -64,6 +64,7 @@ x = "120 mm"
 unbalance = { between = ["0 kg m", "0.01 kg m"] }
 angle = { between = [0, 360] }
 """
+FEW = "[fidelity]\nsamples = 360\n"
 SPLIT = changed(
     TWIN, "bank_angle = { between = [40, 120] }", "bank_angle = 60\nsplit_pin_angle = { between = [-30, 90] }"
 )
@@ -203,7 +204,8 @@ CASES = [
 @pytest.mark.parametrize(("text", "of_bank", "gas", "name"), CASES)
 def test_no_angle_is_better_than_the_bound(text: str, of_bank: bool, gas: str, name: str) -> None:
     """Cones at fixed angles, and the bound meets the design."""
-    problem = _read(text + gas + MOUNTS + WEIGHTS + _objective(name))
+    # of a pressure few samples know too little for the last digits
+    problem = _read(text + (gas or FEW) + MOUNTS + WEIGHTS + _objective(name))
     result = solve(problem)
     low, high = problem.phasing.bank if of_bank else problem.phasing.split
     grid = [solve(_at(problem, angle, of_bank)).objective.value for angle in np.linspace(low, high, 5)]
@@ -225,7 +227,7 @@ def test_an_open_order_takes_the_better_one() -> None:
     """Firing close together and far apart are two orders of one crank: with gas they differ."""
     text = changed(TWIN, "firing_order = [1, 2]", 'firing_order = "open"')
     text = changed(text, "intervals = { min = 225, max = 495 }", "intervals = { min = 30, max = 690 }")
-    problem = _read(text + GAS + MOUNTS + WEIGHTS + _objective("rms roll moment"))
+    problem = _read(text + GAS + MOUNTS + WEIGHTS + FEW + _objective("rms roll moment"))
     result = solve(problem)
     low, high = problem.phasing.bank
     values = [

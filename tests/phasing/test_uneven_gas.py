@@ -146,7 +146,7 @@ def test_one_open_throw_is_where_a_fine_grid_is_least(tmp_path, cycle):
     engine = f"throws = {throws}\nfiring_order = {list(order)}"
     allowed = 'intervals = { largest_deviation = "300 deg" }'
     # bounds are not looked at here
-    few = "[search]\nboxes = 20\n"
+    few = "[search]\nboxes = 2\n"
     problem = engines.problem(tmp_path, count, cycle, engine, allowed, GAS + MOUNT_FORCE + few)
     result = solve(problem)
     phasing = problem.phasing

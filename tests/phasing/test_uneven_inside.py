@@ -137,7 +137,7 @@ def test_waves_of_throws_are_those_of_the_exact_model() -> None:
 
 
 DECIDED = {
-    "mean main-bearing force": {"search": {"boxes": 8}},
+    "mean main-bearing force": {"search": {"boxes": 8}, "fidelity": {"samples": 128}},
     "maximum main-bearing force": {"search": {"boxes": 8}},
     "rms crank-pin force": {"gas": None},
     "peak to peak stored work": {},

@@ -207,11 +207,9 @@ def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
     bound = scale.missed(evaluation) + ROUNDING * scale.value
     if own.is_uneven or any(own.gas_of(loads.point) for loads in evaluation.loads):
         # integration in time is taken as wanted, and would take long
-        mounts = "frequency" if own.mounts == "time" else own.mounts
-        given, finer = (
-            scale.evaluation(replace(own, samples=k * own.samples, gas_samples=k * own.gas_steps, mounts=mounts))
-            for k in (1, 2)
-        )
+        still = replace(own, mounts="frequency") if own.mounts == "time" else own
+        given = evaluation if still is own else scale.evaluation(still)
+        finer = scale.evaluation(replace(still, samples=2 * own.samples, gas_samples=2 * own.gas_steps))
         # what is left of twice the steps is no more than what they change
         bound += 2.0 * scale.lost(given, finer)
     return relative(bound, scale.value)
