@@ -278,6 +278,24 @@ def test_limits_of_a_run_up_are_measured_when_sliders_rest(page: Page) -> None:
     assert told == pytest.approx(built.standing(problem.limits[0]).value, rel=1e-9)
 
 
+def test_on_a_phone_the_optimum_stays_in_sight_and_groups_are_folded(shown: Page) -> None:
+    size = shown.viewport_size
+    try:
+        shown.set_viewport_size({"width": 390, "height": 844})
+        shown.reload()
+        settled(shown)
+        assert shown.evaluate("document.documentElement.scrollWidth") <= 390
+        speed = shown.locator('[data-control="operating_points.1.speed"]')
+        expect(speed).to_be_hidden()
+        shown.get_by_text("3 numbers").click()
+        expect(speed).to_be_visible()
+        shown.evaluate("scrollTo(0, 1500)")
+        expect(shown.locator("#optimum")).to_be_in_viewport()
+        assert serious(shown) == []
+    finally:
+        shown.set_viewport_size(size or {"width": 1280, "height": 720})
+
+
 def test_a_crank_is_clicked_and_given_back(page: Page) -> None:
     with served(PROBLEMS / "vee-eight-open.toml") as (address, _):
         page.goto(address)

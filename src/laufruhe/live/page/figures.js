@@ -192,19 +192,18 @@ class Orders {
     this.root = picture(420, 194, "");
     this.width = 360 / this.orders.length;
     this.bars = this.orders.map((order, j) => this.column(order, j));
-    this.top = label(40, 20, "", "end");
-    this.root.append(drawn("path", { d: "M44 160H410", class: "axis" }), this.top, label(227, 186, "order of crank speed"));
+    this.top = label(4, 12, "", "start");
+    this.root.append(drawn("path", { d: "M44 160H410", class: "axis" }), this.top, label(227, 188, "order of crank speed"));
   }
 
-  /** Orders above a share of the largest in one of the designs, the largest of them. */
+  /** Orders above a share of the largest of one of the designs, each beside its own; of these the largest. */
   counted(designs) {
-    const { signal, point } = this, all = ordersOf(signal, point), most = all.map(() => 0);
+    const { signal, point } = this, all = ordersOf(signal, point), share = all.map(() => 0);
     for (const x of designs) {
-      signal.places.forEach((_, place) => {
-        amplitudesAt(signal, point, place, x, all).forEach((value, j) => { most[j] = Math.max(most[j], value); });
-      });
+      const own = signal.places.map((_, place) => amplitudesAt(signal, point, place, x, all)), top = largest(own.map(largest));
+      all.forEach((_, j) => { share[j] = Math.max(share[j], largest(own.map((place) => place[j])) / (top || 1)); });
     }
-    const top = largest(most), felt = all.map((order, j) => [order, most[j]]).filter(([, value]) => value > 0.01 * top);
+    const felt = all.map((order, j) => [order, share[j]]).filter(([, value]) => value > 0.01);
     return felt.sort((p, q) => q[1] - p[1]).slice(0, MOST_ORDERS).map(([order]) => order).sort((p, q) => p - q);
   }
 

@@ -7,6 +7,8 @@ import { element, shown } from "./parts.js";
  * @typedef {[string, string, any]} Edit
  */
 
+/** On a narrow page groups are folded: who moves one sees what it does. */
+const wide = matchMedia("(min-width: 60rem)");
 const ORDER = ["Limits", "Engine", "Open numbers", "Mounts"];
 
 /** All sliders of a problem, in groups. */
@@ -32,9 +34,12 @@ export class Controls {
     for (const group of ORDER) {
       const own = controls.filter((control) => control.group === group);
       if (!own.length) continue;
-      const box = element("fieldset", { class: "numbers" }, element("legend", {}, group));
-      box.append(...own.map((control) => this.row(control, edits.get(control.name))));
-      this.root.append(box);
+      const open = wide.matches || group === ORDER[0] || own.some((control) => edits.has(control.name));
+      const told = element("summary", {}, `${own.length} number${own.length > 1 ? "s" : ""}`);
+      const rows = own.map((control) => this.row(control, edits.get(control.name)));
+      const box = element("details", { open }, told, ...rows);
+      wide.addEventListener("change", () => { box.open ||= wide.matches; });
+      this.root.append(element("fieldset", { class: "numbers" }, element("legend", {}, group), box));
     }
   }
 

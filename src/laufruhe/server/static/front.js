@@ -1,7 +1,7 @@
 // The front between the objective and another measure, drawn as its points come.
 import { drawn, shown, ticks } from "./parts.js";
 
-const [WIDE, HIGH, LEFT, LOW] = [640, 360, 74, 44];
+const [WIDE, HIGH, LEFT, LOW, TOP] = [640, 376, 74, 44, 28];
 
 /**
  * @typedef {{across: number, value: number, bound: number, acrossText: string, text: string, boundText: string,
@@ -21,7 +21,7 @@ export function drawFront(root, points, across, picked) {
   }
   const sorted = [...points].sort((a, b) => a.across - b.across);
   const x = scale(sorted.map((point) => point.across), LEFT, WIDE - 12);
-  const y = scale(sorted.flatMap((point) => [point.value, point.bound]), HIGH - LOW, 12);
+  const y = scale(sorted.flatMap((point) => [point.value, point.bound]), HIGH - LOW, TOP);
   const svg = drawn("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, role: "group", "aria-label": `Front against ${across}` });
   svg.append(...axes(x, y, sorted[0], across), line(sorted, x, y, "bound", "bound"), line(sorted, x, y, "value", "curve"));
   svg.append(...sorted.map((point) => dot(point, x, y, picked)));
@@ -53,7 +53,7 @@ function axes(x, y, point, across) {
   const [upUnit, upFactor] = point.axes.value;
   for (const tick of ticks(x.low * factor, x.high * factor)) {
     const at = x.at(tick / factor);
-    found.push(drawn("line", { class: "grid", x1: at, x2: at, y1: 12, y2: HIGH - LOW }),
+    found.push(drawn("line", { class: "grid", x1: at, x2: at, y1: TOP, y2: HIGH - LOW }),
       drawn("text", { x: at, y: HIGH - LOW + 15, "text-anchor": "middle" }, shown(tick)));
   }
   for (const tick of ticks(y.low * upFactor, y.high * upFactor)) {
@@ -62,7 +62,7 @@ function axes(x, y, point, across) {
       drawn("text", { x: LEFT - 6, y: at + 4, "text-anchor": "end" }, shown(tick)));
   }
   found.push(drawn("text", { x: WIDE - 12, y: HIGH - 8, "text-anchor": "end" }, `${across} [${unit}]`),
-    drawn("text", { x: 4, y: HIGH - 8 }, `${point.name} [${upUnit}] up; dashed: no design under it`));
+    drawn("text", { x: 4, y: 14 }, `${point.name} [${upUnit}]; dashed: no design has less`));
   return found;
 }
 

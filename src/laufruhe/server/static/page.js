@@ -342,6 +342,8 @@ async function start() {
   onClick("draw", () => trade.draw({ edits: asked().edits, held: state.held }));
   onClick("picture", () => pictures.draw(asked().edits));
   engine.listen();
+  // what sticks under the optimum has to know how high that is
+  new ResizeObserver(() => document.body.style.setProperty("--status", `${byId("status").offsetHeight}px`)).observe(byId("status"));
   byId("follows").addEventListener("change", () => {
     if (byId("follows").checked && state.optimum) state.handle.setDesign(state.optimum.design, {});
   });
