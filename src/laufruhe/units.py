@@ -32,7 +32,7 @@ _DEFINITIONS = (
 COMMON = {
     "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2},
     "kg": {"kg": 1.0, "g": 1e-3},
-    "kg m": {"kg m": 1.0, "kg mm": 1e-3, "g cm": 1e-5},
+    "kg m": {"kg m": 1.0, "kg mm": 1e-3, "g cm": 1e-5, "g mm": 1e-6},
     "kg m^2": {"kg m^2": 1.0, "kg cm^2": 1e-4},
     "Pa": {"Pa": 1.0, "bar": 1e5, "kp/cm^2": 98066.5},
     "N": {"N": 1.0, "kN": 1e3, "kp": 9.80665},

@@ -21,6 +21,7 @@ MOST_COMPLAINTS = 20
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _CLOSE = 0.6
 _FEW = 3
+_COUNTED = {"too_short": ("at least", "min_length"), "too_long": ("at most", "max_length")}
 _RULES = {
     "int_type": "must be a whole number",
     "int_from_float": "must be a whole number",
@@ -93,12 +94,18 @@ def short(value: Any) -> str:
     return printed(f'"{value}"' if isinstance(value, str) else str(value), 60)
 
 
+def _plain(word: str) -> str:
+    """A name as it is compared: in small letters, its words in one order."""
+    return " ".join(sorted(re.split(r"[\s_-]+", word.lower())))
+
+
 def nearest(word: str, words: Sequence[str], otherwise: str = "") -> str:
     """A remedy that names the nearest right word, those that hold it, or all of them; `otherwise` in place of all."""
+    plain = {_plain(each): each for each in words}
     holding = sorted(each for each in words if len(word) >= _FEW and word.lower() in each.lower())
-    close = holding if len(holding) == 1 else difflib.get_close_matches(word, words, n=1, cutoff=_CLOSE)
-    if close and len(holding) < _FEW:
-        return f"did you mean '{close[0]}'?"
+    close = difflib.get_close_matches(_plain(word), plain, n=1, cutoff=_CLOSE)
+    if len(holding) == 1 or (close and not holding):
+        return f"did you mean '{holding[0] if holding else plain[close[0]]}'?"
     return "use one of: " + ", ".join(holding) if holding else otherwise or "use one of: " + ", ".join(sorted(words))
 
 
@@ -143,6 +150,12 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], home: s
         # of two or three all are told: the nearest in letters need not be the one that is meant
         remedy = nearest(str(value), words) if len(words) > _FEW else "use one of: " + ", ".join(words)
         return Complaint(where, short(value), "is not allowed", remedy)
+    if kind in _COUNTED:
+        needed = detail["ctx"][_COUNTED[kind][1]]
+        rule = f"has {detail['ctx']['actual_length']} entries, and {_COUNTED[kind][0]} {needed} belong there"
+        return Complaint(
+            where, short(detail["input"]), rule, "add what is missing" if "least" in rule else "take some out"
+        )
     message = (detail["msg"][:1].lower() + detail["msg"][1:]).replace("input should", "must")
     rule, _, remedy = _RULES.get(kind, message).partition("; ")
     return Complaint(where, short(detail["input"]), rule, remedy or "correct it")

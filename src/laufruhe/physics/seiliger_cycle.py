@@ -53,7 +53,8 @@ def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
         raise ModelError(
             f"peak_pressure {in_bar(gas.peak_pressure)} is below the {in_bar(end)} at the end of compression "
             f"(ratio {gas.compression_ratio:g}, exponent {gas.compression_exponent:g}, "
-            f"from {in_bar(gas.intake_pressure)}); raise peak_pressure or lower compression_ratio"
+            f"from {in_bar(gas.intake_pressure)}); raise peak_pressure or lower compression_ratio",
+            "gas.peak_pressure",
         )
     least, most = seiliger_imep(gas, cycle, 1.0), seiliger_imep(gas, cycle, gas.compression_ratio)
     slack = _ROUNDING * gas.peak_pressure
@@ -61,7 +62,8 @@ def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
         remedy = "raise peak_pressure" if gas.imep > most else "lower peak_pressure"
         raise ModelError(
             f"imep {in_bar(gas.imep)} cannot be reached with peak_pressure {in_bar(gas.peak_pressure)}: from no to "
-            f"full cut-off it is between {in_bar(least)} and {in_bar(most)}; {remedy} or change imep"
+            f"full cut-off it is between {in_bar(least)} and {in_bar(most)}; {remedy} or change imep",
+            "gas.imep",
         )
     if gas.imep <= least:
         return 1.0

@@ -164,7 +164,7 @@ def _wrench(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectr
     try:
         return shaking_loads(engine, point, fidelity)
     except ModelError as error:
-        raise ModelError(f"at {point.name}: {error}") from None
+        raise ModelError(f"at {point.name}: {error}", error.where) from None
 
 
 def remounted(evaluation: Evaluation, engine: Engine) -> Evaluation:
