@@ -67,6 +67,12 @@ def test_quiet_and_verbose_contradict_each_other(here: Path) -> None:
     assert "-q: is given beside -v" in found.output
 
 
+def test_every_command_is_told_in_a_line_that_fits() -> None:
+    told = run.invoke(app, ["--help"], env={"COLUMNS": "80"}).output.partition("Commands:")[2]
+    assert "trade" in told
+    assert "..." not in told
+
+
 def test_loudness_may_stand_before_the_command(here: Path) -> None:
     assert run.invoke(app, ["-q", "check", str(SINGLE)]).output == ""
     assert "reading the problem" in run.invoke(app, ["-v", "evaluate", str(SINGLE), "--no-plots"]).stderr

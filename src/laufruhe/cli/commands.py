@@ -73,9 +73,9 @@ def init(
     file: o.FileArgument = Path("problem.toml"),
     name: o.FromOption = None,
 ) -> None:
-    """Write a commented problem file to start from, with its schema for editors.
+    """Write a commented problem file to start from.
 
-    Asks what it is about, unless --from says so.
+    Asks about the engine, unless --from names one. The schema that editors use comes with it.
     """
     with exit_statuses(file):
         from laufruhe.cli.begin import begun
@@ -99,7 +99,7 @@ def examples(
 def engines(
     names: o.KeysArgument = None,
 ) -> None:
-    """List the engines of the catalogue, or show the figures of some of them."""
+    """List the engines of the catalogue, or show some."""
     with exit_statuses(Path("laufruhe")):
         from laufruhe.cli.begin import catalogue, shown
 
@@ -123,7 +123,10 @@ def solve(
     quiet: o.QuietOption = False,
     verbose: o.VerboseOption = False,
 ) -> None:
-    """Decide what the problem leaves open, and prove how good the design is."""
+    """Find the best design, and prove how good it is.
+
+    What the problem leaves open is decided; results, pictures and proof go into a folder.
+    """
     kinds = () if no_plots else kind.kinds
     with (
         exit_statuses(problem), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler), artists(kinds) as draws
@@ -137,7 +140,7 @@ def solve(
 def evaluate(
     problem: o.ProblemArgument,
     json: o.JsonOption = None,
-    out: o.OutOption = None,
+    out: o.AsGivenOption = None,
     no_plots: o.NoPlotsOption = False,
     kind: o.FormatOption = o.Format.PNG,
     animate: o.AnimateOption = False,
@@ -204,7 +207,7 @@ def study(
 
 @app.command(epilog=_example("laufruhe check problem.toml"))
 def check(
-    problem: o.ProblemArgument,
+    problem: o.EitherArgument,
     json: o.JsonOption = None,
     quiet: o.QuietOption = False,
     verbose: o.VerboseOption = False,
@@ -248,7 +251,10 @@ def trade(
     quiet: o.QuietOption = False,
     verbose: o.VerboseOption = False,
 ) -> None:
-    """Measure time and error of every fidelity on these problems."""
+    """Measure time and error of every simplification.
+
+    Each fidelity, that is each choice of how exactly the physics is computed, is tried on these problems.
+    """
     with exit_statuses(problems[0]), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler):
         from laufruhe.cli.fidelity import traded
 

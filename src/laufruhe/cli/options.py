@@ -26,12 +26,15 @@ def _completed(kinds: str) -> Callable[[str], list[str]]:
 FileOnDisk = Annotated[Path, typer.Argument(metavar="PROBLEM", help="Problem file (TOML).", show_default=False)]
 FILE = "Problem file (TOML); - reads standard input."
 ProblemArgument = Annotated[Path, typer.Argument(metavar="PROBLEM", help=FILE, show_default=False)]
+EITHER = "Problem or study file (TOML); - reads standard input."
+EitherArgument = Annotated[Path, typer.Argument(metavar="FILE", help=EITHER, show_default=False)]
 JSON = "Write the result as JSON to FILE; - prints it, and the text goes to stderr."
 JsonOption = Annotated[str | None, typer.Option("--json", metavar="FILE", help=JSON)]
 PARTS = "Write all parts as JSON to FILE; - prints them."
 StudyJsonOption = Annotated[str | None, typer.Option("--json", metavar="FILE", help=PARTS)]
-OUT = "Folder of the results.  [default: results/<name of the file>, of evaluate <name>-as-given]"
-OutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=OUT)]
+OUT = "Folder of the results.  [default: results/<name of the file>{}]"
+OutOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=OUT.format(""))]
+AsGivenOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=OUT.format("-as-given"))]
 PAGES = "Folder of the pages.  [default: results/trade]"
 PagesOption = Annotated[Path | None, typer.Option("--out", metavar="DIR", help=PAGES)]
 
@@ -65,7 +68,7 @@ LIMIT = "End the search after SECONDS with the best design so far and its bound.
 LimitOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=LIMIT)]
 STOP = "End after SECONDS; finished work is kept."
 StopOption = Annotated[float | None, typer.Option("--time-limit", metavar="SECONDS", help=STOP)]
-JOBS = "Largest number of processes.  [default: one for each core]"
+JOBS = "Use at most N processes.  [default: one for each core]"
 JobsOption = Annotated[int | None, typer.Option("--jobs", metavar="N", help=JOBS)]
 SCHEDULER = "Let the Dask workers of the scheduler at ADDRESS do the work."
 SchedulerOption = Annotated[str | None, typer.Option("--scheduler", metavar="ADDRESS", help=SCHEDULER)]
