@@ -130,10 +130,13 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
         least = math.nan if engine is None else objective_value(problem, reference(problem, engine))
         # what cancels has no share by which another design is worse
         least = 0.0 if engine is not None and least <= nothing_of(problem, engine) else least
-    rows, whole = [], False
+    rows, whole, known = [], False, dict[tuple[Fidelity, int], Row]()
     for name, own in ladder(problem):
         say(name)
-        row = _row(name, own, best, truth, least)
+        # several tolerances may come to the same physics
+        physics = replace(own.fidelity, tolerance=None), len(own.points)
+        row = replace(known[physics], name=name) if physics in known else _row(name, own, best, truth, least)
+        known[physics] = row
         if passed():
             # what a limit may have cut short is no measurement
             break

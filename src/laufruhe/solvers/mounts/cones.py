@@ -54,7 +54,7 @@ class _Stated:
     """
 
     def __init__(self, program: ConvexProgram, relaxed: bool = False) -> None:
-        self.program, self._relaxed = program, relaxed
+        self.program = program
         lower, upper = program.lower, program.upper
         scale = np.maximum(np.abs(lower), np.abs(upper))
         self.scale = np.where(scale > 0.0, scale, 1.0)

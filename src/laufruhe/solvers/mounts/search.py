@@ -20,7 +20,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import FEASIBLE, Design, given_design, judged
 from laufruhe.solvers.mounts.starts import start_points
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, is_explored
-from laufruhe.solvers.smooth.nonlinear import Enough, solve_nonlinear
+from laufruhe.solvers.smooth.nonlinear import Enough, solve_nonlinear, try_all
 from laufruhe.solvers.smooth.program import SmoothProgram
 
 SLACK = 1e-5
@@ -178,7 +178,7 @@ class MountSearch:
                 found, columns = _decided(joint, x)
                 mounts = found + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(found))
                 again.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.turns(x)))
-            more = self._ends(again, _never)
+            more = self._ends(again, try_all)
             optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in more))
         self._take(optima)
 
@@ -251,11 +251,6 @@ class MountSearch:
                 break
             near = Found(design, joint, ends[0])
             self._keep(near)
-
-
-def _never(_: Sequence[LocalOptimum]) -> bool:
-    """All starts are tried."""
-    return False
 
 
 def _is_other(found: Found, other: Found) -> bool:

@@ -190,6 +190,11 @@ def _first_ends(
     return found, several
 
 
+def try_all(_: Sequence[LocalOptimum]) -> bool:
+    """Never enough: all starts are tried, and one of those that end alike goes on."""
+    return False
+
+
 class _Shared:
     """Workers that share starts: to set the program up costs as much as a start, so each has its own share of all."""
 

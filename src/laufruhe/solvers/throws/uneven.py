@@ -30,7 +30,7 @@ from laufruhe.prove.certificate import Reach, certified
 from laufruhe.prove.throws.uneven import steady_bound, uneven_bound
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, unbalances_of
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.smooth.nonlinear import solve_nonlinear
+from laufruhe.solvers.smooth.nonlinear import solve_nonlinear, try_all
 from laufruhe.solvers.smooth.program import TURN, SmoothProgram
 from laufruhe.solvers.stars.conclusion import no_star, with_star
 from laufruhe.solvers.stars.design import StarDesign, solve_fixed
@@ -167,7 +167,8 @@ def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> S
     for _ in range(_ATTEMPTS):
         smooth = SmoothProgram(problem, _size(problem, best), margin, moves, slack=SOFT_LIMIT, softest=SOFTEST)
         least = math.inf
-        for optimum in solve_nonlinear(smooth.program, _points(smooth, best), workers=1, max_seconds=30.0):
+        starts = _points(smooth, best)
+        for optimum in solve_nonlinear(smooth.program, starts, workers=1, max_seconds=30.0, enough=try_all):
             if not optimum.usable:
                 continue
             candidate = moves.candidate(smooth.turns(optimum.x))
