@@ -75,7 +75,7 @@ def solved(problem: Problem, listener: Listener) -> Result:
     from laufruhe.solvers import solve, state
 
     try:
-        return solve(replace(problem, sharply=True), listener, reach=True)
+        return solve(replace(problem, sharply=True), listener, further=True)
     except SolverError as error:
         return replace(state(problem, to_start_from=True), status=Status.FAILED, message=str(error))
 

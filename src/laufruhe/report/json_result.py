@@ -316,13 +316,14 @@ def _robust(result: Result) -> Record:
 
 
 def _ranks(result: Result) -> Record:
-    """`objectives` where several were minimised in order, each with the ends of decisions that it leaves equal."""
+    """`free_decisions`, and `objectives` where several were minimised in order: what each leaves equal."""
     names = "name unit initial least lower_bound gap final limit price"
     found = [
         {**_of(rank, names), "proof": str(rank.proof), "equal": [_of(d, "name unit low high") for d in rank.equal]}
         for rank in result.ranks
     ]
-    return {"objectives": found} if found else {}
+    free = None if result.free is None else [_of(one, "name unit low high") for one in result.free]
+    return {"free_decisions": free, **({"objectives": found} if found else {})}
 
 
 def _reached(result: Result) -> Record:

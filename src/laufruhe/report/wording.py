@@ -14,6 +14,8 @@ from laufruhe.solvers.stars.ranking import RankedStar
 
 # A change that would be printed as 0.0 %.
 UNFELT = 5e-4
+LOOSE = 1e-3
+"""Residual of the optimality conditions from which they are not said to hold."""
 
 
 def headline(result: Result) -> str:
@@ -108,7 +110,12 @@ def _proven(certificate: Certificate | None) -> str:
 
 def gap_text(certificate: Certificate) -> str:
     """The gap in percent, to two figures."""
-    return f"{trimmed(100.0 * max(certificate.gap, 0.0), 2)} %"
+    return percent_of(max(certificate.gap, 0.0))
+
+
+def percent_of(share: float) -> str:
+    """To two figures."""
+    return f"{trimmed(100.0 * share, 2)} %"
 
 
 def explained(result: Result) -> str:
@@ -127,12 +134,13 @@ def explained(result: Result) -> str:
             f"For this design {_conditions(c.kkt_residual)}. "
             f"No design is below {figure(c.lower_bound, o.unit, 6)}; designs between the two values are not ruled out."
         )
+    gap = f"a gap of {gap_text(c)}" if c.gap > 0.0 else "which leaves no gap"
     origin = "was not taken from the solver but computed from the exact model"
     if "SCIP" in c.method:
         origin = "is SCIP's dual bound less its tolerances, or that of dual rows where it is better"
     return (
         f"No design within the bounds and limits has less than {figure(c.lower_bound, o.unit, 6)}; "
-        f"this one has {figure(o.value, o.unit, 6)}, a gap of {gap_text(c)} (proof: {c.kind}). "
+        f"this one has {figure(o.value, o.unit, 6)}, {gap} (proof: {c.kind}). "
         f"The bound {origin} ({c.method}), and {_conditions(c.kkt_residual)}."
     )
 
@@ -141,4 +149,6 @@ def _conditions(residual: float) -> str:
     """What is known of the optimality conditions; nothing of a design that no smooth search ended at."""
     if not math.isfinite(residual):
         return "no search ended at this design, so its optimality conditions are not known"
+    if residual > LOOSE:
+        return f"the optimality conditions, on which no bound rests, are met to {percent_of(residual)} only"
     return f"the optimality conditions hold with a residual of {residual:.1e}"

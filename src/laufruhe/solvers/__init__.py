@@ -14,7 +14,6 @@ from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import Listener, listening, tell
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import objective_value
-from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
@@ -24,6 +23,7 @@ from laufruhe.solvers.boxes.leads import solve_leads
 from laufruhe.solvers.boxes.places import solve_places
 from laufruhe.solvers.boxes.shared_leads import solve_shared_leads
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
+from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_sharply
 from laufruhe.solvers.in_order import solve_in_order
 from laufruhe.solvers.mounts.convex import is_convex, solve_convex_mounts
@@ -174,7 +174,8 @@ def _asks_places(problem: Problem) -> bool:
     carried = {bearing.shaft.name for bearing in problem.engine.bearings}
     moved = {drive.rotor for decision in problem.decisions for drive in decision.place_drives}
     loads = any(rotor.shaft.name in carried for rotor in problem.engine.rotors if rotor.name in moved)
-    return _asks_loads(problem) and _adds_points(problem) and not (loads and any(map(_is_inside, problem.measures)))
+    inside = any(measure.is_inside or measure.channel.is_flywheel for measure in problem.measures)
+    return _asks_loads(problem) and _adds_points(problem) and not (loads and inside)
 
 
 def _adds_points(problem: Problem) -> bool:
@@ -192,10 +193,6 @@ def _asks_stars_on_mounts(problem: Problem) -> bool:
     moves = problem.phasing is not None and problem.phasing.continuous
     numbers = (m.channel.is_number and not m.is_mounting for m in problem.measures)
     return problem.engine.block is not None and _adds_points(problem) and not (moves and any(numbers))
-
-
-def _is_inside(measure: Measure) -> bool:
-    return measure.is_inside or measure.channel.is_flywheel
 
 
 def _feels_pistons(problem: Problem) -> bool:
@@ -242,7 +239,7 @@ METHODS: tuple[Method, ...] = (
 
 
 def solve(
-    problem: Problem, listener: Listener | None = None, time_limit: float | None = None, reach: bool = False
+    problem: Problem, listener: Listener | None = None, time_limit: float | None = None, further: bool = False
 ) -> Result:
     """Decide what a problem leaves open.
 
@@ -254,8 +251,8 @@ def solve(
         Told how far searches are.
     time_limit
         Seconds after which searches end with the best that they have, and with its bound.
-    reach
-        Whether limits that no design keeps are asked what they can reach, for some times as long.
+    further
+        Whether to ask what limits that no design keeps can reach, and which decisions an optimum leaves free.
 
     Raises
     ------
@@ -279,8 +276,10 @@ def solve(
                 raise
             found = None
         found = found if found is not None and not passed() else _cut_short(problem, found)
-        if not reach or found.status in (Status.OPTIMAL, Status.FEASIBLE):
+        if not further or found.status is Status.FEASIBLE:
             return found
+        if found.status is Status.OPTIMAL:
+            return replace(found, free=free_decisions(found))
         return with_reachable(found, problem, kinds_of(problem), time.perf_counter() - begun, _decided)
 
 

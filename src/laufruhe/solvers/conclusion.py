@@ -28,7 +28,6 @@ from laufruhe.solvers.result import (
     ObjectiveValue,
     Result,
     Status,
-    infeasible,
     objective_of,
 )
 from laufruhe.solvers.stars.ranking import none_of_given
@@ -143,7 +142,9 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
         shown.kkt_residual,
         shown.method,
     )
-    limits = limit_values(problem, design.evaluation, shown.prices, design.value)
+    # prices under what the proof leaves open are those of its rounding
+    unfelt = max(_FELT, min(certificate.gap, problem.tolerance))
+    limits = limit_values(problem, design.evaluation, shown.prices, design.value, unfelt)
     proven = certificate.kind is Proof.GLOBAL
     message = f"the design as given has no finite loads: {initial.resonance}" if initial.resonance else ""
     if not met:
@@ -153,7 +154,7 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
         status=Status.FAILED if not met else Status.OPTIMAL if proven else Status.FEASIBLE,
         objective=ObjectiveValue.of(problem, design.value, given),
         certificate=certificate,
-        decisions=decided(design, shown.slopes),
+        decisions=decided(design, shown.slopes, unfelt),
         limits=limits,
         initial=initial,
         final=design.evaluation,
@@ -193,7 +194,21 @@ def state(problem: Problem, to_start_from: bool = False) -> Result:
 
 def none_within(problem: Problem, initial: Evaluation, conflict: tuple[str, ...], timing: dict[str, float]) -> Result:
     """No design exists: which limits cannot be met together, and how the one given stands to them."""
-    return infeasible(problem, initial, limit_values(problem, initial), conflict, timing)
+    names = " and ".join(f"'{name}'" for name in conflict) or "the bounds"
+    verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
+    return Result(
+        problem=problem,
+        status=Status.INFEASIBLE,
+        objective=None,
+        certificate=None,
+        decisions=(),
+        limits=limit_values(problem, initial),
+        initial=initial,
+        final=initial,
+        message=f"no design exists: {names} {verb}",
+        conflict=conflict,
+        timing=timing,
+    )
 
 
 def broken_limits(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[str, ...]:
@@ -217,21 +232,30 @@ def _broken(problem: Problem, design: Design) -> str:
 
 
 def limit_values(
-    problem: Problem, evaluation: Evaluation, prices: Mapping[Side, float] | None = None, value: float = 0.0
+    problem: Problem,
+    evaluation: Evaluation,
+    prices: Mapping[Side, float] | None = None,
+    value: float = 0.0,
+    unfelt: float = _FELT,
 ) -> tuple[LimitValue, ...]:
-    """How a design stands to the limits (E15); a price that would not move the objective by its rounding is none."""
-    return tuple(_limit_value(limit, evaluation, prices, value, problem.tolerance) for limit in problem.limits)
+    """How a design stands to the limits (E15); a price that moves the objective by an `unfelt` share is none."""
+    return tuple(_limit_value(limit, evaluation, prices, value, problem.tolerance, unfelt) for limit in problem.limits)
 
 
 def _limit_value(
-    limit: Limit, evaluation: Evaluation, prices: Mapping[Side, float] | None, value: float, tolerance: float
+    limit: Limit,
+    evaluation: Evaluation,
+    prices: Mapping[Side, float] | None,
+    value: float,
+    tolerance: float,
+    unfelt: float = _FELT,
 ) -> LimitValue:
     found = evaluation.standing(limit)
     # an active side without a price has one that nothing here tells
     price = 0.0 if prices is None else prices.get((limit, found.side), math.nan)
     told = price * abs(found.edge) > _TOLD * value and found.excess >= -tolerance
     active = bool(found.excess >= -ACTIVE or told)
-    price = 0.0 if not active or price * abs(found.edge) <= _FELT * value else price
+    price = 0.0 if not active or price * abs(found.edge) <= unfelt * value else price
     error = relative(missed(limit.measure, evaluation), found.value)
     return LimitValue(limit.name, found.value, found.edge, limit.measure.unit, active, price, found.side, error)
 
@@ -257,12 +281,19 @@ def unbalances_of(problem: Problem, result: Result) -> list[complex]:
     return [cmath.rect(found[d.name], found.get(angle_name(d), d.set.angles[0])) for d in problem.unbalances]
 
 
-def decided(design: Design, slopes: Mapping[str, Array] | None = None) -> tuple[DecisionValue, ...]:
-    """What is open of a design; slopes of the bound price the sides that it stands at."""
-    return tuple(
+def decided(
+    design: Design, slopes: Mapping[str, Array] | None = None, unfelt: float = 0.0
+) -> tuple[DecisionValue, ...]:
+    """What is open of a design; slopes of the bound price the sides that it stands at, where that share is felt."""
+    entries = (
         entry
         for decision, value in zip(design.problem.decisions, design.values, strict=True)
         for entry in decision_values(decision, value, (slopes or {}).get(decision.name))
+    )
+    least = unfelt * design.value
+    return tuple(
+        replace(e, shadow_price=0.0) if e.shadow_price * max(abs(e.lower), abs(e.upper)) <= least else e
+        for e in entries
     )
 
 

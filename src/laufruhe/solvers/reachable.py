@@ -78,7 +78,8 @@ def with_reachable(found: Result, problem: Problem, kinds: Collection[Kind], too
         if drawn and result.final.excess(problem.limits) <= KEPT:
             return _recovered(found, problem, result)
     found = replace(found, reached=tuple(answer.told for answer in answers))
-    found = _excluded(found) if found.status is Status.FAILED else found
+    if found.status is Status.FAILED and drawn:
+        found = _excluded(found)
     near = _nearest(found, problem, designs) if drawn and found.status is Status.FAILED else None
     return replace(found, nearest=near)
 

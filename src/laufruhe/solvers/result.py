@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import html
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from laufruhe.errors import ModelError
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 AS_GIVEN, AS_DECIDED = "as given", "as decided"
+NEXT_TO_NOTHING = 1e-5
 APART = 0.05
 """Share of the largest decision by which two designs differ."""
 
@@ -54,6 +57,17 @@ class DecisionValue:
     initial: float
     at_bound: bool
     shadow_price: float = 0.0
+
+    @property
+    def is_nothing(self) -> bool:
+        """Whether its size is a rounding of what it may be."""
+        return abs(self.value) <= NEXT_TO_NOTHING * max(abs(self.lower), abs(self.upper))
+
+
+def meaningful(decisions: Sequence[DecisionValue]) -> list[DecisionValue]:
+    """Without angles of sizes that are none."""
+    pairs = pairwise([None, *decisions])
+    return [d for size, d in pairs if d is not None and not (d.name.endswith(".angle") and size and size.is_nothing)]
 
 
 @dataclass(frozen=True)
@@ -236,6 +250,8 @@ class Result:
         Without a design: what each of the limits that conflict can reach while the others hold.
     nearest
         Where no design was found, and none is proven not to exist: the one that breaks limits least.
+    free
+        Ranges of decisions that the optimum leaves free, as far as designs were found; None where not looked at.
     """
 
     problem: Problem
@@ -256,6 +272,7 @@ class Result:
     ranks: tuple[RankValue, ...] = ()
     reached: tuple[Reached, ...] = ()
     nearest: Nearest | None = None
+    free: tuple[DecisionRange, ...] | None = None
 
     @property
     def designs(self) -> dict[str, Evaluation]:
@@ -307,7 +324,7 @@ class Result:
             lines.append(f"  {o.name} {o.value:.6g} {o.unit} (as given {given})")
         if self.certificate is not None:
             lines.append(f"  proof {self.certificate.kind}, gap {self.certificate.gap:.1e}")
-        lines += [f"  {d.name} = {d.value:.6g} {d.unit}".rstrip() for d in self.decisions]
+        lines += [f"  {d.name} = {d.value:.6g} {d.unit}".rstrip() for d in meaningful(self.decisions)]
         if self.message:
             lines.append(f"  {self.message}")
         return "\n".join(lines) + ">"
@@ -323,28 +340,3 @@ def objective_of(problem: Problem, initial: Evaluation, final: Evaluation) -> Ob
         return None
     value = objective_value(problem, final)
     return ObjectiveValue.of(problem, value, value if final is initial else objective_value(problem, initial))
-
-
-def infeasible(
-    problem: Problem,
-    initial: Evaluation,
-    limits: tuple[LimitValue, ...],
-    conflict: tuple[str, ...],
-    timing: dict[str, float],
-) -> Result:
-    """No design exists: which limits cannot be met together, and how the one given stands to them."""
-    names = " and ".join(f"'{name}'" for name in conflict) or "the bounds"
-    verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
-    return Result(
-        problem=problem,
-        status=Status.INFEASIBLE,
-        objective=None,
-        certificate=None,
-        decisions=(),
-        limits=limits,
-        initial=initial,
-        final=initial,
-        message=f"no design exists: {names} {verb}",
-        conflict=conflict,
-        timing=timing,
-    )

@@ -11,14 +11,26 @@ from laufruhe.solvers.result import DecisionValue, Result
 from laufruhe.units import readable
 
 HEAD = ("open", "as given", "decided", "bounds", "at bound", "shadow price")
-NEXT_TO_NOTHING = 1e-5
 
 
 def tables(result: Result) -> list[Grid]:
     """A row a decision."""
     pairs = pairwise([None, *result.decisions])
     rows = tuple(_row(before, d, objective_unit(result)) for before, d in pairs if d is not None)
-    return [Grid("Decisions", HEAD, rows)]
+    return [Grid("Decisions", HEAD, rows, note=_free(result))]
+
+
+def _free(result: Result) -> str:
+    """What of the optimum is not unique."""
+    if not result.free:
+        return ""
+    ends = (
+        f"{found.name} from {with_unit(found.low, found.unit)} to {with_unit(found.high, found.unit)}"
+        for found in result.free
+    )
+    share = f"{trimmed(100.0 * result.problem.tolerance, 1)} %"
+    found = ", ".join(ends)
+    return f"The optimum is not unique. As good within {share}, with other decisions to match, at least: {found}."
 
 
 def _row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str, ...]:
@@ -28,7 +40,7 @@ def _row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str
     # the angle of a size that is none means nothing
     size = before if d.name.endswith(".angle") else None
     given = DASH if size and not size.initial else with_unit(d.initial, d.unit)
-    if size and abs(size.value) <= NEXT_TO_NOTHING * max(abs(size.lower), abs(size.upper)):
+    if size and size.is_nothing:
         return d.name, given, DASH, bounds, DASH, DASH
     upper = abs(d.value - d.upper) <= abs(d.value - d.lower)
     mark = DASH if not d.at_bound else "upper" if upper else "lower"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from laufruhe.present.numbers import DASH, figure, with_unit
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.grid import Grid
-from laufruhe.solvers.result import DecisionValue, Nearest, Reached, Result
+from laufruhe.solvers.result import DecisionValue, Nearest, Reached, Result, meaningful
 
 NOTE = "None of these designs is an answer: each keeps the limits but the one that it is named by."
 
@@ -13,8 +13,8 @@ NOTE = "None of these designs is an answer: each keeps the limits but the one th
 def tables(result: Result) -> list[Grid]:
     """A row a decision, a column a design."""
     designs = [found for found in result.reached if found.decisions]
-    names = list(dict.fromkeys(decision.name for found in designs for decision in found.decisions))
-    known = [{decision.name: decision for decision in found.decisions} for found in designs]
+    known = [{decision.name: decision for decision in meaningful(found.decisions)} for found in designs]
+    names = dict.fromkeys(name for each in known for name in each)
     first = ("value reached", *(figure(found.value, found.unit) for found in designs))
     rows = tuple((name, *(_value(each.get(name)) for each in known)) for name in names)
     head = ("", *(f"nearest to '{found.name}'" for found in designs))

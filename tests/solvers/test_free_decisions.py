@@ -1,0 +1,184 @@
+"""Decisions that an optimum leaves free (P17): against grids by the exact model, and against optima with one held."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.files.reader import load, load_tables
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Interval
+from laufruhe.prove.certificate import Reach
+from laufruhe.report.json_result import as_dict
+from laufruhe.report.sections.decisions import tables
+from laufruhe.report.wording import explained
+from laufruhe.solvers import solve
+from laufruhe.solvers.conclusion import Shown, concluded, judged
+from laufruhe.solvers.cones.equal_designs import FREE, free_decisions
+from laufruhe.solvers.result import Result, Status, meaningful
+from problem_files import PROBLEMS
+
+ENGINE = {
+    "layout": "inline", "cycle": "four-stroke", "bore": "100 mm", "stroke": "120 mm", "rod_ratio": 0.28,
+    "reciprocating_mass": "1.5 kg", "throws": [0], "firing_order": [1],
+}  # fmt: skip
+VEE = ENGINE | {"layout": "vee", "bank_angle": 70, "cylinder_spacing": "130 mm", "firing_order": [1, 2]}
+THREE = ENGINE | {"cylinders": 3, "throws": "open", "firing_order": "open", "cylinder_spacing": "120 mm"}
+POSITIONS = [["200 mm", "250 mm", "0 mm"], ["200 mm", "-250 mm", "0 mm"], ["-300 mm", "0 mm", "-20 mm"]]
+SPRINGS = {
+    "kind": "elastic", "loss_factor": 0.1,
+    "places": [{"position": place, "stiffness": ["200 N/mm"] * 3} for place in POSITIONS],
+}  # fmt: skip
+BLOCK = {"mass": "120 kg", "inertia": ["6 kg m^2", "9 kg m^2", "8 kg m^2"]}
+POINTS = [{"name": "idle", "speed": "800 rpm"}, {"name": "rated", "speed": "2500 rpm", "gas": False}]
+
+
+def web(name: str, most: str = "2 kg", x: str = "0 mm") -> dict[str, Any]:
+    return {"name": name, "x": x, "opposite_throw": 1, "radius": "80 mm", "mass": {"between": ["0 kg", most]}}
+
+
+def problem_of(
+    minimise: str, webs: list[dict[str, Any]], narrowed: dict[str, Any] | None = None, **told: Any
+) -> Problem:
+    whole = {
+        "title": "test", "engine": ENGINE, "mounts": {"positions": POSITIONS}, "operating_points": POINTS,
+        "gas": {"model": "seiliger", "peak_pressure": "80 bar", "imep": "6 bar"}, "fidelity": {"samples": 360},
+        "counterweights": webs, "objective": {"minimise": minimise} | (narrowed or {}),
+    }  # fmt: skip
+    return load_tables(whole | told, Path("t.toml"))
+
+
+def ends_of(result: Result) -> dict[str, tuple[float, float]]:
+    assert result.status is Status.OPTIMAL
+    assert result.free is not None
+    return {found.name: (found.low, found.high) for found in result.free}
+
+
+TWINS = [web("one", "2 kg", "200 mm"), web("two", "0.8 kg", "200 mm")]
+SCENES = {
+    "single": {}, "vee": {"engine": VEE}, "on elastic mounts": {"mounts": SPRINGS, "block": BLOCK},
+    "stars, with gas": {"engine": THREE},
+}  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCENES)
+def test_two_weights_in_one_place_are_free_against_each_other(name: str) -> None:
+    """Their sum alone counts, so the ends follow from it and from what each may be."""
+    told = SCENES[name]
+    result = laufruhe.solve(problem_of("mean mount force", TWINS, **told))
+    alone = laufruhe.solve(problem_of("mean mount force", [web("both", "2.8 kg", "200 mm")], **told))
+    assert alone.free == ()
+    whole = sum(decision.value for decision in result.decisions if decision.unit == "kg")
+    assert whole == pytest.approx(next(d.value for d in alone.decisions if d.unit == "kg"), rel=1e-3, abs=1e-4)
+    ends = ends_of(result)
+    for own, other in (("one", 0.8), ("two", 2.0)):
+        low, high = ends[f"{own}.mass"]
+        most = {"one": 2.0, "two": 0.8}[own]
+        assert low == pytest.approx(max(whole - other, 0.0), abs=5e-3 * whole)
+        assert high == pytest.approx(min(whole, most), abs=5e-3 * whole)
+
+
+def test_what_the_objective_does_not_feel_is_free_from_bound_to_bound() -> None:
+    """A weight on the crank makes no force of second order."""
+    result = laufruhe.solve(problem_of("rms mount force", [web("web")], {"orders": [2]}))
+    assert ends_of(result)["web.mass"] == pytest.approx((0.0, 2.0), abs=1e-6)
+    assert "not unique" in tables(result)[0].note
+    (told,) = as_dict(result)["free_decisions"]
+    assert told == {"name": "web.mass", "unit": "kg", "low": pytest.approx(0.0), "high": pytest.approx(2.0)}
+
+
+GRIDS = [
+    ("maximum mount force", {}), ("maximum mount force", {"engine": VEE}), ("mean mount force", {}),
+    ("maximum mount force", {"mounts": SPRINGS, "block": BLOCK}), ("maximum roll moment", {"engine": VEE}),
+    ("maximum mount force", {"operating_points": POINTS[:1]}),
+]  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("minimise", "told"), GRIDS)
+def test_a_grid_shows_the_same(minimise: str, told: dict[str, Any]) -> None:
+    """All between the ends is as good; and where none is told, no two designs far apart are."""
+    problem = problem_of(minimise, [web("web", "4 kg")], **told)
+    result = laufruhe.solve(problem)
+    best, masses = result.objective.value, np.linspace(0.0, 4.0, 41)
+    values = np.array([objective_value(problem, evaluate(problem, problem.design([mass]))) for mass in masses])
+    assert values.min() >= result.certificate.lower_bound * (1.0 - 1e-9)
+    ends = ends_of(result)
+    assert bool(ends) == (minimise == "maximum roll moment")
+    low, high = ends.get("web.mass", (math.inf, -math.inf))
+    assert np.all(values[(masses >= low) & (masses <= high)] <= best * (1.0 + problem.tolerance))
+    equal = masses[values <= best * (1.0 + 1e-7)]
+    assert ends or not len(equal) or np.ptp(equal) <= FREE * 4.0
+
+
+READY = ("twin-parallel-180", "tractor-three-bearings")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", READY)
+def test_with_a_free_decision_held_the_optimum_is_as_good(name: str) -> None:
+    """Of ready problems, at both ends and between them; beside limits on peaks, and in the plane."""
+    problem = load(PROBLEMS / f"{name}.toml")
+    result = laufruhe.solve(problem)
+    found = [told for told in result.free if not told.name.endswith(".angle")]
+    assert found
+    best, told = result.objective.value, found[0]
+    k = next(k for k, decision in enumerate(problem.decisions) if decision.name == told.name)
+    for share in (0.0, 0.5, 1.0):
+        size = told.low + share * (told.high - told.low)
+        held = holding(problem, k, size)
+        again = solve(held)
+        assert again.objective.value <= best * (1.0 + 2.0 * problem.tolerance)
+        assert again.final.excess(problem.limits) <= 1e-5
+
+
+def holding(problem: Problem, k: int, size: float) -> Problem:
+    """One decision at a size: in the plane no larger, and where the optimum has it, no smaller either."""
+    decision = problem.decisions[k]
+    own = decision.set.within(size) if decision.set.width > 1 else Interval(size, size, decision.set.angle)
+    decisions = (*problem.decisions[:k], replace(decision, set=own), *problem.decisions[k + 1 :])
+    return problem.changed(decisions=decisions)
+
+
+def test_nothing_is_told_where_it_is_not_looked_at() -> None:
+    assert solve(problem_of("mean mount force", TWINS)).free is None
+    moving = load(PROBLEMS / "tractor-four-shaft-heights.toml")
+    found = solve(replace(problem_of("mean mount force", TWINS)))
+    assert free_decisions(replace(found, problem=moving)) is None
+    assert as_dict(found)["free_decisions"] is None
+    assert not tables(found)[0].note
+
+
+def test_prices_within_the_accuracy_are_none() -> None:
+    """A slope that moves the objective by less than what is not proven has no price; one that is felt has."""
+    problem = problem_of("mean mount force", [web("web")])
+    design = judged(problem, [0.0])
+    scale = design.value / 2.0
+    for slope, priced in ((1e-10, False), (5e-5, False), (1e-2, True)):
+        shown = Shown(design.value * (1.0 - 1e-4), Reach.WHOLE, 0.0, "", {}, {"web.mass": np.array([slope * scale])})
+        (told,) = concluded(design, design.evaluation, shown, {}).decisions
+        assert told.at_bound
+        assert told.shadow_price == (pytest.approx(slope * scale) if priced else 0.0)
+
+
+def test_an_angle_of_nothing_is_not_shown() -> None:
+    result = solve(problem_of("rms mount force", [web("web") | {"angle": {"between": [0, 360]}}], {"orders": [2]}))
+    assert [decision.name for decision in meaningful(result.decisions)] == ["web.mass"]
+    assert "web.angle" not in repr(result)
+    assert tables(result)[0].rows[1][2] == "-"
+
+
+def test_conditions_that_hardly_hold_are_not_said_to() -> None:
+    result = solve(problem_of("mean mount force", [web("web")]))
+    loose = replace(result, certificate=replace(result.certificate, gap=0.0, kkt_residual=6.7e-2))
+    assert "which leaves no gap" in explained(loose)
+    assert "are met to 6.7 % only" in explained(loose)
+    assert "hold with a residual" in explained(result)
