@@ -146,6 +146,12 @@ def test_every_star_is_looked_at() -> None:
         assert told.value == pytest.approx(min(kept), rel=1e-9)
         assert {decision.name for decision in told.decisions} == {f"throw {j}" for j in range(1, 6)}
     assert "Each limit that is named is needed" in explained(result)
+    # some stars keep one of them, others the other: with a weight that does next to nothing as well, and a third limit
+    faint = WEB | {"mass": {"between": ["0 g", "1 g"]}}
+    beside = problem_of([*asked, LIGHT], engine=FIVE, counterweights=[faint])
+    narrowed = laufruhe.solve(beside)
+    assert narrowed.conflict == ("order 1", "order 2")
+    assert [told.value for told in narrowed.reached] == pytest.approx([told.value for told in result.reached], rel=1e-2)
 
 
 OPEN = {"between": ["50 N/mm", "800 N/mm"], "start": "300 N/mm"}
@@ -248,3 +254,15 @@ def test_nothing_is_looked_at_when_time_is_over() -> None:
     assert [each.why for each in found.reached] == [LONG]
     assert all(math.isnan(each.value) for each in found.reached)
     assert "it takes long" in sentences(found)[0]
+
+
+def test_what_nothing_open_changes_stays() -> None:
+    shaft = {"name": "s", "ratio": 1, "position": ["90 mm", "-90 mm"],
+             "unbalances": [{"x": "0 mm", "unbalance": "1e-3 kg m", "radius": "30 mm"}]}  # fmt: skip
+    problem = problem_of([limit("envelope radius", max="50 mm"), LIGHT], balancer_shafts=[shaft])
+    result = laufruhe.solve(problem)
+    assert result.status is Status.INFEASIBLE
+    (told,) = result.reached
+    assert told.value == pytest.approx(evaluate(problem).value(problem.limits[-1].measure))
+    assert "stays at" in sentences(result)[0]
+    assert "needed" not in explained(result)

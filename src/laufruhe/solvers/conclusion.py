@@ -192,10 +192,15 @@ def state(problem: Problem, to_start_from: bool = False) -> Result:
     )
 
 
-def none_within(problem: Problem, initial: Evaluation, conflict: tuple[str, ...], timing: dict[str, float]) -> Result:
-    """No design exists: which limits cannot be met together, and how the one given stands to them."""
+def contradiction(conflict: Sequence[str]) -> str:
+    """That no design keeps limits of these names together."""
     names = " and ".join(f"'{name}'" for name in conflict) or "the bounds"
     verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
+    return f"no design exists: {names} {verb}"
+
+
+def none_within(problem: Problem, initial: Evaluation, conflict: tuple[str, ...], timing: dict[str, float]) -> Result:
+    """No design exists: which limits cannot be met together, and how the one given stands to them."""
     return Result(
         problem=problem,
         status=Status.INFEASIBLE,
@@ -205,7 +210,7 @@ def none_within(problem: Problem, initial: Evaluation, conflict: tuple[str, ...]
         limits=limit_values(problem, initial),
         initial=initial,
         final=initial,
-        message=f"no design exists: {names} {verb}",
+        message=contradiction(conflict),
         conflict=conflict,
         timing=timing,
     )

@@ -20,7 +20,8 @@ from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach, certified
-from laufruhe.solvers.conclusion import KEPT, broken_limits, limit_values, nearest_of
+from laufruhe.solvers.conclusion import KEPT, broken_limits, contradiction, limit_values, nearest_of
+from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Nearest, ObjectiveValue, Reached, Result, Status
 
 Solve = Callable[[Problem], Result]
@@ -34,10 +35,11 @@ LONG = "it takes long; give it time by a time limit"
 
 @dataclass(frozen=True, eq=False)
 class _Answer:
-    """What is told of one limit, and the result that it is told of."""
+    """What is told of one limit, the result that it is told of, and whether none keeps the others either."""
 
     told: Reached
     result: Result | None = None
+    is_none: bool = False
 
 
 def with_reachable(found: Result, problem: Problem, kinds: Collection[Kind], took: float, solve: Solve) -> Result:
@@ -71,13 +73,16 @@ def with_reachable(found: Result, problem: Problem, kinds: Collection[Kind], too
     with limited(seconds):
         for limit in asked:
             tell(f"what '{limit.name}' can reach")
-            answers.append(_answer(limit, problem, kinds, found.status, solve))
+            answers.append(_answer(limit, problem, kinds, found, solve))
+        if len(found.conflict) > 1 and any(answer.is_none for answer in answers):
+            found = _narrowed(found, problem, solve)
     designs = [answer.result for answer in answers if answer.result is not None]
     drawn = problem.over is None and not problem.ranks
     for result in designs:
         if drawn and result.final.excess(problem.limits) <= KEPT:
             return _recovered(found, problem, result)
-    found = replace(found, reached=tuple(answer.told for answer in answers))
+    wanted = _wanted(found, problem)
+    found = replace(found, reached=tuple(answer.told for answer in answers if answer.told.name in wanted))
     if found.status is Status.FAILED and drawn:
         found = _excluded(found)
     near = _nearest(found, problem, designs) if drawn and found.status is Status.FAILED else None
@@ -92,7 +97,7 @@ def _wanted(found: Result, problem: Problem) -> Collection[str]:
     return broken or [limit.name for limit in problem.limits]
 
 
-def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], status: Status, solve: Solve) -> _Answer:
+def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], found: Result, solve: Solve) -> _Answer:
     """What one limit can reach while the others hold."""
     measure, edge = limit.measure, limit.maximum
     side = "at most" if edge < math.inf else "at least"
@@ -103,11 +108,12 @@ def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], status: Sta
         return _Answer(replace(told, why=LONG))
     others = tuple(other for other in problem.limits if other is not limit)
     if not measure.channel.is_moved_by(kinds):
-        return _Answer(replace(told, why="nothing that is open changes it"))
+        value = math.nan if found.initial.resonance else found.initial.standing(limit).value
+        return _Answer(replace(told, value=value, why="nothing that is open changes it"))
     try:
         if measure.channel.minimised and side == "at most" and limit.minimum == -math.inf:
             return _least(told, _asking(problem, (Term(measure),), others), solve)
-        return _at_edges(told, limit, problem, others, status, solve)
+        return _at_edges(told, limit, problem, others, found.status, solve)
     except LaufruheError as error:
         return _Answer(replace(told, why=str(error)))
 
@@ -126,7 +132,7 @@ def _least(told: Reached, asked: Problem, solve: Solve) -> _Answer:
     """By the problem that minimises what is limited."""
     result = solve(asked)
     if result.status not in _DESIGNED or result.objective is None:
-        return _Answer(replace(told, why=_none(result)))
+        return _none(told, result)
     proof = result.certificate
     return _Answer(
         replace(
@@ -140,12 +146,25 @@ def _least(told: Reached, asked: Problem, solve: Solve) -> _Answer:
     )
 
 
-def _none(result: Result) -> str:
+def _none(told: Reached, result: Result) -> _Answer:
     """Why nothing is told where the other limits found no design."""
     if result.status is Status.INFEASIBLE:
         names = " and ".join(f"'{name}'" for name in result.conflict)
-        return f"the other limits cannot be met together either{names and ': no design keeps '}{names}"
-    return LONG if passed() else "no design was found that keeps the other limits"
+        why = f"the other limits cannot be met together either{names and ': no design keeps '}{names}"
+        return _Answer(replace(told, why=why), is_none=True)
+    return _Answer(replace(told, why=LONG if passed() else "no design was found that keeps the other limits"))
+
+
+def _narrowed(found: Result, problem: Problem, solve: Solve) -> Result:
+    """With a smallest set of limits that conflict, where a method names more: what one star breaks another may keep."""
+    limits = [limit for limit in problem.limits if limit.name in found.conflict]
+
+    def excluded(kept: Sequence[Limit]) -> bool:
+        asked = _asking(problem, problem.objective, tuple(kept))
+        return not passed() and solve(asked).status is Status.INFEASIBLE
+
+    names = smallest_conflict(limits, excluded)
+    return found if len(names) == len(limits) else replace(found, conflict=names, message=contradiction(names))
 
 
 def _at_edges(
@@ -155,7 +174,7 @@ def _at_edges(
     high = told.side == "at most"
     first = solve(_asking(problem, problem.objective, others))
     if first.status not in _DESIGNED:
-        return _Answer(replace(told, why=_none(first)))
+        return _none(told, first)
     best, reached = first, first.final.standing(limit).value
     missed, bound = told.limit, told.limit if status is Status.INFEASIBLE else math.nan
     for _ in in_time(range(HALVINGS)):

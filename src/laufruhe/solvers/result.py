@@ -150,7 +150,7 @@ class Reached:
     side, limit
         "at most" or "at least", and what was asked for.
     value
-        Of the design found that comes nearest; not a number where none is told.
+        Of the design found that comes nearest, or of every one; not a number where none is told.
     bound
         What no design that keeps the other limits goes beyond; not a number where that is not known.
     proof
@@ -158,7 +158,7 @@ class Reached:
     decisions
         Of that design.
     why
-        Why nothing is told.
+        Why no design is told.
     """
 
     name: str

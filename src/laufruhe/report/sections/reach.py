@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from laufruhe.present.numbers import DASH, figure, with_unit
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.grid import Grid
@@ -35,6 +37,9 @@ def sentences(result: Result) -> list[str]:
 
 
 def _sentence(found: Reached, held: str) -> str:
+    if found.why and math.isfinite(found.value):
+        stands, asked = figure(found.value, found.unit), f"{found.side} {with_unit(found.limit, found.unit)}"
+        return f"'{found.name}' stays at {stands}: {found.why}; {asked} is asked."
     if found.why:
         return f"What '{found.name}' can reach is not told: {found.why}."
     least, beyond = ("least", "lower") if found.side == "at most" else ("largest", "higher")

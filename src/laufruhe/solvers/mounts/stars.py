@@ -29,6 +29,7 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
+from laufruhe.solvers.conclusion import contradiction
 from laufruhe.solvers.mounts.bounds import bounded_under
 from laufruhe.solvers.mounts.nonlinear import solve_mounts, solve_moved
 from laufruhe.solvers.result import Result, Status
@@ -274,8 +275,11 @@ def _none(problem: Problem, found: list[StarDesign], given: Evaluation, designs:
     proven = len(found) == designs and all(f.result.status is Status.INFEASIBLE for f in found)
     first = found[0].result
     status = Status.INFEASIBLE if proven else Status.FAILED
-    message = f"{first.message} (best of {len(found)} of {designs} star(s))"
+    # what one star breaks another may keep
+    told = {name for each in found for name in each.result.conflict} if proven else ()
+    conflict = tuple(limit.name for limit in problem.limits if limit.name in told)
+    message = f"{contradiction(conflict) if proven else first.message} (best of {len(found)} of {designs} star(s))"
     return replace(
         first, problem=problem, status=status, objective=None, certificate=None, initial=given, final=given,
-        message=message, conflict=first.conflict if proven else (),
+        message=message, conflict=conflict,
     )  # fmt: skip

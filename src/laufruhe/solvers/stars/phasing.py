@@ -96,7 +96,7 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
         if phasing.continuous:
             return _uneven(problem, phasing, None)
         if answer.complete:
-            return _none(problem, answer)
+            return _none(problem, answer.infeasible)
         why = f"no feasible design was found in phasing.time_limit = {phasing.time_limit:g} s; raise it"
         return no_star(problem, why, Status.FAILED)
     result = _best_of(problem, phasing, answer)
@@ -163,7 +163,8 @@ def by_each_order(
     if not solved:
         proven = complete and all(design.result.status is not Status.FAILED for design in every)
         why = f"no firing order and no set of shafts that may be built {'keeps' if proven else 'was found that keeps'}"
-        return no_star(problem, f"{why} the limits", Status.INFEASIBLE if proven else Status.FAILED)
+        status, names = Status.INFEASIBLE if proven else Status.FAILED, [limit.name for limit in problem.limits]
+        return no_star(problem, f"{why} the limits", status, tuple(names) if proven else ())
     nothing = nothing_of(problem)
     best = solved[0]
     for design in solved[1:]:
@@ -275,12 +276,11 @@ def _needed(problem: Problem, phasing: Phasing, best: Decided) -> tuple[int, ...
     return kept
 
 
-def _none(problem: Problem, answer: Answer) -> Result:
-    """Stars exist, but none keeps the limits: the conflict of the first one names them."""
-    result = solve_fixed(replace(problem, phasing=None)) if problem.decisions else None
-    names = result.conflict if result is not None else tuple(limit.name for limit in problem.limits)
-    shown = " and ".join(f"'{name}'" for name in names) or "the bounds"
-    why = f"no star keeps {shown}, whatever else is decided ({answer.infeasible} design(s) tried)"
+def _none(problem: Problem, tried: int) -> Result:
+    """Stars exist, but none keeps all limits: one may break some of them, and another the others."""
+    names = tuple(limit.name for limit in problem.limits)
+    shown = (" and ".join(f"'{name}'" for name in names) or "the bounds") + " together" * (len(names) > 1)
+    why = f"no star keeps {shown}, whatever else is decided ({tried} design(s) tried)"
     return no_star(problem, why, conflict=names)
 
 
