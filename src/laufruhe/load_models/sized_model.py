@@ -234,10 +234,16 @@ class SizeModel:
         return np.append(self.mass_box[0], low), np.append(self.mass_box[1], high)
 
     @cached_property
-    def mass_box(self) -> tuple[Array, Array]:
-        """Least and most of the masses within the bounds: they go one way with each size."""
+    def mass_corners(self) -> Array:
+        """Masses at every corner of the bounds, shape (2, ..., 2, 4), an axis for each size."""
         ends = zip(self.lower, self.upper, strict=True)
         found = np.array([self.masses(np.array(each)) for each in itertools.product(*ends)])
+        return found.reshape(*(2,) * len(self.lower), MASSES)
+
+    @cached_property
+    def mass_box(self) -> tuple[Array, Array]:
+        """Least and most of the masses within the bounds: they go one way with each size."""
+        found = self.mass_corners.reshape(-1, MASSES)
         return found.min(axis=0), found.max(axis=0)
 
     @cached_property

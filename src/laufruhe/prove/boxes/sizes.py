@@ -66,7 +66,7 @@ class SizeBoxes:
         # no row is left out for a bend that passes it
         self.is_whole = True
         # for each size whether masses grow with it or fall
-        self._light = self._ways(lambda x: np.abs(self.model.masses(x)))
+        self._light = self._mass_ways()
         self.terms = [(term.weight, self._number(term.measure, 1.0)) for term in problem.objective]
         self.limits: list[tuple[float, Number, Limit]] = []
         for limit in problem.limits:
@@ -118,6 +118,21 @@ class SizeBoxes:
                 if (rises and falls) or way * ways[k] < 0.0:
                     raise ValueError(f"a measure does not go one way with {self.model.problem.decisions[k].name}")
                 ways[k] = way or ways[k]
+        return ways
+
+    def _mass_ways(self) -> Ways:
+        """Of the sizes of masses; none of these passes zero, and each size takes all of them one way at every corner."""
+        found = self.model.mass_corners
+        low, high = self.model.mass_box
+        if np.any((low < 0.0) & (high > 0.0)):
+            raise ValueError("a mass of the running gear passes zero")
+        ways = np.zeros(found.ndim - 1)
+        for k, decision in enumerate(self.model.sizes):
+            change = np.diff(np.abs(found), axis=k)
+            rises, falls = bool(np.any(change > 0.0)), bool(np.any(change < 0.0))
+            if rises and falls:
+                raise ValueError(f"masses do not go one way with {decision.name}")
+            ways[k] = float(rises) - float(falls)
         return ways
 
     def keeping(self, limits: Sequence[Limit]) -> SizeBoxes:
