@@ -231,13 +231,13 @@ samples = 180
 def test_masses_that_pass_zero_bound_nothing() -> None:
     """Journals that reach beyond the pins: whether a thicker web is heavier hangs on the other sizes."""
     text = TEXT.replace(f'diameter = "{JOURNAL} m"', 'diameter = { between = ["50 mm", "128 mm"], start = "60 mm" }', 1)
-    text = text.replace(f'diameter = "{JOURNAL} m"', 'diameter = "140 mm"').replace('"25 mm", "60 mm"', '"20 mm", "80 mm"')
+    text = text.replace(f'diameter = "{JOURNAL} m"', 'diameter = "140 mm"')
+    text = text.replace('"25 mm", "60 mm"', '"20 mm", "80 mm"')
     model = SizeModel(laufruhe.load(text.split("[[constraints]]")[0]))
     low, high = model.mass_box
     assert low[3] < 0.0 < high[3]
     with pytest.raises(ValueError, match="zero"):
         SizeBoxes(model)
-
 
 
 @pytest.mark.slow

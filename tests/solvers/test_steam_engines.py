@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 import laufruhe
+from laufruhe.files.reader import load_tables
 from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Result
 from ready import solved
 
@@ -83,3 +88,26 @@ def test_weight_of_kleins_drive() -> None:
     )
     assert result.objective.value == pytest.approx(best, rel=1e-3)
     assert result.objective.value <= best * (1.0 + 1e-6)
+
+
+@pytest.mark.parametrize("quantity", ["rms roll moment", "degree of irregularity"])
+def test_stars_are_told_apart_by_chambers_that_some_cylinders_have(quantity: str) -> None:
+    """Two of four cylinders work, the others are driven: neighbours in the star or opposite each other."""
+    steam = {"admission": "9 bar", "cut_off": 0.4, "back_pressure": "1.2 bar", "release": 0.93, "compression": 0.15}
+    power = {"cylinders": [1, 2], "end": "head", "bore": "90 mm", "steam": {**steam, "clearance": 0.06}}
+
+    def problem(**throws: Any) -> Problem:
+        engine = {"layout": "inline", "cycle": "two-stroke", "stroke": "100 mm", "bore": "90 mm", "rod_ratio": 0.25}
+        engine |= {"reciprocating_mass": "1 kg", "cylinder_spacing": "110 mm", **throws}
+        told = {"title": "Half a steam engine", "engine": engine, "operating_points": [{"speed": "600 rpm"}]}
+        told |= {"gas": {"model": "chambers", "chambers": [power]}, "flywheel": {"inertia": "20 kg m^2"}}
+        return load_tables({**told, "objective": {"minimise": quantity}}, Path("half.toml"))
+
+    stars = [problem(throws=[0, *rest]) for rest in itertools.permutations((90, 180, 270))]
+    values = [objective_value(star, evaluate(star)) for star in stars]
+    assert max(values) > 1.05 * min(values)
+    result = laufruhe.solve(problem(throws="open", cylinders=4))
+    assert result.objective is not None
+    assert result.certificate is not None
+    assert result.objective.value == pytest.approx(min(values), rel=1e-9)
+    assert str(result.certificate.kind) == "global"

@@ -7,14 +7,18 @@ cylinder, and one cylinder may load those of another.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import replace
 
-from laufruhe.machine import Chambers, Engine, OperatingPoint, Rotor, SliderCrank
+from laufruhe.machine import Chambers, Engine, GasModel, OperatingPoint, Rotor, SliderCrank
+from laufruhe.machine.facing import Facing
+from laufruhe.physics.gas_cycle import alike_under
 from laufruhe.problem.problem import Problem
 
 QUARTERS = (0.0, 0.5 * math.pi, math.pi)
 """Banks that tell what a cylinder loads at any other: all of it leans with the bank, or not at all."""
+SAME = 9
+"""Digits of a lead [rad] that count."""
 
 
 def idle(part: SliderCrank) -> SliderCrank:
@@ -44,6 +48,21 @@ def working(problem: Problem, name: str) -> Problem:
 def motored(problem: Problem) -> Problem:
     """The problem without gas."""
     return replace(problem, fidelity=replace(problem.fidelity, gas=False, gas_orders=None))
+
+
+def gas_tells_apart(problem: Problem) -> bool:
+    """Whether gas that is felt drives some cylinders in another way than others."""
+    if not problem.feels_gas:
+        return False
+    gases = [gas for gas in map(problem.fidelity.gas_of, problem.points) if gas is not None]
+    return len({tuple(_driven(gas, part) for gas in gases) for part in problem.engine.cylinders}) > 1
+
+
+def _driven(gas: GasModel, part: SliderCrank) -> Hashable:
+    """What tells of how gas drives a piston, roundings of the lead of the one that faces it left out."""
+    other = part.facing
+    plain = replace(part, facing=replace(other, ahead=round(other.ahead, SAME))) if isinstance(other, Facing) else part
+    return alike_under(gas, plain)
 
 
 def _working(point: OperatingPoint, name: str) -> OperatingPoint:

@@ -236,9 +236,8 @@ class SizeModel:
     @cached_property
     def mass_corners(self) -> Array:
         """Masses at every corner of the bounds, shape (2, ..., 2, 4), an axis for each size."""
-        ends = zip(self.lower, self.upper, strict=True)
-        found = np.array([self.masses(np.array(each)) for each in itertools.product(*ends)])
-        return found.reshape(*(2,) * len(self.lower), MASSES)
+        corners = itertools.product(*zip(self.lower, self.upper, strict=True))
+        return np.reshape([self.masses(np.array(each)) for each in corners], (*(2,) * len(self.lower), MASSES))
 
     @cached_property
     def mass_box(self) -> tuple[Array, Array]:

@@ -121,7 +121,7 @@ class SizeBoxes:
         return ways
 
     def _mass_ways(self) -> Ways:
-        """Of the sizes of masses; none of these passes zero, and each size takes all of them one way at every corner."""
+        """Of masses: none of them passes zero, and each size takes all of them one way at every corner."""
         found = self.model.mass_corners
         low, high = self.model.mass_box
         if np.any((low < 0.0) & (high > 0.0)):

@@ -11,6 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from laufruhe.errors import ModelError, SolverError
+from laufruhe.load_models.lone_parts import gas_tells_apart
 from laufruhe.machine.firing import MOST_ORDERS
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import tell
@@ -61,7 +62,7 @@ def solve_phasing(problem: Problem) -> Result:
     if phasing is None:
         raise SolverError("nothing of the phasing is open")
     wheel = of_wheel(problem)
-    if phasing.throws is None and wheel and not phasing.continuous:
+    if phasing.throws is None and wheel and not phasing.continuous and not gas_tells_apart(problem):
         return solve_told_alike(problem, phasing, solve_phasing)
     started = time.perf_counter()
     if phasing.throws is not None:
@@ -75,12 +76,13 @@ def solve_phasing(problem: Problem) -> Result:
 
 def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
     is_even = phasing.intervals.holds([phasing.even_interval])
-    if of_wheel(problem):
+    unlike = gas_tells_apart(problem)
+    if of_wheel(problem) and not unlike:
         even = replace(phasing, intervals=Intervals(phasing.even_interval, phasing.even_interval))
         told = solve_told_alike(problem, even, solve_phasing) if is_even and families_of(even)[0] else None
         return _uneven(problem, phasing, None if told is None or told.objective is None else told)
-    alone = phasing.shares_throws or any(measure.is_told_apart for measure in problem.measures)
-    if problem.feels_order and is_even and alone:
+    alone = unlike or phasing.shares_throws or any(measure.is_told_apart for measure in problem.measures)
+    if (problem.feels_order or unlike) and is_even and alone:
         stars = every_star(phasing)
         result = by_each_order(problem, phasing, stars) if stars else no_star(problem, none_fires(phasing)[0])
         if not phasing.continuous:
