@@ -130,7 +130,7 @@ BAD = [
     ('from = "1000 rpm", to = "3000 rpm", step = "5000 rpm"', "", "does not fit between their ends"),
     ('from = "1 m", to = "3000 rpm", points = 3', "", "is not a unit of a speed of rotation"),
     ('from = "1000 rpm", to = "3000 rpm", points = 3', 'operating_point = "idle"', "has no 'idle'"),
-    ('from = "1000 rpm", to = "3000 rpm", points = 3', 'measures = [{ quantity = "mean force" }]', "did you mean"),
+    ('from = "1000 rpm", to = "3000 rpm", points = 3', 'measures = [{ quantity = "mean force" }]', "mean mount force"),
     ('from = "1000 rpm", to = "3000 rpm", points = 3', 'measures = [{ quantity = "balancer mass" }]', "speed changes"),
     (
         'from = "1000 rpm", to = "3000 rpm", points = 3',

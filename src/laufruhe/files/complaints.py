@@ -102,7 +102,11 @@ def _plain(word: str) -> str:
 def nearest(word: str, words: Sequence[str], otherwise: str = "") -> str:
     """A remedy that names the nearest right word, those that hold it, or all of them; `otherwise` in place of all."""
     plain = {_plain(each): each for each in words}
-    holding = sorted(each for each in words if len(word) >= _FEW and word.lower() in each.lower())
+    parts = set(_plain(word).split())
+    holding = sorted(
+        each for each in words
+        if len(word) >= _FEW and (word.lower() in each.lower() or parts < set(_plain(each).split()))
+    )  # fmt: skip
     close = difflib.get_close_matches(_plain(word), plain, n=1, cutoff=_CLOSE)
     if len(holding) == 1 or (close and not holding):
         return f"did you mean '{holding[0] if holding else plain[close[0]]}'?"

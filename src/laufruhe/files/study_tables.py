@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias, get_args, get_origin
 
@@ -107,18 +107,31 @@ def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
     for k, part in enumerate(parts):
         options = _options(here)
         if part not in options:
-            raise Refused(".".join(parts[: k + 1]), None, "is no quantity of this problem", _remedy(here, parts, k))
+            raise Refused(
+                ".".join(parts[: k + 1]), None, "is no quantity of this problem", _remedy(tables, here, parts, k)
+            )
         keys.append(options[part])
         here = here[options[part]]
     return tuple(keys)
 
 
-def _remedy(here: Any, parts: Sequence[str], k: int) -> str:
+def _remedy(tables: dict[str, Any], here: Any, parts: Sequence[str], k: int) -> str:
     """What to do where a path leads nowhere from its part `k` on."""
+    for path in _paths(tables):
+        rest = iter(path)
+        if path[-1] == parts[-1] and all(part in rest for part in parts):
+            return f"write the whole path, {'.'.join(path)}"
     if not (options := list(_options(here))):
         return "name a number of the problem file"
     known = isinstance(here, dict) and field_at(".".join(parts)) is not None
     return nearest(parts[k], options, "write it into the problem file first" if known else "")
+
+
+def _paths(node: Any, above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
+    """Paths of all that tables hold, entries of lists by their names."""
+    for key, name in {key: name for name, key in _options(node).items()}.items():
+        yield (*above, name)
+        yield from _paths(node[key], (*above, name))
 
 
 def parts_of(where: str) -> list[str]:
@@ -289,6 +302,9 @@ def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
 
 def _ends(quantity: str, first: Value, last: Value) -> tuple[str, tuple[float, ...]]:
     unit, numbers = _measured(quantity, (first, last), "from")
+    if numbers is None and isinstance(first, str) and units.dimension_of(first) is not None:
+        remedy = "write its whole path, such as operating_points.1.speed"
+        raise Refused("quantity", quantity, "is no number of a problem file", remedy)
     if numbers is None:
         raise Refused("from", first, "is no number", "list the labels under values")
     return unit, numbers
@@ -308,9 +324,9 @@ def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str
         return ("1", tuple(plain)) if len(plain) == len(values) else ("", None)
     if not texts:
         return "deg" if field is not None and field.plain is not None else "1", tuple(plain)
+    numbers = tuple(measured(text, wanted, given) for text in texts)
     if plain:
         raise Refused(given, list(values), "mixes numbers with and without a unit", "write all alike")
-    numbers = tuple(measured(text, wanted, given) for text in texts)
     unit = units.unit_of(texts[0])
     one = units.parse(f"1 {unit}", wanted)
     return unit or "1", tuple(float(f"{number / one:.{_DIGITS}g}") for number in numbers)
