@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.spectrum import base_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +29,16 @@ class Lines:
     orders: Array
     real: Any
     imaginary: Any
+
+    @property
+    def base(self) -> float:
+        """Lowest order of them: one period of it is enough."""
+        return float(base_of(self.orders.tolist()))
+
+    def sampled(self, steps: int) -> Any:
+        """Values at equal steps of the period, shape (steps, d)."""
+        cosine, sine = waves(self.orders.tolist(), self.base, steps)
+        return (self.real @ cosine - self.imaginary @ sine).T
 
     def kept(self, which: NDArray[np.intp]) -> Lines:
         """Some of the orders."""
@@ -59,3 +70,10 @@ def summed(parts: Sequence[Lines]) -> Lines:
         spread = ca.sparsify(places)
         real, imaginary = real + part.real @ spread, imaginary + part.imaginary @ spread
     return Lines(orders, real, imaginary)
+
+
+def waves(orders: Sequence[float], base: float, samples: int) -> tuple[Any, Any]:
+    """Cosines and sines of orders at equal steps over the period of `base`, shape (n, samples)."""
+    angles = 2.0 * np.pi / base * np.arange(samples) / samples
+    phases = np.outer(orders, angles)
+    return ca.DM(np.cos(phases)), ca.DM(np.sin(phases))

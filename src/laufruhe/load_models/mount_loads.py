@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import casadi as ca
@@ -11,37 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.affine import AffineModel
+from laufruhe.load_models.lines import Lines
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.uneven_model import Symbols, UnevenModel
 from laufruhe.machine import OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
-from laufruhe.numerics.spectrum import base_of, common_base
+from laufruhe.numerics.spectrum import common_base
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
 KEPT_SHARE = 1e-4
 PROBES = 6
-
-
-@dataclass(frozen=True, eq=False)
-class SymbolicLoads:
-    """Wrenches about the origin that matter at one operating point, transformed.
-
-    Attributes
-    ----------
-    orders
-        Shape (n,).
-    period
-        Lowest order of what is left: one period of it is enough.
-    real, imaginary
-        Shape (6, n).
-    """
-
-    orders: Array
-    period: float
-    real: Any
-    imaginary: Any
 
 
 class FixedThrows:
@@ -51,11 +31,11 @@ class FixedThrows:
         self._problem, self._model, self._u = problem, model, unbalances
         self._reach = np.concatenate([np.full(d.width, d.scale) for d in model.domains] or [np.zeros(0)])
 
-    def wrenches(self, moved: Array) -> list[SymbolicLoads]:
+    def wrenches(self, moved: Array) -> list[Lines]:
         """Per operating point, times a matrix of shape (6, 6): bare design and every column, the orders that matter."""
         return [self._at(bare, slopes, moved) for bare, slopes in self._model.wrenches()]
 
-    def _at(self, bare: Any, slopes: Sequence[Any], moved: Array) -> SymbolicLoads:
+    def _at(self, bare: Any, slopes: Sequence[Any], moved: Array) -> Lines:
         base = common_base([bare.base, *(slope.base for slope in slopes)])
         spectra = [spectrum.rebased(base).coefficients for spectrum in (bare, *slopes)]
         longest = max(len(c) for c in spectra)
@@ -63,9 +43,8 @@ class FixedThrows:
         size = np.abs(loads[0]).max(axis=1, initial=0.0)
         size += (np.abs(loads[1:]).max(axis=2, initial=0.0) * self._reach[:, None]).sum(axis=0)
         kept = _felt(size, np.arange(longest, dtype=float))
-        period = float(common_base([int(k) * base for k in kept if k > 0] or [base]))
         real, imaginary = (self._expression(part[:, kept]) for part in (loads.real, loads.imag))
-        return SymbolicLoads(np.asarray(kept, dtype=float) * float(base), period, real, imaginary)
+        return Lines(np.asarray(kept, dtype=float) * float(base), real, imaginary)
 
     def _expression(self, loads: Array) -> Any:
         """Loads (1 + columns, n, 6) as an expression of the unbalances, shape (6, n)."""
@@ -94,14 +73,13 @@ class MovedThrows:
         self._turns, self._u = turns, unbalances
         self._at = Symbols(*moves.angles(turns), unbalances)
 
-    def wrenches(self, moved: Array) -> list[SymbolicLoads]:
+    def wrenches(self, moved: Array) -> list[Lines]:
         """Orders that matter at any of a few designs."""
         return [self._wrenches_at(point, moved) for point in self._problem.points]
 
-    def _wrenches_at(self, point: OperatingPoint, moved: Array) -> SymbolicLoads:
+    def _wrenches_at(self, point: OperatingPoint, moved: Array) -> Lines:
         found = self._model.wrench(point, self._at).mapped(moved)
-        kept = found.kept(_felt(self._sizes([found.real, found.imaginary]), found.orders))
-        return SymbolicLoads(kept.orders, float(base_of(kept.orders.tolist())), kept.real, kept.imaginary)
+        return found.kept(_felt(self._sizes([found.real, found.imaginary]), found.orders))
 
     def _sizes(self, parts: Sequence[Any]) -> Array:
         """Largest component of every order over designs drawn at random: a star that cancels shows nothing itself."""

@@ -9,7 +9,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from laufruhe.load_models.mount_symbols import SymbolicResponse, waves
+from laufruhe.load_models.lines import waves
+from laufruhe.load_models.mount_symbols import SymbolicResponse
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.problem import channels

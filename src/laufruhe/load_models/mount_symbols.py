@@ -7,7 +7,6 @@ closed form; its derivatives are exact.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -188,10 +187,3 @@ def response(mounts: SymbolicMounts, omegas: Array, real: Any, imaginary: Any) -
         (mounts.travels @ yr, mounts.travels @ yi),
         (mounts.springs @ firm[0], mounts.springs @ firm[1]),
     )
-
-
-def waves(orders: Sequence[float], base: float, samples: int) -> tuple[Any, Any]:
-    """Cosines and sines of orders at equal steps over the period of `base`, shape (n, samples)."""
-    angles = 2.0 * np.pi / base * np.arange(samples) / samples
-    phases = np.outer(orders, angles)
-    return ca.DM(np.cos(phases)), ca.DM(np.sin(phases))

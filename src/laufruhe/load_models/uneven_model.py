@@ -19,13 +19,12 @@ from numpy.typing import NDArray
 
 from laufruhe.load_models.lines import Lines
 from laufruhe.load_models.mount_rows import SAMPLES_PER_ORDER
-from laufruhe.load_models.mount_symbols import waves
 from laufruhe.load_models.turned_loads import Felt, TurnedLoads
 from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
-from laufruhe.numerics.spectrum import Spectrum, as_order, base_of
+from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.mount_forces import RigidMounting
 from laufruhe.physics.mounting import mount_maps, mounting_of, travel_of
 from laufruhe.problem import channels
@@ -118,7 +117,7 @@ class UnevenModel:
         # points keep orders of their own: every signal has as many steps as the finest needs
         steps = max(_steps(place) for places in signals for place in places)
         for point, places in zip(chosen, signals, strict=True):
-            values = [_sampled(place, steps) for place in places]
+            values = [place.sampled(steps) for place in places]
             if mapped:
                 values = [values[0] @ ca.DM(m.real).T for m in self._maps(measure, 0.0, point)]
             blocks += values
@@ -242,14 +241,7 @@ def _wrench_of(loads: PointLoads) -> Spectrum:
 
 def _steps(lines: Lines) -> int:
     """That a period needs."""
-    base = float(base_of(lines.orders.tolist()))
-    return max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * float(lines.orders.max()) / base))
-
-
-def _sampled(lines: Lines, steps: int) -> Any:
-    """Values at equal steps of the period, shape (steps, d)."""
-    cosine, sine = waves(lines.orders.tolist(), float(base_of(lines.orders.tolist())), steps)
-    return (lines.real @ cosine - lines.imaginary @ sine).T
+    return max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * float(lines.orders.max()) / lines.base))
 
 
 def rides_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:

@@ -195,7 +195,7 @@ class SmoothProgram:
         """Response to the orders that matter (E4)."""
         moved = self._root @ moved_wrench(NUMBERS, self._mounting.block.centre_of_gravity)
         return [
-            PointResponse(point.name, point.weight, w.period, w.orders,
+            PointResponse(point.name, point.weight, w.base, w.orders,
                    response(self._mounts, w.orders * point.speed, w.real, w.imaginary))
             for point, w in zip(self.problem.points, self._loads.wrenches(moved), strict=True)
         ]  # fmt: skip
