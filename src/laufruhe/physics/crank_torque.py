@@ -11,7 +11,7 @@ from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
-from laufruhe.physics.mechanism import TWO_ORDER_ROLL, Direction, Effect, resolved_orders, two_order_roll
+from laufruhe.physics.mechanism import TWO_ORDER_ROLL, Direction, Effect, reduced, resolved_orders, two_order_roll
 from laufruhe.physics.star_loads import star_loads
 from laufruhe.physics.wrench import ROLL
 
@@ -46,12 +46,7 @@ def _short(part: SliderCrank, is_rigid: bool) -> ComplexArray:
 
 def _orders(part: SliderCrank, is_rigid: bool) -> ComplexArray:
     def torque(alpha: np.ndarray) -> tuple[np.ndarray]:
-        motion = part.motion(np, alpha)
-        total = np.zeros(len(alpha))
-        for mass, (_, velocity, acceleration) in motion.points:
-            total -= mass * (np.conj(velocity) * acceleration).real
-        for inertia, (rate, swing) in motion.swings if is_rigid else ():
-            total -= inertia * rate * swing
-        return (part.shaft.ratio * total,)
+        _, slope = reduced(part.motion(np, alpha), is_rigid)
+        return (-0.5 * part.shaft.ratio * slope,)
 
     return np.asarray(resolved_orders(torque, np.ones((1, 1)), part.name)[0])

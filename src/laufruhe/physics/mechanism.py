@@ -89,6 +89,17 @@ def momentum_loads(part: SliderCrank, motion: Motion, square: Any, turning: Any 
     return force, roll, rods
 
 
+def reduced(motion: Motion, with_rods: bool = True) -> tuple[Any, Any]:
+    """Inertia that a motion reduces to its own crank [kg m2], and its derivative by the angle of that (F3)."""
+    inertia, slope = 0.0, 0.0
+    for mass, (_, velocity, acceleration) in motion.points:
+        inertia = inertia + mass * np.abs(velocity) ** 2
+        slope = slope + 2.0 * mass * (np.conj(velocity) * acceleration).real
+    for own, (rate, swing) in motion.swings if with_rods else ():
+        inertia, slope = inertia + own * rate**2, slope + 2.0 * own * rate * swing
+    return inertia, slope
+
+
 def cylinder_wrench(part: SliderCrank, motion: Motion, axis: Any, square: Any, turning: Any = 0.0,
                     with_rods: bool = True) -> Any:  # fmt: skip
     """Wrench of `momentum_loads`, shape (6, ...), of a cylinder whose axis is a unit number (C4)."""

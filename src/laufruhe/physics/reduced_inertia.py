@@ -11,6 +11,7 @@ import numpy as np
 
 from laufruhe.machine import Engine, SliderCrank, Torsion
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.mechanism import reduced
 
 _STEPS = 1024
 
@@ -25,14 +26,8 @@ def reduced_inertia(part: SliderCrank) -> float:
 
 @lru_cache(maxsize=256)
 def _reduced_inertia(part: SliderCrank) -> float:
-    motion = part.motion(np, 2.0 * math.pi * np.arange(_STEPS) / _STEPS)
-    swinging = sum(
-        mass * float(np.mean(np.abs(velocity * np.ones(_STEPS)) ** 2)) for mass, (_, velocity, _) in motion.points
-    )
-    turning = sum(
-        inertia * float(np.mean((rate * np.ones(_STEPS)) ** 2)) for inertia, (rate, _) in motion.swings if inertia
-    )
-    return part.rotating_mass * part.crank_radius**2 + swinging + turning
+    inertia, _ = reduced(part.motion(np, 2.0 * math.pi * np.arange(_STEPS) / _STEPS))
+    return part.rotating_mass * part.crank_radius**2 + float(np.mean(inertia * np.ones(_STEPS)))
 
 
 def turned_by(chain: Torsion, before: Sequence[SliderCrank], after: Sequence[SliderCrank]) -> Torsion:

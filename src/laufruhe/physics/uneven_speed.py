@@ -22,7 +22,7 @@ from laufruhe.numerics.turns import as_turn, cis
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_factor
-from laufruhe.physics.mechanism import cylinder_wrench
+from laufruhe.physics.mechanism import cylinder_wrench, reduced
 from laufruhe.physics.wrench import ROLL, plane_wrench
 
 _ROUNDS = 60
@@ -171,13 +171,8 @@ def moving_inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Arra
     """That of pistons and rods alone, reduced to the crank, and its derivative by the crank angle (F3)."""
     total, slope = np.zeros(len(phi)), np.zeros(len(phi))
     for part in engine.slider_cranks:
-        ratio, motion = part.shaft.ratio, part.motion(np, _alpha(part, phi))
-        for mass, (_, velocity, acceleration) in motion.points:
-            total += mass * ratio**2 * np.abs(velocity) ** 2
-            slope += 2.0 * mass * ratio**3 * (np.conj(velocity) * acceleration).real
-        for inertia, (rate, swing) in motion.swings if fidelity.rod == "rigid" else ():
-            total += inertia * ratio**2 * rate**2
-            slope += 2.0 * inertia * ratio**3 * rate * swing
+        ratio, (inertia, steep) = part.shaft.ratio, reduced(part.motion(np, _alpha(part, phi)), fidelity.rod == "rigid")
+        total, slope = total + ratio**2 * inertia, slope + ratio**3 * steep
     return total, slope
 
 
