@@ -13,10 +13,12 @@ from laufruhe.cli import app
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.files.study_tables import SweepTable, axis_of
+from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.solvers import solve, state
 from laufruhe.studies import run
 from laufruhe.studies.reader import load_study
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed
+from problem_files import PROBLEMS
 
 LIMIT = "constraints.1.max"
 SHAFT = """
@@ -139,3 +141,45 @@ def test_limits_are_swept_in_their_own_dimension() -> None:
     assert (listed.unit, listed.numbers, listed.name) == ("kg", (2.0, 0.5), "weight, at most")
     place = axis_of(SweepTable.model_validate({"quantity": "mounts.places.a.position.1", "values": ["1 m", "2 m"]}))
     assert place.name == "position 1"
+
+
+NEWER_KEYS = {
+    "fluid": 'fluid_track = { axis = "z", mass = "28 kg", bulge_stiffness = "220 N/mm", chamber_stiffness = "4 N/mm", '
+    'damping = "700 N s/m" }\n',
+    "table": 'dynamic_stiffness = { axis = "z", file = "hydraulic-mount.csv" }\n',
+    "joined": '[[mounts.places]]\njoined_to = "first"\nturned = [0, 35, 0]\n'
+    'stiffness = ["60 N/mm", "60 N/mm", "90 N/mm"]\ndamping_per_stiffness = "0.6 ms"\n',
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("key", NEWER_KEYS)
+def test_studies_of_newer_mounts_have_the_loads_of_their_designs(tmp_path: Path, key: str) -> None:
+    (tmp_path / "hydraulic-mount.csv").write_bytes((PROBLEMS / "hydraulic-mount.csv").read_bytes())
+    places = [("first", 300, 220), ("right", 300, -220), ("rear", -420, 0)]
+    mounts = '[mounts]\nkind = "elastic"\nloss_factor = 0.1\n'
+    for name, x, y in places:
+        mounts += f'[[mounts.places]]\nname = "{name}"\nposition = ["{x} mm", "{y} mm", "0 mm"]\n'
+        mounts += 'stiffness = ["120 N/mm", "150 N/mm", "200 N/mm"]\n' + (NEWER_KEYS[key] if name == "first" else "")
+    problem = '[objective]\nminimise = "mean mount force"\n' + SHAFT.partition("[search]")[0]
+    draws = study(tmp_path, "random designs", "draws = 4", problem="")
+    (tmp_path / "soft.toml").write_text(ENGINE + BLOCK + mounts + problem)
+    found, scene = computed(draws), load(tmp_path / "soft.toml")
+    for unbalance, told in zip(found["left.unbalance"].values[0], found["objective"].values[0], strict=True):
+        design = scene.design([complex(unbalance)])
+        assert told == pytest.approx(objective_value(scene, evaluate(scene, design)), rel=1e-9)
+    speed = scene.points[0].speed
+    lines = f'speeds = {{ from = "{0.9 * speed!r} rad/s", to = "{speed!r} rad/s", points = 2 }}\n'
+    draws.write_text(draws.read_text().replace("random designs", "speed map").replace("draws = 4", lines))
+    (tmp_path / "kept.jsonl").unlink(missing_ok=True)
+    seen = computed(draws)
+    last = np.flatnonzero((seen["design"].values == "as given") & (seen["speed"].values == seen["speed"].values.max()))
+    told = float(seen["value"].values[last[0], 0])
+    assert told == pytest.approx(objective_value(scene, evaluate(scene, scene.engine)), rel=1e-5)
+
+
+@pytest.mark.slow
+def test_explain_says_at_which_stiffness_modes_are() -> None:
+    told = CliRunner().invoke(app, ["explain", str(PROBLEMS / "powertrain-hydraulic.toml")])
+    assert told.exit_code == 0
+    assert "modes are of the stiffness at rest" in told.output

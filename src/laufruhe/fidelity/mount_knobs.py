@@ -96,7 +96,8 @@ class _Modes(_OfElasticMounts):
         if scale.mounting is None or fidelity.mounts != "frequency":
             return []
         modes = scale.excited_modes if fidelity.modes is None else fidelity.modes
-        return [f"mode(s) {mode_names(scale.mounting, modes)} of the block on its mounts"]
+        rest = "; modes are of the stiffness at rest, loads of that at each frequency" if scale.mounting.dynamic else ""
+        return [f"mode(s) {mode_names(scale.mounting, modes)} of the block on its mounts{rest}"]
 
     def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
         if scale.mounting is None:
