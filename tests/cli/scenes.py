@@ -8,9 +8,9 @@ from pathlib import Path
 
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Result, solve, state
-from problem_files import FOUR, MOUNTS, SECOND_ORDER_SHAFTS, loaded
+from problem_files import FOUR, MOUNTS, PROBLEMS, SECOND_ORDER_SHAFTS, loaded
 
-READY = Path(__file__).parents[2] / "problems" / "tractor-four-lanchester.toml"
+READY = PROBLEMS / "tractor-four-lanchester.toml"
 
 _SPEED = '[[operating_points]]\nspeed = "2500 rpm"\n'
 

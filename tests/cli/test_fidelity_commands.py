@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from cli import scenes
 from laufruhe.cli import app
-from problem_files import written
+from problem_files import PROBLEMS, written
 
 RUN = CliRunner()
 
@@ -69,7 +69,7 @@ def test_trade_of_a_damaged_file(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_trade_of_a_question_about_modes(tmp_path: Path) -> None:
     """No load enters, so every fidelity is right, and the mounts alone are the cheapest."""
-    path, out = Path(__file__).parents[2] / "problems" / "powertrain-torque-roll.toml", tmp_path / "trade.json"
+    path, out = PROBLEMS / "powertrain-torque-roll.toml", tmp_path / "trade.json"
     answer = RUN.invoke(app, ["trade", str(path), "--out", str(tmp_path / "trade"), "--json", str(out)])
     assert answer.exit_code == 0, answer.output
     (data,) = json.loads(out.read_text(encoding="utf-8"))
@@ -100,7 +100,7 @@ def test_trade_of_elastic_mounts(tmp_path: Path) -> None:
 
 
 def test_trade_where_a_star_is_open(tmp_path: Path) -> None:
-    path, out = Path(__file__).parents[2] / "problems" / "inline-five-open.toml", tmp_path / "trade.json"
+    path, out = PROBLEMS / "inline-five-open.toml", tmp_path / "trade.json"
     answer = RUN.invoke(app, ["trade", str(path), "--out", str(tmp_path / "trade"), "--json", str(out)])
     assert answer.exit_code == 0, answer.output
     (data,) = json.loads(out.read_text(encoding="utf-8"))
@@ -110,7 +110,7 @@ def test_trade_where_a_star_is_open(tmp_path: Path) -> None:
 
 def _elastic_with_a_shaft() -> str:
     """The tractor on elastic mounts as they are given, its shafts open, at idle."""
-    text = (Path(__file__).parents[2] / "problems" / "tractor-four-elastic.toml").read_text(encoding="utf-8")
+    text = (PROBLEMS / "tractor-four-elastic.toml").read_text(encoding="utf-8")
     text = re.sub(r"\{ between = [^}]*start = (\"[^\"]*\") \}", r"\1", text)
     text = text.replace("turned    = [{ between = [0, 60] }, 0, 0]", "turned    = [0, 0, 0]")
     idle, rest = text.split('[[operating_points]]\nname  = "work"', 1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -13,8 +12,7 @@ from laufruhe.files.reader import load
 from laufruhe.problem.problem import Problem
 from laufruhe.studies import rigid_digits
 from laufruhe.studies.rigid_digits import rigid_part
-
-PROBLEMS = Path(__file__).parents[2] / "problems"
+from problem_files import PROBLEMS
 
 
 @pytest.mark.parametrize("seed", range(24))

@@ -24,9 +24,8 @@ from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
-from problem_files import written
+from problem_files import PROBLEMS, written
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 EVERY = 10_000
 
 

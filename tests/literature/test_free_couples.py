@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +23,7 @@ from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import rotating_loads, shaking_loads
 from laufruhe.studies.kinds.free_forces import FreeLoad, free_load
+from problem_files import PROBLEMS
 
 TWO_ORDER = Fidelity(kinematics="two-order")
 HALF_DIGIT = 0.00005
@@ -209,7 +209,6 @@ def test_higher_orders_and_offset_tell() -> None:
     assert abs(_loads(row, 3, offset=0.012)[2]) > 1e-3 * UNIT_FORCE
 
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 ROOT = math.sqrt
 # ready problem: forces and couples of orders 1 and 2, and the longest firing interval [deg]
 READY = {

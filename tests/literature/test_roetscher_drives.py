@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,8 @@ import laufruhe
 from laufruhe.machine import SliderCrank
 from laufruhe.machine.swinging_yoke import SwingingYoke
 from laufruhe.physics.shaking_loads import shaking_loads
+from problem_files import PROBLEMS
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 FILE = """
 title = "drive"
 [engine]

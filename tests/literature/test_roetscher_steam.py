@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,8 +13,9 @@ from laufruhe.physics.shaking_loads import reciprocating_loads
 from laufruhe.physics.torque import torque_facts
 from laufruhe.physics.working_chambers import chambers_thrust
 from laufruhe.problem.problem import Problem
+from problem_files import PROBLEMS
 
-READY = Path(__file__).parents[2] / "problems" / "waterworks-steam-pump.toml"
+READY = PROBLEMS / "waterworks-steam-pump.toml"
 CM2, KILOPOND = 1e-4, 9.80665
 AT = KILOPOND / CM2
 WEIGHT = 9.81

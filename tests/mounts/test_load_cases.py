@@ -26,6 +26,7 @@ from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 from mounts.powertrain import random_mounting
+from problem_files import PROBLEMS
 from prove.test_subdivision import boxes
 
 TORQUE = LoadCase("torque", moment=(180.0, 0.0, 0.0), force=(0.0, 300.0, -50.0), place=(0.3, -0.1, 0.2))
@@ -142,7 +143,7 @@ def test_no_design_of_a_box_is_under_its_bound(name: str, gap: str, tmp_path: Pa
 @pytest.mark.parametrize("asked", ["static travel", "static mount force"])
 def test_joined_and_hydraulic_mounts_with_stops_are_bounded_too(name: str, asked: str) -> None:
     """Boxes of every size, at random and at corners."""
-    tables = tomllib.loads((Path(__file__).parents[2] / "problems" / f"{name}.toml").read_text(encoding="utf-8"))
+    tables = tomllib.loads((PROBLEMS / f"{name}.toml").read_text(encoding="utf-8"))
     tables["mounts"]["stop"] = {"gap": "4 mm", "stiffness": "1200 N/mm"}
     tables["load_cases"] = [{"name": "bump", "times_weight": [0.2, 0, -3]}, {"name": "torque", "torque": "350 N m"}]
     tables["constraints"] = [{"limit": asked, "max": "1 m" if asked == "static travel" else "1 MN"}]

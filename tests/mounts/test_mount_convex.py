@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,8 +19,8 @@ from laufruhe.solvers.mounts.convex import ConvexDuals, convex_program, dual_bou
 from laufruhe.solvers.mounts.nonlinear import solve_mounts
 from laufruhe.solvers.result import Status
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed, problem_of
+from problem_files import PROBLEMS
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 RPM = np.pi / 30.0
 
 

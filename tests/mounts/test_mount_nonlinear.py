@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -23,8 +22,8 @@ from laufruhe.solvers.mounts.nonlinear import solve_joint, solve_mounts
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.smooth.program import SmoothProgram
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, problem_of
+from problem_files import PROBLEMS
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 SHAFTS = SECOND_ORDER_SHAFTS.replace("60 mm", "100 mm")
 FORCE = '[objective]\nminimise = "{measure} mount force"\n'
 LIMITS = """

@@ -2,7 +2,6 @@
 
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,9 +20,9 @@ from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.stars.search import search_stars
 from phasing import engines
+from problem_files import PROBLEMS
 from ready import solved
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 SQRT2, SQRT10 = math.sqrt(2.0), math.sqrt(10.0)
 
 

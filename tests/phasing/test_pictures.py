@@ -1,7 +1,6 @@
 """Pictures of stars, firings and the trade, and the command that makes them."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,8 +10,7 @@ from laufruhe.cli import app
 from laufruhe.plots.results import firings, star, trade
 from laufruhe.solvers import solve
 from phasing import engines
-
-PROBLEMS = Path(__file__).parents[2] / "problems"
+from problem_files import PROBLEMS
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -20,11 +19,10 @@ from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.search import search_stars
 from laufruhe.solvers.throws.uneven import local_optimum
 from phasing import engines
-from problem_files import loaded
+from problem_files import PROBLEMS, loaded
 from ready import solved
 from smooth import AtItsValues, smooth_value
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 SPLIT = "bank_angle = { between = [60, 100] }\nsplit_pin_angle = { between = [0, 60] }\n"
 
 

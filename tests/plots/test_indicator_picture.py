@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +12,9 @@ from laufruhe.machine import Chambers, Steam
 from laufruhe.plots.results import cycle, engine, indicator
 from laufruhe.solvers import Result
 from picture_faults import drawn_texts, overlaps
+from problem_files import PROBLEMS
 
-READY = Path(__file__).parents[2] / "problems" / "waterworks-steam-pump.toml"
+READY = PROBLEMS / "waterworks-steam-pump.toml"
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from laufruhe.files.reader import load
@@ -11,8 +9,7 @@ from laufruhe.plots.results import campbell, modes
 from laufruhe.present.mounting import at_which_stiffness, facts_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.solvers import solve
-
-PROBLEMS = Path(__file__).parents[2] / "problems"
+from problem_files import PROBLEMS
 
 
 @pytest.mark.parametrize(("name", "depends"), [("powertrain-hydraulic", True), ("powertrain-decoupling", False)])

@@ -17,9 +17,8 @@ from laufruhe.machine import Role
 from laufruhe.physics.shaking_loads import rotating_loads, rotor_loads
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
-from problem_files import changed, loaded, open_unbalance, shaft, written
+from problem_files import PROBLEMS, changed, loaded, open_unbalance, shaft, written
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 ENGINE = """
 title = "Vee"
 [engine]

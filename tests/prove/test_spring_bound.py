@@ -36,6 +36,7 @@ from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.prove.springs.search import SpringBoxes
 from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
+from problem_files import PROBLEMS
 from prove.test_subdivision import DAMPED, asked_for
 
 OPEN = '{ between = ["60 N/mm", "700 N/mm"], start = "300 N/mm" }'
@@ -66,7 +67,7 @@ max = "30 Hz"
 limit = "static sag"
 max = "10 mm"
 """
-POWERTRAIN = Path(__file__).parents[2] / "problems" / "powertrain-least-force.toml"
+POWERTRAIN = PROBLEMS / "powertrain-least-force.toml"
 
 
 def designs_of(problem: Problem, low: np.ndarray, high: np.ndarray, count: int, seed: int) -> list[tuple[Any, float]]:

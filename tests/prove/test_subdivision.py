@@ -21,8 +21,8 @@ from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.mounts.search import judged_at
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
+from problem_files import PROBLEMS
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 DAMPED = changed(
     MOUNTS,
     ('position  = ["300', 'damping = ["0 N s/m", "300 N s/m", "900 N s/m"]\nposition  = ["300'),

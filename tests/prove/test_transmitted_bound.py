@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import cvxpy as cp
 import numpy as np
@@ -19,8 +18,8 @@ from laufruhe.problem.measure import Measure, Term
 from laufruhe.prove.mounts.transmitted import least_transmitted, softest_of, transmitted_bound
 from laufruhe.prove.quadratics import Quadratic, best_prices, covering
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
+from problem_files import PROBLEMS
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 FORCE = '[objective]\nminimise = "rms mount force"\norders = [2]\n'
 LOSSLESS = ("loss_factor = 0.1", "loss_factor = 0.0")
 OVER_CENTRE = ('centre_of_gravity = ["0 mm", "0 mm", "120 mm"]', 'centre_of_gravity = ["0 mm", "0 mm", "0 mm"]')

@@ -23,9 +23,8 @@ from laufruhe.prove.certificate import Proof, lower_bound
 from laufruhe.solvers import Status, solve
 from laufruhe.solvers.cones import conic
 from laufruhe.solvers.cones.conic import TIGHT, solve_cones
-from problem_files import loaded
+from problem_files import PROBLEMS, loaded
 
-PROBLEMS = Path(__file__).resolve().parents[2] / "problems"
 NAMES = ("tractor-single", "tractor-two", "tractor-four-lanchester", "tractor-four-lanchester-and-moment",
          "tractor-four-front-force-and-moment", "tractor-six", "vee-six-60", "vee-eight-cross")  # fmt: skip
 

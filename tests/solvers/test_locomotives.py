@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +14,8 @@ from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.problem import Problem
 from laufruhe.report.wording import headline
 from laufruhe.solvers import Result
+from problem_files import PROBLEMS
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 pytestmark = pytest.mark.slow
 
 MASS, PIN, RADIUS, ROD = 320.0, 290.0, 0.33, 2.6

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +11,9 @@ import laufruhe
 from laufruhe.machine.swinging_yoke import SwingingYoke
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Result
+from problem_files import PROBLEMS
 
-PROBLEM = Path(__file__).parents[2] / "problems" / "shaper.toml"
+PROBLEM = PROBLEMS / "shaper.toml"
 STEPS = 512
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,9 +18,9 @@ from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Result
+from problem_files import PROBLEMS
 from ready import solved
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 pytestmark = pytest.mark.slow
 
 

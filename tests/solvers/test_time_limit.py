@@ -15,9 +15,8 @@ from laufruhe.cli import app
 from laufruhe.files.reader import load
 from laufruhe.numerics.budget import in_time, left, limited, passed, rounds
 from laufruhe.solvers import CUT_SHORT, Status, solve
-from problem_files import written
+from problem_files import PROBLEMS, written
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 # a problem of every kind of search, and what its whole search finds
 OPTIMA = {
     "tractor-four-lanchester": 227.3,

@@ -16,9 +16,8 @@ from laufruhe.studies.kinds.replication import Replication
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.replication.expressions import value_of
 from laufruhe.studies.runner import run
+from problem_files import PROBLEMS
 from shared import once
-
-PROBLEMS = Path(__file__).parents[2] / "problems"
 
 
 @cache

@@ -22,9 +22,7 @@ from laufruhe.studies.kinds.free_forces import printed_agree
 from laufruhe.studies.kinds.tolerance import verdicts
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.worth import worths
-from problem_files import written
-
-PROBLEMS = Path(__file__).parents[2] / "problems"
+from problem_files import PROBLEMS, written
 
 ECONOMICS = f"""
 title = "t"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -24,8 +23,8 @@ from laufruhe.studies.equal_power import at_equal_power, check_comparable
 from laufruhe.studies.kinds.economics import Economics
 from laufruhe.studies.scenes import Point, Scenes, with_shafts
 from laufruhe.studies.worth import NEXT, PLAIN, SHAFTS, Judgement, best, front, verdicts, worths
+from problem_files import PROBLEMS
 
-PROBLEMS = Path(__file__).resolve().parents[2] / "problems"
 FOUR = PROBLEMS / "tractor-four-lanchester-and-moment.toml"
 LIMITS = (0.0, 0.5, 1.0, 2.0, 4.0)
 

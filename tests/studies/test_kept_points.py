@@ -13,8 +13,8 @@ import xarray as xr
 from laufruhe.studies import run
 from laufruhe.studies.kept_points import KEPT, KeptPoints
 from laufruhe.studies.reader import load_study
+from problem_files import PROBLEMS
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 MARKS = [f"{k:032x}" for k in range(5)]
 RECORDS = [{"objective": 100.125 + k, "status": "optimal", "lower_bound": math.nan} for k in range(5)]
 STUDY = """

@@ -21,8 +21,8 @@ from laufruhe.studies.replication.judging import CONFIRMED, NOT_CONFIRMED, count
 from laufruhe.studies.replication.models import Hue, StatementTable
 from laufruhe.studies.scenes import Scenes
 from laufruhe.studies.text import Rows
+from problem_files import PROBLEMS
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 READY = {
     "replication-five-cylinder": (6, ["Second-order couple (Fig. 2.8.13)"]),
     "replication-free-couples": (17, []),

@@ -23,9 +23,8 @@ from laufruhe.studies import run
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.reader import load_study
 from mounts.files import BLOCK, ENGINE, MOUNTS, OPEN
-from problem_files import written
+from problem_files import PROBLEMS, written
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 RPM = np.pi / 30.0
 CASE = '[[study.parts.cases]]\nname = "{name}"\nproblem = "{problem}"\n'
 

@@ -36,8 +36,8 @@ from laufruhe.studies.kinds.replication import Replication
 from laufruhe.studies.part import Part
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.swept import solved
+from problem_files import PROBLEMS
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 SPEED = "operating_points.1.mean_piston_speed"
 FRACTION = "counterweights.web.balance_factor"
 

@@ -17,8 +17,8 @@ from laufruhe.files.study_tables import CaseTable, SweepTable, axis_of, field_at
 from laufruhe.studies import Point, Scenes, run
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.swept import dataset, solved
+from problem_files import PROBLEMS
 
-PROBLEMS = Path(__file__).parents[2] / "problems"
 SPEED = "operating_points.1.mean_piston_speed"
 FRACTION = "counterweights.web.balance_factor"
 

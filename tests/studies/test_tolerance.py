@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -21,8 +20,8 @@ from laufruhe.studies.kinds.tolerance import (
     worst_parts,
 )
 from laufruhe.studies.scenes import Point
+from problem_files import PROBLEMS
 
-PROBLEMS = Path(__file__).resolve().parents[2] / "problems"
 KILOPOND = 9.80665
 
 

@@ -38,10 +38,10 @@ from laufruhe.physics.shaking_loads import (
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from one_cylinder import inertia_coefficients
-from problem_files import changed, loaded
+from problem_files import PROBLEMS, changed, loaded
 from ready import solved
 
-READY = Path(__file__).parents[2] / "problems" / "radial-seven.toml"
+READY = PROBLEMS / "radial-seven.toml"
 TEXT = """
 title = "Radial"
 [engine]

@@ -8,7 +8,6 @@ from __future__ import annotations
 import cmath
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,12 +15,13 @@ import pytest
 import laufruhe
 from laufruhe.machine import Chamber, Chambers, Pump, Steam
 from laufruhe.physics.shaking_loads import shaking_loads
+from problem_files import PROBLEMS
 from validation import multibody
 from validation.multibody import ConnectingRod, Cylinder, Machine, Turning
 
 pytestmark = [pytest.mark.validation, pytest.mark.slow]
 
-READY = Path(__file__).parents[2] / "problems" / "waterworks-steam-pump.toml"
+READY = PROBLEMS / "waterworks-steam-pump.toml"
 COARSE, FINE = 360, 720
 RADIUS, LENGTH = 0.4, 2.0
 ROD = ConnectingRod(LENGTH, mass=220.0, centre=0.8, inertia=0.7 * 220.0 * 0.8 * 1.2)
