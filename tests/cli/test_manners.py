@@ -90,14 +90,14 @@ def test_other_options_before_the_command_are_told_where_they_stand(here: Path) 
     assert "No such option" in run.invoke(app, ["--nothing", "check", str(SINGLE)]).output
 
 
-@pytest.mark.parametrize("command", ["check", "evaluate"])
-def test_a_problem_may_come_from_standard_input(here: Path, command: str) -> None:
+@pytest.mark.parametrize("words", [["check"], ["evaluate", "--no-plots"]], ids=["check", "evaluate"])
+def test_a_problem_may_come_from_standard_input(here: Path, words: list[str]) -> None:
     reader._typed.cache_clear()
-    found = run.invoke(app, [command, "-"], input=SINGLE.read_bytes())
+    found = run.invoke(app, [*words, "-"], input=SINGLE.read_bytes())
     assert found.exit_code == 0, found.output
-    assert (here / "results" / "stdin-as-given").is_dir() == (command == "evaluate")
+    assert (here / "results" / "stdin-as-given").is_dir() == (words[0] == "evaluate")
     reader._typed.cache_clear()
-    found = run.invoke(app, [command, "-"], input=b"title = 5")
+    found = run.invoke(app, [*words, "-"], input=b"title = 5")
     assert found.exit_code == 2
     assert "stdin: title = 5" in found.output
     reader._typed.cache_clear()

@@ -267,7 +267,6 @@ OpenTorsionalStiffness: TypeAlias = Annotated[float | Open, Number("N m/rad", ab
 OpenTorsionalDamping: TypeAlias = Annotated[float | Open, Number("N m s/rad", least=0.0, openable=True)]
 TorsionalStiffnesses: TypeAlias = Annotated[list[float | Open], OneOrEach(OpenTorsionalStiffness)]
 TorsionalDampings: TypeAlias = Annotated[list[float], OneOrEach(TorsionalDamping)]
-Frequency: TypeAlias = Annotated[float, Number("Hz", above=0.0)]
 OpenFrequency: TypeAlias = Annotated[float | Open, Number("Hz", above=0.0, openable=True)]
 OpenLossFactor: TypeAlias = Annotated[float | Open, Number("", least=0.0, most=10.0, openable=True)]
 OpenPositiveLength: TypeAlias = Annotated[float | Open, Number("m", above=0.0, openable=True)]

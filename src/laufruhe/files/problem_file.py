@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from importlib.resources import files
 from typing import Annotated, Any
 
 from pydantic import BaseModel, Field
@@ -97,8 +96,3 @@ def schema_text(model: type[BaseModel]) -> str:
     whole: dict[str, Any] = {"$schema": "http://json-schema.org/draft-07/schema#", **found}
     whole["definitions"] = whole.pop("$defs")
     return json.dumps(explained(whole), indent=2, ensure_ascii=False) + "\n"
-
-
-def shipped_schema() -> str:
-    """The schema in the package."""
-    return (files("laufruhe.files") / SCHEMA).read_text(encoding="utf-8")
