@@ -241,7 +241,7 @@ class TestForms:
         if cones.centred:
             v = v - centre_of(cones, v)
         scaled = cones.factors[:, None] * v
-        sizes = [float(np.linalg.norm(scaled))] if cones.whole else lengths(scaled).tolist()
+        sizes = [float(np.hypot.reduce(scaled, axis=None))] if cones.whole else lengths(scaled).tolist()
         heads = np.zeros(len(cones.value))
         for head, size in zip(cones.head, sizes, strict=True):
             heads[head] = max(heads[head], size)
