@@ -148,6 +148,7 @@ def holding(problem: Problem, k: int, size: float) -> Problem:
     return problem.changed(decisions=decisions)
 
 
+@pytest.mark.slow
 def test_nothing_is_told_where_it_is_not_looked_at() -> None:
     assert solve(problem_of("mean mount force", TWINS)).free is None
     moving = load(PROBLEMS / "tractor-four-shaft-heights.toml")

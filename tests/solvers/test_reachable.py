@@ -22,7 +22,7 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.json_result import as_dict
-from laufruhe.report.sections.reach import sentences
+from laufruhe.report.sections.reach import sentences, tables
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.reachable import LONG, with_reachable
@@ -222,6 +222,9 @@ def test_the_nearest_design_is_kept_where_none_is_found() -> None:
     assert written["objective"]["value"] is None
     assert written["nearest"]["decisions"].keys() == {decision.name for decision in near.decisions}
     assert "proven;" not in " ".join(sentences(result))
+    (grid,) = tables(result)
+    assert grid.head[-1] == "nearest to all limits"
+    assert [row[0] for row in grid.rows] == ["value reached", *written["nearest"]["decisions"]]
 
 
 def told_of(problem: Problem, status: Status, seconds: float | None = None) -> Result:
@@ -231,6 +234,7 @@ def told_of(problem: Problem, status: Status, seconds: float | None = None) -> R
         return with_reachable(found, problem, {Kind.UNBALANCE}, 1.0, solve)
 
 
+@pytest.mark.slow
 def test_a_design_that_was_overlooked_is_the_result() -> None:
     """Whatever a method says: what the exact model shows to keep all limits is a design."""
     for status in (Status.FAILED, Status.INFEASIBLE):
@@ -253,7 +257,7 @@ def test_nothing_is_looked_at_when_time_is_over() -> None:
     found = told_of(SCENES["vee"], Status.INFEASIBLE, 1e-9)
     assert [each.why for each in found.reached] == [LONG]
     assert all(math.isnan(each.value) for each in found.reached)
-    assert "it takes long" in sentences(found)[0]
+    assert "no time left" in sentences(found)[0]
 
 
 def test_what_nothing_open_changes_stays() -> None:

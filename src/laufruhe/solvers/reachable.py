@@ -30,7 +30,7 @@ LEAST_SECONDS, TIMES, MOST_SECONDS = 5.0, 1.5, 60.0
 HALVINGS, CLOSE = 10, 1e-3
 """Of the edges of a limit that has no least value to minimise, and the share of it at which they stop."""
 _DESIGNED = (Status.OPTIMAL, Status.FEASIBLE)
-LONG = "it takes long; give it time by a time limit"
+LONG = "there was no time left for it; give more by a time limit"
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,18 +9,21 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import DecisionValue, Nearest, Reached, Result, meaningful
 
-NOTE = "None of these designs is an answer: each keeps the limits but the one that it is named by."
+NOTE = "None of these designs is an answer: each breaks the limit that it is named by."
 
 
 def tables(result: Result) -> list[Grid]:
-    """A row a decision, a column a design."""
-    designs = [found for found in result.reached if found.decisions]
-    known = [{decision.name: decision for decision in meaningful(found.decisions)} for found in designs]
+    """A row a decision, a column a design: those of each limit, and the one that breaks limits least."""
+    designs: list[tuple[str, Reached | Nearest]] = [
+        (f"nearest to '{found.name}'", found) for found in result.reached if found.decisions
+    ]
+    designs += [("nearest to all limits", result.nearest)] if result.nearest is not None else []
+    known = [{decision.name: decision for decision in meaningful(found.decisions)} for _, found in designs]
     names = dict.fromkeys(name for each in known for name in each)
-    first = ("value reached", *(figure(found.value, found.unit) for found in designs))
+    first = ("value reached", *(figure(found.value, found.unit) for _, found in designs))
     rows = tuple((name, *(_value(each.get(name)) for each in known)) for name in names)
-    head = ("", *(f"nearest to '{found.name}'" for found in designs))
-    return [Grid("What the limits can reach", head, (first, *rows) if designs else (), note=NOTE)]
+    head = ("", *(title for title, _ in designs))
+    return [Grid("What the limits can reach", head, (first, *rows) if names else (), note=NOTE)]
 
 
 def _value(decision: DecisionValue | None) -> str:
