@@ -131,27 +131,25 @@ def test_no_design_of_a_grid_goes_under_what_a_limit_can_reach(name: str) -> Non
 def test_every_star_is_looked_at() -> None:
     """Two couples of five cylinders: what one can reach under the other, by all stars there are."""
     asked = [limit("rms rocking couple", orders=[k], max="300 N m", name=f"order {k}") for k in (1, 2)]
-    problem = problem_of(asked, engine=FIVE, counterweights=None)
+    problem = problem_of([*asked, limit("rms roll moment", max="9 MN m")], engine=FIVE, counterweights=None)
     result = laufruhe.solve(problem)
     assert result.status is Status.INFEASIBLE
+    assert result.conflict == ("order 1", "order 2")
+    # some stars keep one of them, others the other, whatever one of them breaks
+    faint = WEB | {"mass": {"between": ["0 g", "1 g"]}}
+    assert solve(problem_of(asked, engine=FIVE, counterweights=[faint])).conflict == ("order 1", "order 2")
     pairs = []
     for steps in itertools.permutations(range(1, 5)):
         fixed = {key: value for key, value in FIVE.items() if key != "firing_order"}
         star = problem_of([], engine=fixed | {"throws": [0, *(72 * k for k in steps)]}, counterweights=None)
         found = evaluate(star)
-        pairs.append([found.value(limit.measure) for limit in problem.limits])
+        pairs.append([found.value(limit.measure) for limit in problem.limits[:2]])
     for k, told in enumerate(result.reached):
         kept = [pair[k] for pair in pairs if pair[1 - k] <= 300.0]
         assert told.proof is Proof.GLOBAL
         assert told.value == pytest.approx(min(kept), rel=1e-9)
         assert {decision.name for decision in told.decisions} == {f"throw {j}" for j in range(1, 6)}
     assert "Each limit that is named is needed" in explained(result)
-    # some stars keep one of them, others the other: with a weight that does next to nothing as well, and a third limit
-    faint = WEB | {"mass": {"between": ["0 g", "1 g"]}}
-    beside = problem_of([*asked, LIGHT], engine=FIVE, counterweights=[faint])
-    narrowed = laufruhe.solve(beside)
-    assert narrowed.conflict == ("order 1", "order 2")
-    assert [told.value for told in narrowed.reached] == pytest.approx([told.value for told in result.reached], rel=1e-2)
 
 
 OPEN = {"between": ["50 N/mm", "800 N/mm"], "start": "300 N/mm"}
@@ -169,7 +167,8 @@ def mounts_of(front: dict[str, Any], rear: Any = OPEN) -> dict[str, Any]:
 @pytest.mark.parametrize("side", ["min", "max"])
 def test_what_is_not_minimised_is_asked_for_at_edges(side: str) -> None:
     """Natural frequencies under a sag, against a grid of both stiffnesses."""
-    asked = [limit("static sag", max="1 mm"), limit("natural frequencies", **{side: "12 Hz"})]
+    sides = {"min": "1 Hz", "max": "500 Hz"} | {side: "12 Hz"}
+    asked = [limit("static sag", max="1 mm"), limit("natural frequencies", **sides)]
     problem = problem_of(
         asked, block=BLOCK, counterweights=None, mounts=mounts_of({}), objective={"minimise": "total stiffness"}
     )
@@ -178,9 +177,10 @@ def test_what_is_not_minimised_is_asked_for_at_edges(side: str) -> None:
     told = next(each for each in result.reached if each.name == "natural frequencies")
     own = next(limit for limit in problem.limits if limit.name == told.name)
     others = tuple(limit for limit in problem.limits if limit is not own)
-    sides = [np.geomspace(d.set.lower, d.set.upper, 15) for d in problem.decisions]
-    designs = (evaluate(problem, problem.design(pair)) for pair in itertools.product(*sides))
-    kept = [found.standing(own).value for found in designs if keeps(found, others)]
+    springs = [np.geomspace(d.set.lower, d.set.upper, 15) for d in problem.decisions]
+    designs = (evaluate(problem, problem.design(pair)) for pair in itertools.product(*springs))
+    extreme = min if side == "min" else max
+    kept = [extreme(found.values(own.measure)) for found in designs if keeps(found, others)]
     sign = 1.0 if side == "min" else -1.0
     best = max(sign * value for value in kept)
     assert told.side == ("at least" if side == "min" else "at most")
@@ -188,7 +188,7 @@ def test_what_is_not_minimised_is_asked_for_at_edges(side: str) -> None:
     assert best - 0.01 * abs(best) <= sign * told.value <= sign * told.bound
     assert told.value == pytest.approx(told.bound, rel=2e-3)
     values = [decision.value for decision in told.decisions]
-    assert evaluate(problem, problem.design(values)).standing(own).value == pytest.approx(told.value)
+    assert extreme(evaluate(problem, problem.design(values)).values(own.measure)) == pytest.approx(told.value)
 
 
 FORCE = {"minimise": "rms mount force"}

@@ -98,24 +98,34 @@ def _wanted(found: Result, problem: Problem) -> Collection[str]:
 
 
 def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], found: Result, solve: Solve) -> _Answer:
-    """What one limit can reach while the others hold."""
-    measure, edge = limit.measure, limit.maximum
-    side = "at most" if edge < math.inf else "at least"
-    told = Reached(limit.name, side, edge if side == "at most" else limit.minimum, measure.unit)
+    """What one limit can reach while the others hold; of two sides the second where the first is not to blame."""
+    measure, nothing = limit.measure, Reached(limit.name, "at most", limit.maximum, limit.measure.unit)
     if limit.outside is not None:
-        return _Answer(replace(told, why="a band is kept or not; no single value can be reached"))
-    if passed():
-        return _Answer(replace(told, why=LONG))
+        return _Answer(replace(nothing, why="a band is kept or not; no single value can be reached"))
     others = tuple(other for other in problem.limits if other is not limit)
-    if not measure.channel.is_moved_by(kinds):
-        value = math.nan if found.initial.resonance else found.initial.standing(limit).value
-        return _Answer(replace(told, value=value, why="nothing that is open changes it"))
-    try:
-        if measure.channel.minimised and side == "at most" and limit.minimum == -math.inf:
-            return _least(told, _asking(problem, (Term(measure),), others), solve)
-        return _at_edges(told, limit, problem, others, found.status, solve)
-    except LaufruheError as error:
-        return _Answer(replace(told, why=str(error)))
+    sides = [("at most", limit.maximum, replace(limit, minimum=-math.inf), replace(limit, maximum=math.inf))]
+    sides += [("at least", limit.minimum, *reversed(sides[0][2:]))]
+    answer = _Answer(nothing)
+    for side, edge, own, rest in sides:
+        if math.isinf(edge):
+            continue
+        told = replace(nothing, side=side, limit=edge)
+        if passed():
+            return _Answer(replace(told, why=LONG))
+        if not measure.channel.is_moved_by(kinds):
+            value = math.nan if found.initial.resonance else found.initial.standing(limit).value
+            return _Answer(replace(told, value=value, why="nothing that is open changes it"))
+        held = others if math.isinf(rest.minimum) and math.isinf(rest.maximum) else (*others, rest)
+        try:
+            if measure.channel.minimised and side == "at most":
+                answer = _least(told, _asking(problem, (Term(measure),), held), solve)
+            else:
+                answer = _at_edges(told, own, problem, held, found.status, solve)
+        except LaufruheError as error:
+            return _Answer(replace(told, why=str(error)))
+        if not answer.is_none:
+            break
+    return answer
 
 
 def _asking(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, ...]) -> Problem:
@@ -175,7 +185,7 @@ def _at_edges(
     first = solve(_asking(problem, problem.objective, others))
     if first.status not in _DESIGNED:
         return _none(told, first)
-    best, reached = first, first.final.standing(limit).value
+    best, reached = first, _extreme(first, limit, high)
     missed, bound = told.limit, told.limit if status is Status.INFEASIBLE else math.nan
     for _ in in_time(range(HALVINGS)):
         if abs(reached - missed) <= CLOSE * abs(told.limit):
@@ -184,11 +194,17 @@ def _at_edges(
         moved = replace(limit, maximum=edge) if high else replace(limit, minimum=edge)
         found = solve(_asking(problem, problem.objective, (*others, moved)))
         if found.status in _DESIGNED:
-            best, reached = found, found.final.standing(moved).value
+            best, reached = found, _extreme(found, limit, high)
         else:
             missed, bound = edge, edge if found.status is Status.INFEASIBLE else bound
     proven = Proof.WITHIN_GAP if bound == missed else Proof.LOCAL
     return _Answer(replace(told, value=reached, bound=bound, proof=proven, decisions=best.decisions), best)
+
+
+def _extreme(result: Result, limit: Limit, high: bool) -> float:
+    """The largest or least of the numbers that are limited."""
+    values = result.final.values(limit.measure)
+    return (max if high else min)(values, default=limit.maximum if high else limit.minimum)
 
 
 def _recovered(found: Result, problem: Problem, result: Result) -> Result:
