@@ -11,12 +11,11 @@ from matplotlib.axes import Axes
 from laufruhe.plots.style import VERMILION, entry
 from laufruhe.plots.words import FAINT, SMALL, fitted, spread, width_of
 from laufruhe.present.mounting import MountingFacts
+from laufruhe.present.numbers import RPM
 from laufruhe.problem.channels import Channel
 from laufruhe.problem.measure import Limit
 from laufruhe.solvers.result import Result
-from laufruhe.units import readable
 
-RPM = readable("rad/s")[1]
 LIMIT = VERMILION
 MOST_NAMES, _APART = 5, 0.1
 """Operating points that are all named, and room between two names [inch]."""

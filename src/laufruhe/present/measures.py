@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.machine import Chambers
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
 from laufruhe.physics.torsion import has_torsion
 from laufruhe.problem.channels import CRANK_PIN_FORCE, FRICTION_POWER, MAIN_BEARING_FORCE, MOUNT_FORCE, LoadChannel
 from laufruhe.problem.channels.torsional import SHAFT_STRESS, SHAFT_TORQUE
-from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.evaluation import Evaluation, samples_of
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import limit_values
@@ -146,9 +146,30 @@ def changed(result: Result) -> bool:
     return result.final is not result.initial
 
 
+def loaded(result: Result) -> dict[str, Evaluation]:
+    """Designs whose loads are shown, by name: a resonance of the one given leaves the other."""
+    return {name: design for name, design in result.designs.items() if design is result.final or not design.resonance}
+
+
 def load_designs(result: Result) -> list[Evaluation]:
-    """Designs whose loads are shown: as given and as decided; a resonance of the one given leaves the other."""
-    return [result.initial, result.final] if changed(result) and not result.initial.resonance else [result.final]
+    """The same in their order."""
+    return list(loaded(result).values())
+
+
+def has_bearings(result: Result) -> bool:
+    """Whether there are main bearings with loads to draw."""
+    return BEARINGS in places_of(result) and has_loads(result)
+
+
+def bearing_paths(design: Evaluation, k: int) -> ComplexArray:
+    """Force on every main bearing at an operating point, up and left as one number, shape (angles, bearings) [N]."""
+    samples = samples_of(design, k, BEARINGS.channel)
+    return np.asarray(samples[..., 2] + 1j * samples[..., 1])
+
+
+def as_crank_turns(design: Evaluation, steps: int) -> ComplexArray:
+    """What turns forces at as many angles of a cycle into those that the crank feels."""
+    return np.asarray(np.exp(-1j * design.engine.cycle.angle * np.arange(steps) / steps))
 
 
 def objective_unit(result: Result) -> str:

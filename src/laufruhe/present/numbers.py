@@ -7,6 +7,8 @@ import math
 from laufruhe.units import readable
 
 DASH = "-"
+RPM, DEGREE = readable("rad/s")[1], readable("rad")[1]
+"""In one rad/s, and in one rad."""
 NOTHING = 1e-9
 
 

@@ -10,15 +10,13 @@ import numpy as np
 
 from laufruhe.physics.bearing_wear import wear_of
 from laufruhe.physics.willans import FrictionTest
-from laufruhe.present.measures import BEARINGS, has_loads, load_designs, places_of
+from laufruhe.present.measures import BEARINGS, as_crank_turns, bearing_paths, has_bearings, loaded
 from laufruhe.present.mounting import critical_speed, facts_of, is_elastic
+from laufruhe.present.numbers import RPM
 from laufruhe.present.twins import KINDS, is_twin, parts_of
-from laufruhe.problem.evaluation import Evaluation, samples_of
 from laufruhe.report.sheet import Cells, Sheet
 from laufruhe.solvers.result import Result
-from laufruhe.units import readable
 
-RPM = readable("rad/s")[1]
 DIRECTIONS = 180
 """In which wear is told."""
 
@@ -45,18 +43,18 @@ def _of_test(test: FrictionTest) -> Iterator[Cells]:
 
 def _on_crank(result: Result) -> Sheet | None:
     """Forces on main bearings along and across the crank as it turns, of every design and point (B4)."""
-    if not _has_bearings(result):
+    if not has_bearings(result):
         return None
     names, rows, heads = BEARINGS.channel.places(result.final.engine), [], []
-    designs = _loaded(result)
+    designs = loaded(result)
     for k, point in enumerate(result.problem.points):
         columns = []
         for design in designs.values():
-            samples = samples_of(design, k, BEARINGS.channel)
-            angles = design.engine.cycle.angle * np.arange(len(samples)) / len(samples)
-            turned = (samples[..., 2] + 1j * samples[..., 1]) * np.exp(-1j * angles)[:, None]
+            paths = bearing_paths(design, k)
+            turned = paths * as_crank_turns(design, len(paths))[:, None]
             columns += [part for path in turned.T for part in (path.real, path.imag)]
-        rows += [[point.name, *row] for row in np.column_stack([np.degrees(angles), *columns]).tolist()]
+        angles = np.degrees(result.final.engine.cycle.angle) * np.arange(len(paths)) / len(paths)
+        rows += [[point.name, *row] for row in np.column_stack([angles, *columns]).tolist()]
     for name in designs:
         lead = f"{name}: force on " if len(designs) > 1 else "force on "
         heads += [f"{lead}{bearing} {way} the crank [N]" for bearing in names for way in ("along", "across")]
@@ -65,14 +63,13 @@ def _on_crank(result: Result) -> Sheet | None:
 
 def _wear(result: Result) -> Sheet | None:
     """Load that every direction of each main bearing takes over a cycle, over that of the most loaded (B10)."""
-    if not _has_bearings(result):
+    if not has_bearings(result):
         return None
     names, angles = BEARINGS.channel.places(result.final.engine), math.tau * np.arange(DIRECTIONS) / DIRECTIONS
     rows = []
-    for name, design in _loaded(result).items():
+    for name, design in loaded(result).items():
         for k, point in enumerate(result.problem.points):
-            samples = samples_of(design, k, BEARINGS.channel)
-            shares = [wear_of(path, angles) for path in (samples[..., 2] + 1j * samples[..., 1]).T]
+            shares = [wear_of(path, angles) for path in bearing_paths(design, k).T]
             rows += [[name, point.name, *row] for row in np.column_stack([np.degrees(angles), *shares]).tolist()]
     head = ["design", "point", "direction from upright towards y [deg]", *(f"wear of {name} [-]" for name in names)]
     return Sheet(head, rows)
@@ -85,7 +82,7 @@ def _turning(result: Result) -> Sheet | None:
     rows = [
         [name, point.name, kind, order, abs(forward), math.degrees(cmath.phase(forward)), abs(backward),
          math.degrees(cmath.phase(backward)), KINDS[kind][1]]
-        for name, design in _loaded(result).items()
+        for name, design in loaded(result).items()
         for k, point in enumerate(result.problem.points)
         for (kind, order), (forward, backward) in parts_of(result, design.engine, k).items()
     ]  # fmt: skip
@@ -99,7 +96,7 @@ def _mount_criticals(result: Result) -> Sheet | None:
     if not is_elastic(result):
         return None
     rows = []
-    for name, design in _loaded(result).items():
+    for name, design in loaded(result).items():
         facts = facts_of(design)
         for j, (mode, frequency) in enumerate(zip(facts.modes.names, facts.modes.frequencies.tolist(), strict=True)):
             rows += [
@@ -108,16 +105,6 @@ def _mount_criticals(result: Result) -> Sheet | None:
             ]
     head = ["design", "mode", "name", "natural frequency [Hz]", "excited", "order", "critical speed [rpm]"]
     return Sheet(head, rows) if rows else None
-
-
-def _has_bearings(result: Result) -> bool:
-    return BEARINGS in places_of(result) and has_loads(result)
-
-
-def _loaded(result: Result) -> dict[str, Evaluation]:
-    """Designs whose loads are finite, by name."""
-    shown = load_designs(result)
-    return {name: design for name, design in result.designs.items() if design in shown}
 
 
 PART_CURVES: dict[str, Callable[[Result], Sheet | None]] = {

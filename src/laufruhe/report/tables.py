@@ -13,21 +13,20 @@ from pathlib import Path
 from typing import Any
 
 from laufruhe.physics.run_up import RunUp
-from laufruhe.present.measures import has_loads, has_ranking, limits_of, load_designs, places_of, ranking_of
+from laufruhe.present.measures import has_loads, has_ranking, limits_of, loaded, places_of, ranking_of
 from laufruhe.present.mounting import facts_of, is_elastic
+from laufruhe.present.numbers import DEGREE, RPM
 from laufruhe.present.pictures import MOST_PRINTED, PRINTED, SHEETS
 from laufruhe.present.run_up import runs_up, shown_runs
 from laufruhe.present.speed_curves import speeds_of, transmissibility_of
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
-from laufruhe.problem.evaluation import Evaluation, measured
+from laufruhe.problem.evaluation import measured
 from laufruhe.report import files
 from laufruhe.report.curves import CURVES
 from laufruhe.report.sections import SECTIONS
 from laufruhe.report.sheet import Sheet
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result
-from laufruhe.units import readable
 
-RPM, DEGREE = readable("rad/s")[1], readable("rad")[1]
 MOST_ROWS = 20 * STEPS
 _WHENEVER = datetime(2000, 1, 1, tzinfo=UTC)
 
@@ -75,7 +74,7 @@ def _measures(result: Result) -> Sheet | None:
         [places.title, point.name, design, name, each.mean, each.max, each.rms, places.channel.unit]
         for places in places_of(result)
         for k, point in enumerate(result.problem.points)
-        for design, found in _loaded(result).items()
+        for design, found in loaded(result).items()
         for name, each in zip(
             places.channel.places(found.engine), measured(found, k, places.channel), strict=True
         )
@@ -88,11 +87,11 @@ def _forces(result: Result) -> Sheet | None:
     if not has_loads(result):
         return None
     steps = max(min(STEPS, MOST_ROWS // len(result.problem.points)), 36)
-    return Sheet.of(forces_of(_loaded(result), steps))
+    return Sheet.of(forces_of(loaded(result), steps))
 
 
 def _orders(result: Result) -> Sheet | None:
-    return Sheet.of(orders_of(_loaded(result))) if has_loads(result) else None
+    return Sheet.of(orders_of(loaded(result))) if has_loads(result) else None
 
 
 def _modes(result: Result) -> Sheet | None:
@@ -105,7 +104,7 @@ def _transmissibility(result: Result) -> Sheet | None:
     speeds, orders = speeds_of(result), facts_of(result.final).orders
     columns = [
         (f"{design}, {point.name}: order {orders[k]:g}", curve.tolist())
-        for design, found in _loaded(result).items()
+        for design, found in loaded(result).items()
         for point in result.problem.points
         for k, curve in transmissibility_of(found, point, speeds, orders)
     ]
@@ -118,7 +117,7 @@ def _run_up(result: Result) -> Sheet | None:
         return None
     rows = [
         [design, way, RPM * speed, force, travel, DEGREE * twist]
-        for design, found in _loaded(result).items()
+        for design, found in loaded(result).items()
         for way, run in zip(("run-up", "shut-down"), shown_runs(result, found), strict=True)
         for speed, force, travel, twist in _columns(run)
     ]
@@ -153,12 +152,6 @@ def _rankings(result: Result) -> Sheet | None:
 
 def _degrees(angles: Iterable[float]) -> str:
     return " ".join(f"{math.degrees(angle):.6g}" for angle in angles)
-
-
-def _loaded(result: Result) -> Mapping[str, Evaluation]:
-    """Designs whose loads are finite, by name."""
-    shown = load_designs(result)
-    return {name: design for name, design in result.designs.items() if design in shown}
 
 
 _FILLED = (

@@ -51,7 +51,6 @@ class Page:
     def __init__(self, path: Path, port: int | None, seconds: float) -> None:
         self.watched = Watched(path)
         self.server = _listening(port, _files())
-        self._seconds = seconds
         self._follow, self._measure = Desk(_HASTE), Desk(_HASTE)
         self._settle, self._front = Desk(_PATIENCE), Desk(_PATIENCE)
         self.server.handles = {
@@ -61,7 +60,7 @@ class Page:
             "/settle": self._asked(self._settle, seconds + GRACE, answers.settle, seconds),
             "/save": self._asked(self._follow, FOLLOWED, answers.save),
             "/front": self._fronted,
-            "/pictures": self._pictured,
+            "/pictures": _read(partial(self._lines, self._settle, len(PICTURES), answers.picture)),
             "/events": lambda _: Answer(lines=self._events()),
         }
 
@@ -108,38 +107,18 @@ class Page:
 
     def _asked(self, desk: Desk, seconds: float, work: Callable[..., str], *more: Any) -> Callable[[Any], Answer]:
         """How requests of one kind are answered."""
+        return _read(lambda asked: _worked(partial(desk.ask, seconds, work, self.watched.source, asked, *more)))
 
-        def answer(body: Any) -> Answer:
-            try:
-                asked = Asked.of(body)
-            except Refused as refused:
-                return _wrong(refused.complaint)
-            return _worked(partial(desk.ask, seconds, work, self.watched.source, asked, *more))
-
-        return answer
+    def _lines(self, desk: Desk, most: int, work: Callable[..., str], asked: Asked, *more: Any) -> Answer:
+        """Answers with their numbers, one after the other."""
+        source = self.watched.source
+        return Answer(lines=_each(lambda k: partial(desk.ask, FOLLOWED, work, source, asked, *more, k), most))
 
     def _fronted(self, body: Any) -> Answer:
         across = body.pop("across", None) if isinstance(body, dict) else None
-        try:
-            asked = Asked.of(body)
-        except Refused as refused:
-            return _wrong(refused.complaint)
         if not isinstance(across, str) or len(across) > 200:
             return _wrong(Complaint("across", "", "is no measure", "load the page again"))
-        source = self.watched.source
-        return Answer(
-            lines=_each(lambda k: partial(self._front.ask, FOLLOWED, answers.front, source, asked, across, k), POINTS)
-        )
-
-    def _pictured(self, body: Any) -> Answer:
-        try:
-            asked = Asked.of(body)
-        except Refused as refused:
-            return _wrong(refused.complaint)
-        source = self.watched.source
-        return Answer(
-            lines=_each(lambda k: partial(self._settle.ask, FOLLOWED, answers.picture, source, asked, k), len(PICTURES))
-        )
+        return _read(lambda asked: self._lines(self._front, POINTS, answers.front, asked, across))(body)
 
     def _events(self) -> Iterator[str]:
         """What the page is told unasked: that the file has changed, and that somebody is there."""
@@ -147,6 +126,18 @@ class Page:
         while not self.watched.is_closed:
             version = self.watched.later(version, HEARTBEAT)
             yield json.dumps(self._state())
+
+
+def _read(answer: Callable[[Asked], Answer]) -> Callable[[Any], Answer]:
+    """What answers a request that can be read; another is refused."""
+
+    def answered(body: Any) -> Answer:
+        try:
+            return answer(Asked.of(body))
+        except Refused as refused:
+            return _wrong(refused.complaint)
+
+    return answered
 
 
 def _each(work: Callable[[int], Callable[[], str]], most: int) -> Iterator[str]:

@@ -347,7 +347,7 @@ async function show(model, root) {
   return new Page(root).open(typeof model === "string" ? JSON.parse(model) : model);
 }
 
-window.laufruheLive = { show, NORMS, opened, measured, judged, rowsAt, savedText, number };
+window.laufruheLive = { show, element, drawn, NORMS, opened, measured, judged, rowsAt, savedText, number };
 
 const told = document.getElementById("live-model");
 if (told) window.laufruheLive.page = show(told.textContent, document.getElementById("live"));

@@ -15,33 +15,27 @@ from numpy.typing import NDArray
 from laufruhe.physics.bearing_wear import wear_of
 from laufruhe.plots.style import ORANGE, Series, entry_of_dots, headed, page, point_name, series_of, styled, thin
 from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_ticks, rows_of
-from laufruhe.present.measures import BEARINGS, has_loads, load_designs, places_of
-from laufruhe.problem.evaluation import samples_of
+from laufruhe.present.measures import BEARINGS, as_crank_turns, bearing_paths, has_bearings, load_designs
 from laufruhe.solvers.result import Result
 
 MOST_BEARINGS, MOST_COLUMNS, PANEL, STEPS = 6, 4, 1.95, 180
 # of a panel: where the ring of wear begins, how thick it is at most, and what the paths fill
 RING, THICK, FILLED = 0.86, 0.12, 0.80
 Plane = NDArray[np.complex128]
-
-
-def applies(result: Result) -> bool:
-    """Whether there are main bearings with loads to draw."""
-    return BEARINGS in places_of(result) and has_loads(result)
+applies = has_bearings
 
 
 @styled()
 def figure(result: Result) -> Figure:
     """A column a bearing, all to one scale: above as the block feels it, below as the crankshaft does."""
     k, series = _hardest(result), series_of(result, loads=True)
-    forces = [samples_of(one.design, k, BEARINGS.channel) for one in series]
-    planes = [force[..., 2] + 1j * force[..., 1] for force in forces]
+    planes = [bearing_paths(one.design, k) for one in series]
     names = BEARINGS.channel.places(result.final.engine)
     sizes = np.abs(planes[-1]).max(axis=0)
     chosen = sorted(np.argsort(-sizes, kind="stable")[:MOST_BEARINGS].tolist())
     largest = thin(float(np.abs(plane[:, chosen]).max()) for plane in planes)
     factor, unit = in_thousands(largest, "N")
-    turned = np.exp(-1j * result.final.engine.cycle.angle * np.arange(len(planes[0])) / len(planes[0]))
+    turned = as_crank_turns(result.final, len(planes[0]))
     side = rows_of(len(chosen), MOST_COLUMNS)
     chunks = [chosen[first : first + side] for first in range(0, len(chosen), side)]
     drawn = page(2 * len(chunks), side, (PANEL, PANEL), gap=0.55, lead=0.16, across=0.3)
@@ -69,7 +63,7 @@ def figure(result: Result) -> Figure:
 def _hardest(result: Result) -> int:
     """The operating point with the largest force on a bearing."""
     design = load_designs(result)[0]
-    return int(np.argmax([np.abs(samples_of(design, k, BEARINGS.channel)).max() for k in range(len(design.loads))]))
+    return int(np.argmax([np.abs(bearing_paths(design, k)).max() for k in range(len(design.loads))]))
 
 
 def _draw(axes: Axes, paths: Sequence[Plane], series: Sequence[Series], size: float) -> None:

@@ -10,12 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, limits_on, mark_points, order_entries
+from laufruhe.plots.speed_axis import LIMIT, STYLES, limits_on, mark_points, order_entries
 from laufruhe.plots.style import AFTER, BEFORE, entry, entry_of_dots, headed, page, styled
 from laufruhe.plots.words import FAINT, INK, beside
 from laufruhe.present.measures import changed
 from laufruhe.present.mounting import MountingFacts, at_which_stiffness, critical_speed, facts_of, is_elastic
-from laufruhe.present.numbers import number
+from laufruhe.present.numbers import RPM, number
 from laufruhe.present.speed_curves import fastest
 from laufruhe.problem import channels
 from laufruhe.solvers.result import Result

@@ -9,11 +9,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
-from laufruhe.plots.speed_axis import LIMIT, RPM, STYLES, limits_on, mark_points, order_entries
+from laufruhe.plots.speed_axis import LIMIT, STYLES, limits_on, mark_points, order_entries
 from laufruhe.plots.style import entry, headed, page, series_of, styled
 from laufruhe.plots.words import FAINT, INK
 from laufruhe.present.measures import hardest_point
 from laufruhe.present.mounting import facts_of, is_elastic
+from laufruhe.present.numbers import RPM
 from laufruhe.present.speed_curves import fastest, speeds_of, transmissibility_of
 from laufruhe.problem import channels
 from laufruhe.solvers.result import Result

@@ -6,12 +6,11 @@ from laufruhe.machine.mount import every_spring
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.present.measures import changed
 from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic
-from laufruhe.present.numbers import DASH, figure, number, trimmed
+from laufruhe.present.numbers import DASH, RPM, figure, number, trimmed
 from laufruhe.problem.channels import MOUNT_TRAVEL
 from laufruhe.problem.evaluation import measured
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
-from laufruhe.units import readable
 
 
 def tables(result: Result) -> list[Grid]:
@@ -30,7 +29,7 @@ def _modes(facts: MountingFacts, title: str) -> Grid:
     rows = []
     for j, (name, frequency) in enumerate(zip(facts.modes.names, facts.modes.frequencies, strict=True)):
         driven = j in facts.excited
-        critical = critical_speed(frequency, order) * readable("rad/s")[1] if order and driven else 0.0
+        critical = critical_speed(frequency, order) * RPM if order and driven else 0.0
         shares = [f"{round(100.0 * share, 1) + 0.0:.1f}" for share in facts.modes.energy[:, j]]
         reached = number(critical) if critical else DASH
         rows.append((name, number(frequency), "yes" if driven else "no", reached, *shares))

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from laufruhe.present.measures import changed
-from laufruhe.present.numbers import DASH, number
+from laufruhe.present.numbers import DASH, RPM, number
 from laufruhe.present.torsion import TorsionFacts, barred_ranges, facts_of, is_twisted, speed_range
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
-from laufruhe.units import readable
 
 MOST_MODES, MOST_CRITICALS = 4, 8
-RPM = readable("rad/s")[1]
 
 
 def tables(result: Result) -> list[Grid]:

@@ -1,7 +1,5 @@
 // Pieces of a page: elements with their words, and numbers as they are read.
 
-const SVG = "http://www.w3.org/2000/svg";
-
 /**
  * @param {string} id
  * @returns {any} the element, which has to be there
@@ -12,39 +10,8 @@ export function byId(id) {
   return found;
 }
 
-/**
- * @param {string} tag
- * @param {Record<string, string | number | boolean>} [attributes]
- * @param {...(Node | string)} children
- * @returns {any}
- */
-export function element(tag, attributes = {}, ...children) {
-  return filled(document.createElement(tag), attributes, children);
-}
-
-/**
- * @param {string} tag
- * @param {Record<string, string | number | boolean>} [attributes]
- * @param {...(Node | string)} children
- * @returns {any}
- */
-export function drawn(tag, attributes = {}, ...children) {
-  return filled(document.createElementNS(SVG, tag), attributes, children);
-}
-
-/**
- * @param {Element} made
- * @param {Record<string, string | number | boolean>} attributes
- * @param {(Node | string)[]} children
- */
-function filled(made, attributes, children) {
-  for (const [name, value] of Object.entries(attributes)) {
-    if (value === true) made.setAttribute(name, "");
-    else if (value !== false) made.setAttribute(name, String(value));
-  }
-  made.append(...children);
-  return made;
-}
+/** @type {{element: (tag: string, attributes?: object, ...children: (Node | string)[]) => any, drawn: typeof element}} */
+export const { element, drawn } = window.laufruheLive;
 
 /**
  * A number to so many figures, without zeros that say nothing.
