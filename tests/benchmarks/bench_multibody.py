@@ -60,7 +60,7 @@ class Scene:
         return mount_forces(self.engine, loads.reactions)
 
     def integration_seconds(self, steps: int) -> float:
-        """Wall time of one turn; building the system and reading its forces are not counted."""
+        """Processor time of one turn; building the system and reading its forces are not counted."""
         model = self.multibody.build(self.machine, 0.0)
         return spent(lambda: self.multibody.integrate(model, steps, steps, self.integrator))
 
@@ -134,7 +134,7 @@ def peak_memory(scene: Scene) -> int:
 
 
 def same_rods_again(scene: Scene) -> float:
-    """Wall time of an evaluation that remembers order coefficients of the rods and no loads."""
+    """Processor time of an evaluation that remembers order coefficients of the rods and no loads."""
     forget()
     return spent(scene.analytic)
 
@@ -172,7 +172,7 @@ def main() -> None:
         "kept Jacobians) is the integration of one turn alone, with the fewest steps of those tried that reach an",
         f"error of {WANTED:.0e} of the largest mount force once a tenth of the turn has settled the start. The",
         f"analytic side is the shaking loads with exact kinematics, the mounting, and the forces at {SAMPLES} angles.",
-        f"Medians of {REPEATS} runs taken in turns on one machine.",
+        f"Medians of {REPEATS} runs taken in turns on one machine, in processor time.",
         "",
         "| what | error | ms | simulation over it |",
         "| --- | ---: | ---: | ---: |",

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from pages import PAGES, ROOT, publish
+from pages import PAGES, ROOT, processor_seconds, publish
 
 from laufruhe import load
 from laufruhe.load_models.affine import AffineModel, AffineProblem
@@ -29,11 +29,11 @@ Row = tuple[str, float, str, float]
 
 
 def seconds(command: list[str]) -> float:
-    """Wall time of a command in an empty folder."""
+    """Processor time of a command in an empty folder."""
     with tempfile.TemporaryDirectory() as folder:
-        start = time.perf_counter()
+        start = processor_seconds()
         subprocess.run(command, check=True, cwd=folder, capture_output=True)
-        return time.perf_counter() - start
+        return processor_seconds() - start
 
 
 def in_turns(own: Callable[[], float], other: Callable[[], float], repeats: int) -> tuple[float, float]:
@@ -88,7 +88,8 @@ def main() -> None:
     lines = [
         "# Start-up, solve, re-solve",
         "",
-        "Medians of runs taken in turns on one machine; the problem is `problems/tractor-four-lanchester.toml`.",
+        "Medians of runs taken in turns on one machine, of commands in processor time; the problem is",
+        "`problems/tractor-four-lanchester.toml`.",
         "`solve` reads, solves, proves, and writes its report and pictures.",
         "",
         "| what | ms | beside | ms | ratio |",
