@@ -128,7 +128,7 @@ def test_infeasible_says_what_was_minimised_and_proves_nothing() -> None:
 
 @pytest.mark.parametrize("odd", [math.nan, math.inf, -math.inf])
 def test_what_is_no_number_is_null(odd: float) -> None:
-    result = replace(scenes.solved(scenes.TIGHT), error_estimate=odd)
+    result = replace(scenes.solved(scenes.TIGHT), error=lambda: odd)
     assert parsed(result)["fidelity"]["error_estimate"] is None
 
 

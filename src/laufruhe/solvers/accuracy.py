@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from laufruhe.fidelity.automatic import choose
 from laufruhe.fidelity.error_bounds import error_bound, missed, reference, relative, sampling_error
@@ -27,6 +28,11 @@ def error_of(problem: Problem, evaluation: Evaluation) -> float:
     share = sum(term.weight * evaluation.value(term.measure) for term in problem.load_terms) * loads
     between = sum(term.weight * missed(term.measure, evaluation) for term in runs)
     return relative(share + between, objective_value(problem, evaluation))
+
+
+def largest_error(results: Sequence[Result]) -> float:
+    """Of several results that make one."""
+    return max(result.error_estimate for result in results)
 
 
 def _error_of_loads(problem: Problem, evaluation: Evaluation) -> float:
@@ -56,4 +62,4 @@ def solve_within(problem: Problem, solve: Callable[[Problem], Result]) -> Result
         if better == result.problem.fidelity:
             break
         result = solve(problem.at(better))
-    return replace(result, error_estimate=error_of(result.problem, result.final))
+    return replace(result, error=partial(error_of, result.problem, result.final))

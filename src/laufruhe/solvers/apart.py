@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from laufruhe.errors import ModelError
 from laufruhe.problem.decision import Kind
@@ -15,6 +16,7 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import STRENGTH, Certificate, Proof
+from laufruhe.solvers.accuracy import largest_error
 from laufruhe.solvers.conclusion import none_within
 from laufruhe.solvers.result import ObjectiveValue, Result, Status
 
@@ -75,7 +77,7 @@ def solve_apart(problem: Problem, solve: Solve) -> Result:
         initial=evaluate_start(problem),
         final=evaluate(problem, engine, found[-1].final.samples),
         message="; ".join(r.message for r in found if r.message),
-        error_estimate=max(r.error_estimate for r in found),
+        error=partial(largest_error, found),
         timing={key: took for r in found for key, took in r.timing.items()},
     )
 

@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -159,7 +160,7 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
         initial=initial,
         final=design.evaluation,
         message=message,
-        error_estimate=error_of(problem, design.evaluation),
+        error=partial(error_of, problem, design.evaluation),
         timing=timing,
     )
 
@@ -187,7 +188,7 @@ def state(problem: Problem, to_start_from: bool = False) -> Result:
         limits=() if evaluation.resonance else limit_values(problem, evaluation),
         initial=evaluation,
         final=evaluation,
-        error_estimate=0.0 if evaluation.resonance else error_of(problem, evaluation),
+        error=float if evaluation.resonance else partial(error_of, problem, evaluation),
         timing={"evaluate": time.perf_counter() - started},
     )
 

@@ -14,12 +14,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import STRENGTH, Certificate, Proof, Reach, certified
+from laufruhe.solvers.accuracy import largest_error
 from laufruhe.solvers.cones.equal_designs import equal_designs
 from laufruhe.solvers.result import DecisionRange, ObjectiveValue, RankValue, Result, Status
 
@@ -107,7 +109,7 @@ def _together(
         limits=tuple(replace(x, shadow_price=math.nan if x.active else 0.0) for x in last.limits[:count]),
         initial=first.initial,
         message=message,
-        error_estimate=max(stage.error_estimate for stage in stages),
+        error=partial(largest_error, stages),
         timing=_summed(stages),
         ranks=ranks,
     )

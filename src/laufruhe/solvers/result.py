@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -234,8 +235,8 @@ class Result:
         Why there is no design, or what the reader should know.
     conflict
         Names of limits that no design meets together.
-    error_estimate
-        Relative error of the objective from sampling the cycle.
+    error
+        What tells the relative error of the objective from sampling the cycle; `error_estimate` asks it once.
     timing
         Seconds by what they were spent on.
     phasing
@@ -264,7 +265,7 @@ class Result:
     final: Evaluation
     message: str = ""
     conflict: tuple[str, ...] = ()
-    error_estimate: float = 0.0
+    error: Callable[[], float] = float
     timing: dict[str, float] = field(default_factory=dict)
     phasing: PhasingResult | None = None
     robust: RobustResult | None = None
@@ -273,6 +274,11 @@ class Result:
     reached: tuple[Reached, ...] = ()
     nearest: Nearest | None = None
     free: tuple[DecisionRange, ...] | None = None
+
+    @cached_property
+    def error_estimate(self) -> float:
+        """Relative error of the objective from sampling the cycle; studies keep none, and do not wait for it."""
+        return self.error()
 
     @property
     def designs(self) -> dict[str, Evaluation]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,7 +98,7 @@ def _whole(problem: Problem, phasing: Phasing, found: Result, given: Evaluation,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, given)),
         certificate=certified(value, bound, nothing, problem.tolerance, Reach.WHOLE, proof.kkt_residual, method),
         phasing=details,
-        error_estimate=error_of(found.problem, found.final),
+        error=partial(error_of, found.problem, found.final),
     )
 
 

@@ -11,6 +11,7 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -78,7 +79,7 @@ def solve_assembly(problem: Problem) -> Result:
         objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)), certificate=certificate,
         decisions=(), limits=limits, initial=initial, final=final,
         message="" if met else "the best assembly breaks a limit, and limits do not choose parts; relax it",
-        error_estimate=error_of(problem, final), timing={"solve": time.perf_counter() - started},
+        error=partial(error_of, problem, final), timing={"solve": time.perf_counter() - started},
         assembly=search.result([part.name for part in problem.engine.slider_cranks]),
     )  # fmt: skip
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -198,7 +199,7 @@ def robust_result(
         initial=evaluate(problem),
         final=design.evaluation,
         message="" if met else message,
-        error_estimate=error_of(problem, design.evaluation),
+        error=partial(error_of, problem, design.evaluation),
         timing=timing,
         robust=details,
     )  # fmt: skip
