@@ -75,12 +75,12 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
     )
 
 
-def automatic(problem: Problem, tolerance: float, engine: Engine | None = None) -> Problem:
+def automatic(problem: Problem, tolerance: float) -> Problem:
     """The problem at the fidelity chosen for it."""
     if not problem.load_terms or any(measure.channel.is_checked for measure in problem.measures):
         # nothing tells what run-ups lose with an order
         return problem.at(replace(problem.fidelity, tolerance=tolerance))
-    return problem.at(choose(problem, tolerance, engine).fidelity)
+    return problem.at(choose(problem, tolerance).fidelity)
 
 
 def ladder(problem: Problem) -> list[tuple[str, Problem]]:

@@ -26,7 +26,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN
 from laufruhe.present.measures import places_of
 from laufruhe.problem.channels import CHANNELS
-from laufruhe.problem.decision import Decision, Domain, Kind
+from laufruhe.problem.decision import Decision, Domain, Kind, vector_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
@@ -98,10 +98,10 @@ def _filled(
     collected = _Collected(model, kinds, result, _aside(bare.file, is_served))
     curves = _curves(collected, result)
     measures = collected.measures()
-    start = _vector(model.domains, [decision.start for decision in moving.decisions])
+    start = vector_of(model.domains)
     designs = [("given", start)]
     if result.decisions:
-        designs.append(("optimum", _vector(model.domains, [values[d.name] for d in moving.decisions])))
+        designs.append(("optimum", vector_of(model.domains, [values[d.name] for d in moving.decisions])))
     designs.append(("between", _between(model.domains)))
     return replace(
         bare,
@@ -198,11 +198,6 @@ def _unit(problem: Problem, decision: Decision) -> tuple[str, float]:
             if own:
                 return own, 1.0 / units.parse(f"1 {own}", decision.unit)
     return units.readable(decision.unit)
-
-
-def _vector(domains: Sequence[Domain], values: Sequence[Value]) -> Array:
-    columns = (domain.columns_of(value) for domain, value in zip(domains, values, strict=True))
-    return np.concatenate([np.zeros(0), *columns])
 
 
 def _between(domains: Sequence[Domain]) -> Array:

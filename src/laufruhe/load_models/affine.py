@@ -19,7 +19,7 @@ from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
 from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import added_geared_loads, added_rotor_loads, shaking_loads
 from laufruhe.problem.channels import LoadChannel
-from laufruhe.problem.decision import Decision, Domain, Kind, domains_of
+from laufruhe.problem.decision import Decision, Domain, Kind, domains_of, vector_of
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure, Rows, bends_of, load_rows, mass_rows
@@ -110,7 +110,7 @@ class AffineProblem:
     @property
     def start(self) -> Array:
         """The decision vector of the design as given."""
-        return np.concatenate([np.zeros(0), *(domain.columns_of(domain.decision.start) for domain in self.domains)])
+        return vector_of(self.domains)
 
     @property
     def scales(self) -> Array:

@@ -21,7 +21,7 @@ from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.norms.norm import lengths
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.problem.decision import Decision, Kind, domains_of
+from laufruhe.problem.decision import Decision, Kind, domains_of, vector_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
 from laufruhe.problem.measure import Measure, Rows, bends_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
@@ -223,7 +223,7 @@ class SizeModel:
     @cached_property
     def start(self) -> Array:
         """Columns of the unbalances as given."""
-        return np.concatenate([np.zeros(0), *(d.columns_of(d.decision.start) for d in self.domains)])
+        return vector_of(self.domains)
 
     @cached_property
     def _span(self) -> tuple[Array, Array]:

@@ -202,10 +202,15 @@ def domains_of(decisions: Sequence[Decision]) -> tuple[Domain, ...]:
     return tuple(out)
 
 
+def vector_of(domains: Sequence[Domain], values: Sequence[Value] | Array | None = None) -> Array:
+    """Decision vector of complex unbalances, of those of the design as given unless told."""
+    own = [domain.decision.start for domain in domains] if values is None else values
+    return np.concatenate([np.zeros(0), *(d.columns_of(value) for d, value in zip(domains, own, strict=True))])
+
+
 def columns_of(domains: Sequence[Domain], values: Sequence[Value]) -> Array:
     """Decision vector of complex unbalances, each brought into its set."""
-    out = np.zeros(sum(domain.width for domain in domains))
-    for domain, value in zip(domains, values, strict=True):
-        out[domain.columns] = domain.columns_of(value)
+    out = vector_of(domains, values)
+    for domain in domains:
         out[domain.columns] = domain.project(out)
     return out

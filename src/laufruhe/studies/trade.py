@@ -228,7 +228,7 @@ def _prepared_times(own: Problem) -> tuple[float, float]:
         return math.nan, math.nan
     model = AffineModel(own)
     affine = model.at(model.full_samples)
-    x = np.concatenate([d.columns_of(d.decision.start) for d in affine.domains]) if affine.domains else np.zeros(0)
+    x = affine.start
     gradient = seconds(lambda: _value_and_gradient(affine.terms, x)) if own.unbalances else math.nan
     return seconds(lambda: affine.objective(x)), gradient
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.numerics.arrays import Array, ComplexArray
-from laufruhe.problem.decision import Domain
+from laufruhe.problem.decision import Domain, vector_of
 from laufruhe.problem.sets import Value
 
 # share of the largest load under which one counts as none
@@ -65,7 +65,7 @@ class Columns:
 def columns_of(domains: Sequence[Domain], values: Sequence[Value]) -> tuple[Columns, Array]:
     """All columns of domains, at the unbalances of a design, and their middles."""
     middles, reaches = _ranges(domains)
-    near = np.concatenate([np.zeros(0), *(d.columns_of(value) for d, value in zip(domains, values, strict=True))])
+    near = vector_of(domains, values)
     near = (near - middles) / np.where(reaches > 0.0, reaches, 1.0)
     return Columns(np.diag(reaches), near, tuple(_sets(domains, len(near))), len(domains)), middles
 

@@ -48,9 +48,7 @@ def value_at(terms: Terms, errors: Array) -> float:
     return sum(weight * norm.value(errors) for weight, norm in terms)
 
 
-def worst_case(
-    terms: Terms, columns: Sequence[slice], tolerance: float, seed: int = 0, most: int = MOST_NODES
-) -> WorstCase:
+def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, most: int = MOST_NODES) -> WorstCase:
     """The largest weighted sum of norms N(V0 + E z) over intervals and discs.
 
     Parameters
@@ -65,7 +63,7 @@ def worst_case(
         Parts that the errors are divided into.
     """
     count = columns[-1].stop if columns else 0
-    best = max((_climbed(terms, columns, z) for z in _starts(columns, count, seed)), key=lambda found: found[0])
+    best = max((_climbed(terms, columns, z) for z in _starts(columns, count)), key=lambda found: found[0])
     if not count:
         return WorstCase(np.zeros(0), best[0], best[0], 0)
     search = _Errors(terms, tolerance, best)
@@ -117,9 +115,9 @@ class _Errors(Division[_Part]):
             yield (-bound, _Part(middle, blocks, part.split)) if is_left else None
 
 
-def _starts(columns: Sequence[slice], count: int, seed: int) -> Array:
+def _starts(columns: Sequence[slice], count: int) -> Array:
     """No errors, and random ones that are allowed: a point of the square may lie outside the disc in it."""
-    starts = np.random.default_rng(seed).uniform(-1.0, 1.0, (STARTS + 1, count))
+    starts = np.random.default_rng(0).uniform(-1.0, 1.0, (STARTS + 1, count))
     starts[0] = 0.0
     for disc in columns:
         starts[:, disc] /= np.maximum(np.hypot.reduce(starts[:, disc], axis=1), 1.0)[:, None]

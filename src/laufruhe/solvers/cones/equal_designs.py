@@ -13,7 +13,7 @@ from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.norms import MEAN, Grid
-from laufruhe.problem.decision import Domain, columns_of
+from laufruhe.problem.decision import Domain, columns_of, vector_of
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
@@ -57,7 +57,7 @@ def equal_designs(found: Result, limit: Limit) -> tuple[DecisionRange, ...]:
     model = AffineModel(problem)
     rows = model.at(min(model.full_samples, FEW))
     values = unbalances_of(found.problem, found)
-    x = np.concatenate([d.columns_of(value) for d, value in zip(model.domains, values, strict=True)])
+    x = vector_of(model.domains, values)
     rows = _kept_by(rows, x)
     sizes = [(domain, [_size(domain, end) for end in _ends(rows, domain)]) for domain in model.domains]
     return tuple(

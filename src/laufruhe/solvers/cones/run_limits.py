@@ -17,7 +17,7 @@ from laufruhe.load_models.run_rows import RunRows
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.numerics.progress import tell
-from laufruhe.problem.decision import domains_of
+from laufruhe.problem.decision import domains_of, vector_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
@@ -40,10 +40,7 @@ def solve_run_cones(
         return none_within(problem, evaluate(problem), conflict_of(steps.affine, names), {})
     for _ in in_time(range(_AGAIN)):
         result = decide(steps.problem)
-        x = np.concatenate([
-            domain.columns_of(value)
-            for domain, value in zip(domains_of(problem.decisions), unbalances_of(problem, result), strict=True)
-        ]) if result.decisions else None  # fmt: skip
+        x = vector_of(domains_of(problem.decisions), unbalances_of(problem, result)) if result.decisions else None
         found = result.problem.fidelity
         if found != problem.fidelity:
             # steps are of the physics that the answer was found accurate by
@@ -98,8 +95,7 @@ class _Steps:
 
     def found(self) -> bool:
         """Whether designs of few angles keep all steps; those that break some add them."""
-        parts = [domain.columns_of(domain.decision.start) for domain in domains_of(self._whole.decisions)]
-        x = np.concatenate(parts)
+        x = vector_of(domains_of(self._whole.decisions))
         for _ in in_time(range(_ROUNDS)):
             self.add(x)
             tell("steps of the run-up", sum(map(len, self._places.values())))

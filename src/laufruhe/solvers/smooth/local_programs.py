@@ -14,7 +14,7 @@ from scipy.optimize import minimize, nnls
 from laufruhe.errors import ModelError
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
-from laufruhe.problem.decision import Domain, domains_of
+from laufruhe.problem.decision import Domain, domains_of, vector_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side
 from laufruhe.problem.nothing import nothing_of
@@ -56,7 +56,7 @@ class LocalProgram:
 
     def shares(self, values: Sequence[Value] | Array) -> Array:
         """Of the bounds, where decisions have these values."""
-        own = np.concatenate([d.columns_of(value) for d, value in zip(self.domains, values, strict=True)])
+        own = vector_of(self.domains, values)
         return np.asarray(np.clip((own - self.lower) / (self.upper - self.lower), 0.0, 1.0))
 
     def columns(self, shares: Array) -> Array:

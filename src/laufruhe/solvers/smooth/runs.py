@@ -13,7 +13,7 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.run_look import run_measures
 from laufruhe.load_models.run_peaks import RunPeaks
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.decision import domains_of
+from laufruhe.problem.decision import domains_of, vector_of
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.smooth.gathered import Gathered
@@ -42,9 +42,7 @@ class RunVariables:
             raise ModelError("a run-up of so many turns is checked, not designed for; make it shorter")
         self.symbols = ca.MX.sym("run-up", sum(self._peaks.counts))
         ends = np.cumsum(self._peaks.counts)
-        columns = np.concatenate(
-            [np.zeros(0), *(d.columns_of(d.decision.start) for d in domains_of(problem.unbalances))]
-        )
+        columns = vector_of(domains_of(problem.unbalances))
         given = self.at([d.start_number for d in problem.mount_decisions], columns)
         for measure, end, count in zip(measures, ends.tolist(), self._peaks.counts, strict=True):
             self._own[measure] = self.symbols[end - count : end]
