@@ -15,6 +15,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperGroup
 
+from laufruhe import __version__
 from laufruhe.cli import options as o
 from laufruhe.cli.drawing import SELDOM, artists
 from laufruhe.cli.screen import (
@@ -264,9 +265,7 @@ def trade(
 
 def _show_version(wanted: bool) -> None:
     if wanted:
-        from laufruhe.report.versions import version_of
-
-        typer.echo(f"laufruhe {version_of('laufruhe')}")
+        typer.echo(f"laufruhe {__version__}")
         raise typer.Exit(DONE)
 
 

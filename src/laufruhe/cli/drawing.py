@@ -84,7 +84,10 @@ def _ready() -> None:
 
 
 def _drawn(result: Result, folder: Path, kinds: Sequence[str], first: int, step: int) -> Pictures:
-    """Every so many pictures of a result, as files of these kinds, and as they stand in a page."""
+    """Pictures of one of so many who draw, as files of these kinds, and as they stand in a page."""
     from laufruhe import plots
 
-    return plots.draw_and_show(result, folder, kinds, plots.names(result)[first::step])
+    # there and back again: who has a large one has the next small one
+    turn = 2 * step
+    own = [name for k, name in enumerate(plots.names(result)) if min(k % turn, turn - 1 - k % turn) == first]
+    return plots.draw_and_show(result, folder, kinds, own)

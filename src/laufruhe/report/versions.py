@@ -5,7 +5,9 @@ from __future__ import annotations
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
-PACKAGES = ("laufruhe", "numpy", "cvxpy", "clarabel")
+import laufruhe
+
+PACKAGES = ("numpy", "scipy", "cvxpy", "clarabel", "casadi")
 
 
 def version_of(package: str) -> str:
@@ -18,4 +20,5 @@ def version_of(package: str) -> str:
 
 def versions() -> dict[str, str]:
     """Of everything that numbers hang on."""
-    return {"python": platform.python_version(), **{name: version_of(name) for name in PACKAGES}}
+    own = {"python": platform.python_version(), "laufruhe": laufruhe.__version__}
+    return own | {name: version_of(name) for name in PACKAGES}
