@@ -20,11 +20,12 @@ from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Proof
+from laufruhe.prove.certificate import Proof, Reach
 from laufruhe.report.json_result import as_dict
 from laufruhe.report.sections.reach import sentences, tables
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
+from laufruhe.solvers.conclusion import Shown, concluded, judged
 from laufruhe.solvers.reachable import LONG, with_reachable
 from laufruhe.solvers.result import Result, Status
 
@@ -270,3 +271,15 @@ def test_what_nothing_open_changes_stays() -> None:
     assert told.value == pytest.approx(evaluate(problem).value(problem.limits[-1].measure))
     assert "stays at" in sentences(result)[0]
     assert "needed" not in explained(result)
+
+
+def test_a_design_that_breaks_a_limit_proves_nothing() -> None:
+    problem = SCENES["vee"]
+    design = judged(problem, problem.start)
+    shown = Shown(0.9 * design.value, Reach.WHOLE, 0.0, "a bound")
+    result = concluded(design, design.evaluation, shown, {})
+    assert result.status is Status.FAILED
+    assert result.certificate.kind is Proof.NONE
+    assert result.certificate.lower_bound == shown.bound
+    assert "No design within the bounds and limits has less than" in explained(result)
+    assert "nothing is proven of it" in explained(result)

@@ -31,6 +31,7 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
+from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.conclusion import angle_name
 from laufruhe.solvers.result import Result
 
@@ -227,7 +228,7 @@ def _proved(result: Result) -> Proved | None:
         first = result.ranks[0]
         return Proved(first.least, first.lower_bound, first.gap, str(first.proof))
     certificate, objective = result.certificate, result.objective
-    if certificate is None or objective is None:
+    if certificate is None or objective is None or certificate.kind is Proof.NONE:
         return None
     return Proved(objective.value, certificate.lower_bound, certificate.gap, str(certificate.kind))
 

@@ -128,6 +128,10 @@ def explained(result: Result) -> str:
         return said + needed * " Each limit that is named is needed for that: without it the others can be met."
     if c is None or o is None:
         return "Nothing was decided, so there is nothing to prove."
+    if result.status is Status.FAILED:
+        bound = figure(c.lower_bound, o.unit, 6)
+        least = f"No design within the bounds and limits has less than {bound}. " if c.lower_bound > 0.0 else ""
+        return f"{least}The design found breaks a limit, so that nothing is proven of it."
     if c.kind is Proof.LOCAL:
         return (
             f"The best of the local optima found ({c.method}), with {figure(o.value, o.unit, 6)}. "

@@ -143,6 +143,9 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
         shown.kkt_residual,
         shown.method,
     )
+    if not met:
+        # the bound is of designs, and this is none
+        certificate = replace(certificate, kind=Proof.NONE)
     # prices under what the proof leaves open are those of its rounding
     unfelt = max(_FELT, min(certificate.gap, problem.tolerance))
     limits = limit_values(problem, design.evaluation, shown.prices, design.value, unfelt)

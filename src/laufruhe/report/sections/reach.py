@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from laufruhe.present.numbers import DASH, figure, with_unit
+from laufruhe.present.numbers import DASH, figure, trimmed, with_unit
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import DecisionValue, Nearest, Reached, Result, meaningful
@@ -60,5 +60,5 @@ def _sentence(found: Reached, held: str) -> str:
 
 def _nearest(found: Nearest) -> str:
     value, asked = figure(found.value, found.unit), with_unit(found.limit, found.unit)
-    share = f", {100.0 * found.excess:.3g} % of it too far" if found.limit else ""
+    share = f", {trimmed(100.0 * found.excess, 3)} % beyond" if found.limit else ""
     return f"The nearest design found breaks '{found.name}' most: {value} where {found.side} {asked} is asked{share}."
