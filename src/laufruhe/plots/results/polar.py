@@ -74,7 +74,7 @@ def figure(result: Result) -> Figure:
     paths = [_closed(samples_of(one.design, k)) for one in series]
     mounts = result.problem.engine.mounts[:MOST_PANELS]
     frame, columns = Frame.of(paths, len(mounts)), rows_of(len(mounts), MOST_COLUMNS)
-    drawn = page(math.ceil(len(mounts) / columns), columns, (PANEL, PANEL), len(mounts), GAP, LEAD, 0.36)
+    drawn = page(math.ceil(len(mounts) / columns), columns, (PANEL, PANEL), len(mounts), GAP, LEAD, 0.44)
     cycle = result.problem.engine.cycle
     quarters = (len(paths[0]) - 1) // (4 * cycle.turns)
     first = result.final.engine.cylinders[0]
