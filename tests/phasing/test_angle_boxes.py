@@ -205,7 +205,8 @@ CASES = [
 def test_no_angle_is_better_than_the_bound(text: str, of_bank: bool, gas: str, name: str) -> None:
     """Cones at fixed angles, and the bound meets the design."""
     # of a pressure few samples know too little for the last digits
-    problem = _read(text + (gas or FEW) + MOUNTS + WEIGHTS + _objective(name))
+    steps = changed(FEW, "360", "720") if gas else FEW
+    problem = _read(text + gas + MOUNTS + WEIGHTS + steps + _objective(name))
     result = solve(problem)
     low, high = problem.phasing.bank if of_bank else problem.phasing.split
     grid = [solve(_at(problem, angle, of_bank)).objective.value for angle in np.linspace(low, high, 5)]

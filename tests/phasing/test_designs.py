@@ -167,9 +167,9 @@ def test_a_program_out_of_time_is_not_sold_as_an_optimum(tmp_path):
 @pytest.mark.slow
 def test_sampled_norms_are_not_certified_by_scip(tmp_path):
     rest = engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE
-    problem = engines.problem(tmp_path, 4, phasing='method = "program"\nbest = 1', rest=rest, samples=48)
+    problem = engines.problem(tmp_path, 3, phasing='method = "program"\nbest = 1', rest=rest, samples=48)
     result = solve(problem)
-    proven = engines.problem(tmp_path, 4, phasing="best = 1", rest=rest, samples=48)
+    proven = engines.problem(tmp_path, 3, phasing="best = 1", rest=rest, samples=48)
     assert result.certificate.lower_bound <= solve(proven).objective.value * (1.0 + 1e-9)
     if result.certificate.kind is Proof.GLOBAL:
         assert result.certificate.gap <= 2.0 * problem.tolerance
