@@ -42,6 +42,7 @@ samples = 48
 MODELS = (
     "vee-two-90", "rotary-two", "soft-mounts-run-up", "tractor-four-bearings", "inline-five-torsion",
     "inline-seven-uneven", "waterworks-steam-pump", "selective-assembly", "radial-seven", "car-four-willans", "robust",
+    "twin-parallel-360",
 )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from laufruhe.machine.crank_names import name_of_crank
 from laufruhe.plots.style import entry, headed, page, point_name, styled
-from laufruhe.plots.words import FAINT, INK, SMALL
+from laufruhe.plots.words import FAINT, INK, SMALL, UNSEEN
 from laufruhe.present.measures import hardest_point
 from laufruhe.present.numbers import figure as told
 from laufruhe.present.twins import KINDS, ORDERS, Parts, is_twin, parts_of
@@ -32,8 +32,9 @@ def figure(result: Result) -> Figure:
     drawn = page(2, 3, (SIZE, SIZE), gap=0.7, lead=0.3, across=0.72)
     _firings(drawn.panels[0], result)
     parts, given = parts_of(result, engine, k), parts_of(result, result.initial.engine, k)
-    # what is a rounding of the design as given is nothing
-    largest = {kind: max(_sizes(parts, kind) + _sizes(given, kind)) for kind in KINDS}
+    most = max(_sizes(each, kind) for each in (parts, given) for kind in KINDS)
+    parts, given = _seen(parts, most), _seen(given, most)
+    largest = {kind: max(_sizes(parts, kind), _sizes(given, kind)) for kind in KINDS}
     _bars(drawn.panels[3], parts, largest)
     for row, kind in enumerate(KINDS):
         for column, (order, name) in enumerate(ORDERS.items()):
@@ -50,9 +51,17 @@ def figure(result: Result) -> Figure:
     return headed(drawn, result, "Firings, and what turns forward and backward", lines, legend)
 
 
-def _sizes(parts: Parts, kind: str) -> list[float]:
-    """Largest of a force or couple in every order."""
-    return [abs(forward) + abs(backward) for (own, _), (forward, backward) in parts.items() if own == kind]
+def _sizes(parts: Parts, kind: str) -> float:
+    """Largest of a force or couple in any order."""
+    return max(abs(forward) + abs(backward) for (own, _), (forward, backward) in parts.items() if own == kind)
+
+
+def _seen(parts: Parts, most: float) -> Parts:
+    """What cannot be seen beside the largest is nothing."""
+    return {
+        key: (ahead * (abs(ahead) > UNSEEN * most), back * (abs(back) > UNSEEN * most))
+        for key, (ahead, back) in parts.items()
+    }
 
 
 def _firings(axes: Axes, result: Result) -> None:
