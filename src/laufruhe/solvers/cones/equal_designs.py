@@ -27,9 +27,9 @@ MOST_OPEN = 16
 DIRECTIONS = 8
 FEW, ROOM = 180, 1e-7
 """Angles at which designs are compared, and the share by which a limit is wider there for a solver to find them."""
-GLANCE, LEAST, FAR, NEGLIGIBLE = 48, 1e-7, 10.0, 1e-2
-"""Angles at which is found out whether there are others at all; share of the objective that a decision's whole size is
-worth in that, and how many sizes off it aims; share of a size that is none."""
+GLANCE, LEAST, LITTLE, FAR, NEGLIGIBLE = 48, 1e-8, 1e-7, 10.0, 1e-2
+"""Angles at which is found out whether there are others at all; shares of the objective that a decision's whole size is
+worth in that, and where ends are sought; how many sizes off both aim; share of a size that is none."""
 SHARES = (1.0, 0.99, 0.9, 0.5)
 """Of the way to an end at which a design is tried: what a program knows of a peak is not its last digit."""
 FREE = 0.2
@@ -82,13 +82,13 @@ def free_decisions(found: Result) -> tuple[DecisionRange, ...] | None:
     model = AffineModel(problem)
     x = columns_of(model.domains, unbalances_of(problem, found))
     rows = _kept_by(model.at(min(model.full_samples, GLANCE)), x)
-    others = [] if rows.groups else _around(rows, x)
+    others = [] if rows.groups else _around(rows, x, LEAST)
     if not others:
         return None
     if not _moving(rows, [x, *others]):
         return ()
     rows = _kept_by(model.at(min(model.full_samples, FEW)), x)
-    designs = [x, *(good for end in _around(rows, x) for good in _good(found, problem, model, x, end))]
+    designs = [x, *(good for end in _around(rows, x, LITTLE) for good in _good(found, problem, model, x, end))]
     return tuple(told for domain in _moving(rows, designs) for told in _ranges(domain, designs))
 
 
@@ -98,13 +98,13 @@ def _kept_by(rows: AffineProblem, x: Array) -> AffineProblem:
     return replace(rows, limits=limits)
 
 
-def _around(rows: AffineProblem, x: Array) -> list[Array]:
+def _around(rows: AffineProblem, x: Array, share: float) -> list[Array]:
     """Designs on either side of all that are as good."""
     aim = np.random.default_rng(1964).standard_normal(rows.size)
     slope = np.diag(1.0 / rows.units)[None]
     targets = (x / rows.units + sign * FAR * aim for sign in (-1.0, 1.0))
     far = (AffineNorm(MEAN, -target[None], slope, Grid(np.ones(1), 1)) for target in targets)
-    weight = LEAST * (rows.objective(x) or 1.0)
+    weight = share * (rows.objective(x) or 1.0)
     return [end for norm in far for end in _toward(rows, norm, weight)]
 
 
