@@ -274,7 +274,8 @@ def test_where_masses_weigh_nothing_it_is_a_geometric_program() -> None:
 
 def test_stresses_that_nothing_meets_are_named(tmp_path: Path) -> None:
     text = changed(TEXT, 'max = "50 N/mm^2"', 'max = "0.5 N/mm^2"')
-    result = laufruhe.solve(loaded(tmp_path, text))
+    # what the limit can reach is told beside it
+    result = laufruhe.solve(loaded(tmp_path, text).changed(tolerance=1e-2))
     assert result.status is Status.INFEASIBLE
     assert result.conflict == ("maximum web stress",)
 
