@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 import subprocess
 import sys
@@ -90,6 +91,18 @@ def test_the_ring_stands_where_the_first_cylinder_fires() -> None:
         assert np.linalg.norm(np.ravel(ring.get_xydata()) - nearest) < 0.02 * np.abs(samples).max()
     assert "cylinder 1 fires" in texts(figure)
     assert "dead centre" not in texts(engine.figure(result))
+
+
+def test_what_hardly_moves_is_shown_without_its_steady_part() -> None:
+    angles = np.linspace(0.0, math.tau, 181)
+    path = np.stack([0.0 * angles, 3.0 * np.cos(angles), 200.0 + np.sin(angles)], axis=-1)[:, None, :]
+    (moved,), told = polar._moving([path])
+    assert "steady" in told
+    assert moved[:-1].mean(axis=0) == pytest.approx(0.0, abs=1e-12)
+    assert np.ptp(moved, axis=0) == pytest.approx(np.ptp(path, axis=0))
+    (kept,), told = polar._moving([0.02 * path + np.stack([0.0 * path[..., 0], path[..., 1], 0.0 * path[..., 0]], -1)])
+    assert told == ""
+    assert kept[0, 0, 2] == pytest.approx(4.0)
 
 
 def test_polar_diagrams_share_one_scale() -> None:

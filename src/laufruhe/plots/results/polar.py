@@ -28,6 +28,8 @@ POINTS = 1440
 PANEL, GAP, LEAD = 2.0, 0.42, 0.42
 # how many times a smaller side is enlarged, so that its panel is filled
 ENLARGED = (20, 10, 5, 2, 1)
+STEADY = 0.25
+"""Share of the largest force: what moves less about a steady part is shown without it."""
 NEEDLE = 1.0 / 24.0
 """Of the larger force: where the smaller one is less than this, the path is a needle and is unrolled."""
 LATERAL, VERTICAL = 1, 2
@@ -71,7 +73,7 @@ class Frame:
 def figure(result: Result) -> Figure:
     """One panel for each mount, all to one scale; forces of one direction over the crank angle."""
     k, series = hardest_point(result), series_of(result, loads=True)
-    paths = [_closed(samples_of(one.design, k)) for one in series]
+    paths, steady = _moving([_closed(samples_of(one.design, k)) for one in series])
     mounts = result.problem.engine.mounts[:MOST_PANELS]
     frame, columns = Frame.of(paths, len(mounts)), rows_of(len(mounts), MOST_COLUMNS)
     drawn = page(math.ceil(len(mounts) / columns), columns, (PANEL, PANEL), len(mounts), GAP, LEAD, 0.44)
@@ -90,7 +92,7 @@ def figure(result: Result) -> Figure:
         _frame(axes, frame, factor, cycle.turns)
         _name(axes, mount, result.final.engine.mounts[m])
     _label(drawn, columns, frame, unit)
-    lines = f"Force on each mount at {point_name(result, k)}, seen from the front.{_told(frame)}"
+    lines = f"Force on each mount at {point_name(result, k)}, seen from the front.{_told(frame)}{steady}"
     title = "Mount forces over one working cycle"
     return headed(drawn, result, title, lines, _legend(series, frame, first.name), _left_out(paths, frame))
 
@@ -100,6 +102,13 @@ def _closed(samples: Array) -> Array:
     count = len(samples)
     step = next((n for n in range(count // POINTS, 1, -1) if count % n == 0), 1)
     return np.concatenate([samples[::step], samples[:1]])
+
+
+def _moving(paths: list[Array]) -> tuple[list[Array], str]:
+    """Paths without their steady part where that is most of them, as the mean torque is on soft mounts; and words."""
+    moving = [path - path[:-1].mean(axis=0) for path in paths]
+    whole, rest = (max(float(np.abs(path[..., 1:]).max(initial=0.0)) for path in each) for each in (paths, moving))
+    return (paths, "") if rest > STEADY * whole else (moving, " The steady part is left out.")
 
 
 def _path(axes: Axes, path: Array, one: Series, quarters: int, fired: int, width: float) -> None:
