@@ -123,7 +123,7 @@ def explained(result: Result) -> str:
     c, o = result.certificate, result.objective
     if result.status is Status.INFEASIBLE:
         ruled_out = "Every star and firing order allowed was ruled out" if result.problem.phasing is not None else ""
-        needed = bool(result.reached) and all(found.decisions for found in result.reached)
+        needed = bool(result.conflict) and {one.name for one in result.reached if one.decisions} >= {*result.conflict}
         said = f"{ruled_out or 'It is proven that no design keeps the limits named'}."
         return said + needed * " Each limit that is named is needed for that: without it the others can be met."
     if c is None or o is None:

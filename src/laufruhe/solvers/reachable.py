@@ -20,7 +20,7 @@ from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach, certified
-from laufruhe.solvers.conclusion import KEPT, broken_limits, contradiction, limit_values, nearest_of
+from laufruhe.solvers.conclusion import KEPT, broken_limits, contradiction, limit_values, nearest_of, none_within
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Nearest, ObjectiveValue, Reached, Result, Status
 
@@ -84,7 +84,7 @@ def with_reachable(found: Result, problem: Problem, kinds: Collection[Kind], too
     wanted = _wanted(found, problem)
     found = replace(found, reached=tuple(answer.told for answer in answers if answer.told.name in wanted))
     if found.status is Status.FAILED and drawn:
-        found = _excluded(found)
+        found = _excluded(found, problem)
     near = _nearest(found, problem, designs) if drawn and found.status is Status.FAILED else None
     return replace(found, nearest=near)
 
@@ -226,14 +226,15 @@ def _recovered(found: Result, problem: Problem, result: Result) -> Result:
     )
 
 
-def _excluded(found: Result) -> Result:
+def _excluded(found: Result, problem: Problem) -> Result:
     """Infeasible where no design that keeps the other limits comes down to one of them."""
     for told in found.reached:
         if told.side == "at most" and told.bound > told.limit * (1.0 + KEPT):
-            others = " that keeps the other limits" if len(found.problem.limits) > 1 else ""
+            names = tuple(limit.name for limit in problem.limits)
+            others = " that keeps the other limits" if len(names) > 1 else ""
+            none = none_within(problem, found.initial, names, found.timing)
             message = f"no design exists: none{others} keeps '{told.name}'"
-            return replace(found, status=Status.INFEASIBLE, objective=None, certificate=None, message=message,
-                           conflict=(told.name,))  # fmt: skip
+            return replace(none, message=message, reached=found.reached)
     return found
 
 
