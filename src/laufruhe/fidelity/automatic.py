@@ -57,7 +57,11 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
     Choice whose estimate is under the tolerance wherever the reference itself is; of
     an objective that is zero, everything that is not zero is kept.
     """
-    scale = Scale(problem, reference(problem, engine))
+    return chosen_by(Scale(problem, reference(problem, engine)), tolerance)
+
+
+def chosen_by(scale: Scale, tolerance: float) -> Choice:
+    """As `choose`, beside a reference that is known."""
     room = max(tolerance - scale.doubt, 0.0)
     chosen = replace(scale.best.fidelity, tolerance=tolerance, gas_samples=REFERENCE_SAMPLES)
     for knob in KNOBS:
@@ -71,16 +75,17 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
         tuple(text for knob in KNOBS for text in knob.kept(scale, chosen)),
         # what is exactly zero first
         tuple(sorted(left, key=lambda part: part.restored is not None)),
-        _numbers(problem, scale, chosen),
+        _numbers(scale.problem, scale, chosen),
     )
 
 
-def automatic(problem: Problem, tolerance: float) -> Problem:
-    """The problem at the fidelity chosen for it."""
+def automatic(problem: Problem, tolerance: float, scale: Scale | None = None) -> Problem:
+    """The problem at the fidelity chosen for it, beside a reference where one is known."""
     if not problem.load_terms or any(measure.channel.is_checked for measure in problem.measures):
         # nothing tells what run-ups lose with an order
         return problem.at(replace(problem.fidelity, tolerance=tolerance))
-    return problem.at(choose(problem, tolerance).fidelity)
+    chosen = choose(problem, tolerance) if scale is None else chosen_by(scale, tolerance)
+    return problem.at(chosen.fidelity)
 
 
 def ladder(problem: Problem) -> list[tuple[str, Problem]]:
@@ -89,7 +94,7 @@ def ladder(problem: Problem) -> list[tuple[str, Problem]]:
     rungs = [(name, problem.at(fidelity)) for knob in KNOBS for name, fidelity in knob.rungs(scale)]
     if not problem.load_terms and not any(term.measure.channel.is_checked for term in problem.objective):
         return [("mounts alone, no loads", replace(problem, points=())), *rungs]
-    return rungs + [(f"auto {tolerance:g}", automatic(problem, tolerance)) for tolerance in TRIED]
+    return rungs + [(f"auto {tolerance:g}", automatic(problem, tolerance, scale)) for tolerance in TRIED]
 
 
 def _numbers(problem: Problem, scale: Scale, chosen: Fidelity) -> tuple[int, int]:

@@ -8,6 +8,7 @@ mean or maximum the curvature of the signal bounds what the samples miss.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 
@@ -73,6 +74,7 @@ class Scale:
         self.problem, self.best = problem, best
         self.terms = [term for term in problem.objective if term.measure.is_load]
         self.value = _loads(problem, best)
+        self._known: dict[tuple[str, Fidelity], float] = {}
 
     def evaluation(self, fidelity: Fidelity) -> Evaluation:
         """The same design at another fidelity."""
@@ -114,11 +116,26 @@ class Scale:
 
     def loses(self, fidelity: Fidelity, than: Evaluation | None = None) -> float:
         """What a fidelity leaves out at most, relative, of the reference or of another evaluation (F6)."""
-        return relative(self.lost(self.evaluation(fidelity), than or self.best), self.value)
+        if than is not None:
+            return relative(self.lost(self.evaluation(fidelity), than), self.value)
+        return self._once("loses", fidelity, lambda own: self.lost(own, self.best))
 
     def misses(self, fidelity: Fidelity) -> float:
         """What its samples miss at most, relative (F7, F8)."""
-        return relative(self.missed(self.evaluation(fidelity)), self.value)
+        return self._once("misses", fidelity, self.missed)
+
+    def _once(self, what: str, fidelity: Fidelity, found: Callable[[Evaluation], float]) -> float:
+        """Relative, of the design at a fidelity: each tolerance asks for the same ones."""
+        key = what, replace(fidelity, tolerance=None)
+        if key not in self._known:
+            self._known[key] = relative(found(self.evaluation(fidelity)), self.value)
+        return self._known[key]
+
+    def error_of(self, evaluation: Evaluation) -> float:
+        """Of the objective of the same design at another fidelity, as `error_bound`."""
+        value = _loads(self.problem, evaluation)
+        bound = self.lost(evaluation, self.best) + self.missed(evaluation, self.best.samples) + self.doubted
+        return relative(bound + ROUNDING * value, value)
 
     @cached_property
     def repeats(self) -> int:
@@ -192,9 +209,7 @@ def error_bound(problem: Problem, evaluation: Evaluation, best: Evaluation) -> f
     -------
     Over the objective of `evaluation`; infinite where that is zero and the bound is not.
     """
-    scale, value = Scale(problem, best), _loads(problem, evaluation)
-    bound = scale.lost(evaluation, best) + scale.missed(evaluation, best.samples) + scale.doubted
-    return relative(bound + ROUNDING * value, value)
+    return Scale(problem, best).error_of(evaluation)
 
 
 def sampling_error(problem: Problem, evaluation: Evaluation) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.fidelity.automatic import ladder
-from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, error_bound, reference
+from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale, reference
 from laufruhe.fidelity.mount_knobs import TIME_ORDERS, TIME_SAMPLES
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.load_models.run_look import asks_runs
@@ -25,7 +25,7 @@ from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
 from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
@@ -130,12 +130,13 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
         least = math.nan if engine is None else objective_value(problem, reference(problem, engine))
         # what cancels has no share by which another design is worse
         least = 0.0 if engine is not None and least <= nothing_of(problem, engine) else least
+    scale = Scale(problem, best)
     rows, whole, known = [], False, dict[tuple[Fidelity, int], Row]()
     for name, own in ladder(problem):
         say(name)
         # several tolerances may come to the same physics
         physics = replace(own.fidelity, tolerance=None), len(own.points)
-        row = replace(known[physics], name=name) if physics in known else _row(name, own, best, truth, least)
+        row = replace(known[physics], name=name) if physics in known else _row(name, own, scale, truth, least)
         known[physics] = row
         if passed():
             # what a limit may have cut short is no measurement
@@ -189,7 +190,7 @@ def optimum(problem: Problem, samples: int | None = None) -> Engine | None:
     return result.final.engine if result.status in (Status.OPTIMAL, Status.FEASIBLE) else None
 
 
-def _row(name: str, own: Problem, best: Evaluation, truth: float, least: float) -> Row:
+def _row(name: str, own: Problem, scale: Scale, truth: float, least: float) -> Row:
     evaluation = evaluate(own)
     value = objective_value(own, evaluation)
     prepared, gradient = _prepared_times(own)
@@ -199,7 +200,7 @@ def _row(name: str, own: Problem, best: Evaluation, truth: float, least: float) 
         engine = optimum(own)
         if engine is not None:
             solve_time = time.perf_counter() - started
-            whole = replace(own, points=tuple(loads.point for loads in best.loads))
+            whole = replace(own, points=tuple(loads.point for loads in scale.best.loads))
             found = objective_value(whole, reference(whole, engine))
             regret = found / least - 1.0 if least > 0.0 else math.nan
     fresh = seconds(lambda: _from_nothing(own))
@@ -207,7 +208,7 @@ def _row(name: str, own: Problem, best: Evaluation, truth: float, least: float) 
         name=name,
         error=abs(value - truth) / truth if truth > 0.0 else 0.0,
         # the bound is over what was computed, a table compares with the reference
-        estimate=error_bound(own, evaluation, best) * value / truth if truth > 0.0 else 0.0,
+        estimate=scale.error_of(evaluation) * value / truth if truth > 0.0 else 0.0,
         evaluation=fresh if math.isnan(prepared) else prepared,
         gradient=gradient,
         solve=solve_time,
