@@ -9,10 +9,8 @@ import pytest
 
 from cli import scenes
 from laufruhe.cli import drawing
-from laufruhe.files.reader import load
-from laufruhe.solvers import solve
 from laufruhe.solvers.result import Result
-from problem_files import PROBLEMS
+from ready import solved
 
 pytestmark = pytest.mark.slow
 
@@ -28,7 +26,7 @@ def drawn(result: Result, folder: Path, count: int, monkeypatch: pytest.MonkeyPa
 
 
 def test_by_whom_a_picture_is_drawn_cannot_be_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    result = solve(load(PROBLEMS / "vee-two-90.toml"))
+    result = solved("vee-two-90")
     here, there = (drawn(result, tmp_path / str(count), count, monkeypatch) for count in (0, 2))
     assert list(here) == list(there)
     assert here == there
@@ -38,7 +36,7 @@ def test_a_crank_that_was_open_is_drawn_by_another_process(tmp_path: Path, monke
     def never(*_: object) -> None:
         raise AssertionError("drawn here")
 
-    result = solve(load(PROBLEMS / "two-stroke-four-open.toml"))
+    result = solved("two-stroke-four-open")
     monkeypatch.setattr("laufruhe.plots.draw_and_show", never)
     assert {"star.png", "firings.png"} <= set(drawn(result, tmp_path, 1, monkeypatch))
 
