@@ -61,7 +61,7 @@ class Polar extends Compared {
   panel(name, place) {
     const svg = picture(200, 200, "");
     const was = line("was"), now = line(`now ${colour(place)}`);
-    const start = drawn("circle", { r: 3.4, class: `dot ${colour(place)}` }), tick = label(194, 94, "", "end");
+    const start = drawn("circle", { r: 3.4, class: `dot ${colour(place)}` }), tick = label(198, 16, "", "end");
     for (const r of [45, 90]) svg.append(drawn("circle", { cx: 100, cy: 100, r, class: "grid" }));
     svg.append(drawn("path", { d: "M10 100H190M100 10V190", class: "axis" }), was, now, start, tick);
     const root = element("figure", { class: "live-polar" }, svg, element("figcaption", {}, name));
