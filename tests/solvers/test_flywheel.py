@@ -306,3 +306,22 @@ def test_every_even_star_of_equal_cylinders_stores_the_same(tmp_path: Path) -> N
     assert proven(problem).objective.value == pytest.approx(max(degrees), rel=1e-9)
     with pytest.raises(ModelError, match="no method decides star and flywheel together for degree of irregularity"):
         laufruhe.solve(loaded(tmp_path, text + INERTIA + wanted))
+
+
+@pytest.mark.slow
+def test_what_steps_miss_of_the_degree_is_told() -> None:
+    """Of what is minimised and of what is limited: no less than what ten thousand steps change."""
+    text = SINGLE + '[flywheel]\ninertia = "2 kg m^2"\n[objective]\nminimise = "degree of irregularity"\n'
+    text += '[[constraints]]\nlimit = "degree of irregularity"\nmax = 1.9\n'
+
+    def solved(samples: int) -> laufruhe.solvers.Result:
+        return laufruhe.solve(laufruhe.load(text.replace("samples = 360", f"samples = {samples}")))
+
+    true = solved(5760).objective
+    assert true is not None
+    for samples in (60, 90, 240):
+        found = solved(samples)
+        assert found.objective is not None
+        off = abs(found.objective.value - true.value) / found.objective.value
+        assert 0.0 < off <= found.error_estimate
+        assert found.limits[0].error_estimate >= off

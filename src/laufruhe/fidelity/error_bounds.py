@@ -55,10 +55,20 @@ def missed(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAM
     run = evaluation.engine.run
     if measure.channel.is_checked and run is not None:
         return missed_share(run) * evaluation.value(measure)
+    if measure.channel.of_torque:
+        return _missed_of_torque(measure, evaluation, finest)
     if not measure.is_load:
         return 0.0
     shares = measure.shares([loads.point for loads in evaluation.loads])
     return measure.norm.sampling_bound(signals(measure, evaluation), shares, evaluation.samples, finest)
+
+
+def _missed_of_torque(measure: Measure, evaluation: Evaluation, finest: int) -> float:
+    """Of how evenly the crank turns: what is left of the finest steps is no more than these change."""
+    own = evaluation.fidelity
+    finer = replace(own, samples=max(2 * own.samples, finest), gas_samples=max(2 * own.gas_steps, finest))
+    value, other = evaluation.value(measure), replace(evaluation, fidelity=finer).value(measure)
+    return 2.0 * abs(other - value) if math.isfinite(value) and math.isfinite(other) else 0.0
 
 
 class Scale:

@@ -21,7 +21,8 @@ def error_of(problem: Problem, evaluation: Evaluation) -> float:
 
     A fidelity chosen by hand is taken as wanted, so that only its samples are judged.
     """
-    runs = [term for term in problem.objective if term.measure.channel.is_checked]
+    told = [(term, term.measure.channel) for term in problem.objective]
+    runs = [term for term, channel in told if channel.is_checked or channel.of_torque]
     loads = _error_of_loads(problem, evaluation)
     if not runs or evaluation.resonance:
         return loads
