@@ -112,7 +112,7 @@ def test_transmissibility_of_lines_is_that_of_the_model(name: str) -> None:
     problem = load(tables)
     boxes = SpringBoxes(problem, 2.0 * objective_value(problem, evaluate(problem)), 1e-3, problem.start)
     near = np.array([d.start_number for d in problem.mount_decisions])
-    box = SpringBox(boxes, boxes._terms[0][1], np.inf, near * (1.0 - 1e-9), near * (1.0 + 1e-9))
+    box = SpringBox(boxes, boxes._terms[0][1], (np.inf, np.inf), near * (1.0 - 1e-9), near * (1.0 + 1e-9))
     found = []
     for ratio in boxes.limits.ratios:
         (order,) = ratio.orders

@@ -132,9 +132,8 @@ def test_a_narrowed_box_keeps_all_better_designs_and_halves_are_dropped_rightly(
     designs = designs_about(problem, NEAR, 60)
     best, least = min(designs, key=lambda pair: pair[1])
     boxes = SpringBoxes(problem, 1.02 * least, 1e-3, best.tolist())
-    found, solved = narrowed(boxes, boxes.lower, boxes.upper, np.ones(len(boxes.lower)))
+    found, _ = narrowed(boxes, boxes.lower, boxes.upper, np.ones(len(boxes.lower)))
     assert found is not None
-    assert solved == 2 * len(boxes.lower)
     for x, value in designs:
         if value <= 1.02 * least:
             assert np.all((found[0][:4] <= x) & (x <= found[1][:4]))

@@ -53,6 +53,7 @@ direction_weights = [1, 0.5, 2]""",
     "transmissibility": 'minimise = "transmissibility"',
     "of orders": 'minimise = "transmissibility"\norders = [2, 4]',
     "peak to peak": 'minimise = "peak to peak mount force"',
+    "worst mean": 'minimise = "worst mean mount force"',
     "torque roll": 'minimise = "torque-roll residual"\nfrequency = "9 Hz"',
     "sum": """[[objective.terms]]
 quantity = "rms mount force"

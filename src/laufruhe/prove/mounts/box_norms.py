@@ -69,13 +69,15 @@ def _sampled(model: BoxModel, quantity: Measure, answer: Answer, lines: Lines, p
     boxes, samples, mounts = len(value), len(turns), value.shape[-1] // 3
     rows = np.einsum("tk,bkr->btr", turns, value).real.reshape(boxes, samples, mounts, 3)
     box = np.arange(boxes)
-    if quantity.norm.sums_lengths:
+    if quantity.norm.sums_lengths or quantity.norm.joins_points:
         size = np.linalg.norm(rows, axis=-1)
         along = rows / np.where(size > 0.0, size, 1.0)[..., None]
         share = 1.0 / (samples * mounts)
         duals = np.einsum("tk,btr->bkr", turns, along.reshape(boxes, samples, -1))
         slope = share * np.einsum("bkr,bknr->bn", duals, slopes).real
-        return Under(share * size.sum(axis=(1, 2)), slope, rest[:, 0])
+        # a mean of lengths is not over their root mean square
+        squares = np.where(lines.orders[own] > 0.0, 0.5, 1.0) / mounts
+        return Under(share * size.sum(axis=(1, 2)), slope, np.sqrt(rest**2 @ squares))
     # a signal reaches as far as its longest row; of a peak to peak as its row farthest from another
     first, times = np.zeros((boxes, mounts, 3)), 1.0
     if not quantity.norm.of_row_lengths:

@@ -72,10 +72,11 @@ class Searched(Protocol):
 
 
 class SpringBox:
-    """One box, for designs of which a norm is not over a number."""
+    """One box, for designs of which a norm is not over a number; no more is proven than is enough."""
 
-    def __init__(self, search: Searched, each: Asked, most: float, lower: Array, upper: Array) -> None:
-        self.search, self.each, self.most, self.lower, self.upper = search, each, most, lower, upper
+    def __init__(self, search: Searched, each: Asked, ends: tuple[float, float], lower: Array, upper: Array) -> None:
+        self.search, self.each, self.lower, self.upper = search, each, lower, upper
+        self.most, self.enough = ends
         self.parts = search.parts(lower, upper)
         self.mounts = self.parts[0]
         self._stands = np.zeros(self.mounts.numbers)
@@ -100,16 +101,26 @@ class SpringBox:
             bound, pull, middle = self._together(heads, np.ones(1))
             found = heads[0].unit * math.sqrt(max(bound, 0.0)) - heads[0].loss
             return min(max(found, 0.0), most), pull, middle
-        roots = known
-        if np.array_equal(self.lower, self.search.lower) and np.array_equal(self.upper, self.search.upper):
-            roots = self._together_again(heads, self._alone(heads, known))
-            known[:] = roots
-        mean = self._mean(heads, roots)
-        if mean.floor >= most:
-            return most, pull, None
+        roots = self._alone(heads, known)
+        shown = self._shown(heads, roots)
+        if shown[0] < self.enough and self._is_whole:
+            known[:] = self._together_again(heads, roots)
+            shown = max(shown, self._shown(heads, known), key=lambda each: each[0])
+        return shown
+
+    @property
+    def _is_whole(self) -> bool:
+        """Whether it is all that is divided."""
+        return np.array_equal(self.lower, self.search.lower) and np.array_equal(self.upper, self.search.upper)
+
+    def _shown(self, heads: Sequence[Head], roots: Array) -> tuple[float, Array, Array | None]:
+        """What a mean is not under where its roots are not under these."""
+        mean, pull = self._mean(heads, roots), np.zeros(len(self.lower))
+        if mean.floor >= self.enough:
+            return min(mean.floor, self.most), pull, None
         bound, pull, middle = self._together(heads, mean.prices, mean)
-        bound = max(min(bound + mean.constant, most), mean.floor)
-        return bound, self._with_hidden(heads, pull, most - bound), middle
+        bound = max(min(bound + mean.constant, self.most), mean.floor)
+        return bound, self._with_hidden(heads, pull, self.most - bound), middle
 
     def _with_hidden(self, heads: Sequence[Head], pull: Array, lacking: float) -> Array:
         """Sides by what halving may bring: products that are apart, or odd multiples that are told too high (E62)."""

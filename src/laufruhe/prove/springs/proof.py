@@ -126,9 +126,7 @@ class _Narrowing(Halving):
             over = self.spent >= self._most or passed()
             if over or not pull.any() or best - before < PROGRESS * (self.enough - before):
                 return best, Box(lower, upper, int(np.argmax(pull)))
-            whole = np.array_equal(lower, self._search.lower) and np.array_equal(upper, self._search.upper)
-            little = 0.0 if whole and not self._search.modes else LITTLE
-            found, solved = narrowed(self._search, lower, upper, pull, little)
+            found, solved = narrowed(self._search, lower, upper, pull)
             self.spent += solved
             if found is None:
                 return None
@@ -145,13 +143,11 @@ class _Narrowing(Halving):
         return found
 
 
-def narrowed(
-    boxes: SpringBoxes, lower: Array, upper: Array, pull: Array, little: float = LITTLE
-) -> tuple[tuple[Array, Array] | None, int]:
+def narrowed(boxes: SpringBoxes, lower: Array, upper: Array, pull: Array) -> tuple[tuple[Array, Array] | None, int]:
     """A box without what the relaxation shows to hold no better design, none where that is all of it (E59).
 
     Of every side the least and the largest number that leave room for one, as multipliers prove them. Sides that hardly
-    keep the relaxation from a design stay as they are.
+    keep the relaxation from a design stay as they are, and so do ends at which the best design is.
 
     Returns
     -------
@@ -165,12 +161,18 @@ def narrowed(
     middle[count:], half[count:] = 0.0, 1.0
     sides = [(j, side) for j, side in enumerate(mounts.straight) if side is not None]
     sides += [(numbers + k, count + k) for k in range(len(lower) - count)]
-    sides = [(number, side) for number, side in sides if pull[side] > little * pull.max()]
+    ends = [
+        (number, side, sign) for number, side in sides if pull[side] > LITTLE * pull.max()
+        for sign in (1.0, -1.0) if not boxes.is_at(lower, upper, side, sign)
+    ]  # fmt: skip
     whole = np.eye(numbers + len(lower) - count)
-    found = aimed(program, (sign * whole[number] for number, _ in sides for sign in (1.0, -1.0)))
-    for solved, (_, side) in enumerate(sides, 1):
-        least[side] = max(least[side], middle[side] + half[side] * next(found))
-        most[side] = min(most[side], middle[side] - half[side] * next(found))
+    found = aimed(program, (sign * whole[number] for number, _, sign in ends))
+    for solved, (_, side, sign) in enumerate(ends, 1):
+        edge = middle[side] + sign * half[side] * next(found)
+        if sign > 0.0:
+            least[side] = max(least[side], edge)
+        else:
+            most[side] = min(most[side], edge)
         if least[side] > most[side]:
-            return None, 2 * solved
-    return (least, most), 2 * len(sides)
+            return None, solved
+    return (least, most), len(ends)

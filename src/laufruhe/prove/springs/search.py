@@ -42,6 +42,9 @@ LARGE = 0.03
 # share of the bounds of unbalances that says what is large beside the best design
 WIDE = 0.3
 
+# of a side, what counts as its end
+AT_END = 0.1
+
 
 class SpringBoxes:
     """Bounds of boxes.
@@ -128,6 +131,13 @@ class SpringBoxes:
                 found[j] = (2.0 * self.near[side] - lower[side] - upper[side]) / (upper[side] - lower[side])
         return np.clip(found, -1.0, 1.0)
 
+    def is_at(self, lower: Array, upper: Array, side: int, sign: float) -> bool:
+        """Whether the best design is at the lower end of a side, or at the upper one, as its sign says."""
+        if side >= len(self.near):
+            return False
+        apart = self.near[side] - lower[side] if sign > 0.0 else upper[side] - self.near[side]
+        return bool(abs(apart) < AT_END * (upper[side] - lower[side]))
+
     @property
     def mount_numbers(self) -> int:
         """How many numbers of mounts are open."""
@@ -144,7 +154,7 @@ class SpringBoxes:
         if not any(head.beside for head in self._heads[0]):
             return False
         weight, each = self._terms[0]
-        box = SpringBox(self, each, self._room(weight), self.lower, self.upper)
+        box = SpringBox(self, each, self._ends(weight), self.lower, self.upper)
         return box.taken_off(self._heads[0]) > LARGE
 
     @property
@@ -199,7 +209,7 @@ class SpringBoxes:
         total, pull = self._constant, np.zeros(len(lower))
         for k, (weight, each) in enumerate(self._terms):
             whole = not self.places and k == 0
-            box = SpringBox(self, each, self._room(weight), lower, upper)
+            box = SpringBox(self, each, self._ends(weight), lower, upper)
             least, own, middle = box.least(self._heads[k], self._least[k])
             total += weight * least
             pull += own
@@ -211,7 +221,7 @@ class SpringBoxes:
     def left(self, lower: Array, upper: Array) -> tuple[Program, OpenMounts]:
         """Conditions of designs of a box of which the first term leaves that they are better than the best known."""
         weight, each = self._terms[0]
-        box = SpringBox(self, each, self._room(weight), lower, upper)
+        box = SpringBox(self, each, self._ends(weight), lower, upper)
         return box.under_all(self._heads[0], self._least[0]), box.mounts
 
     def under(self, value: float) -> SpringBoxes:
@@ -229,9 +239,9 @@ class SpringBoxes:
         left = 1.0 - np.cumsum(size) / max(float(size.sum()), 1e-300)
         return head.orders[: int(np.argmax(left <= NEEDED * (1.0 - value / self.value))) + 1]
 
-    def _room(self, weight: float) -> float:
-        """What this term of a design that is better than the best known is not over."""
-        return (self.value - self._constant) / weight
+    def _ends(self, weight: float) -> tuple[float, float]:
+        """What this term of a design that is better than the best known is not over, and what is enough alone."""
+        return (self.value - self._constant) / weight, (self.enough - self._constant) / weight
 
     def line(self, mounts: OpenMounts, order: Order, felt: Felt, lower: Array, upper: Array) -> Line:
         """Of an order, about the best design where that is in the box."""
