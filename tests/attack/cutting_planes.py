@@ -20,7 +20,7 @@ from attack.plain_loads import number
 from attack.plain_scene import Table, norm_and_channel, smallest_ball, terms_of
 
 Plane = tuple[float, np.ndarray]
-STEPS = {"mean": 8, "rms": 8, "maximum": 2, "peak to peak": 2}
+STEPS = {"mean": 8, "worst mean": 8, "rms": 8, "maximum": 2, "peak to peak": 2}
 LEVEL = 0.4
 
 
@@ -52,6 +52,9 @@ class Load:
                 for j in range(length.shape[1])
                 for n in [int(np.argmax(length[k, j]))]
             ]
+        if self.norm == "worst mean":
+            ways = np.einsum("kjnd,kjndq->kq", along, self.slopes) / (length.shape[1] * length.shape[2])
+            return [(float(length[k].mean()), ways[k]) for k in np.flatnonzero(self.share)]
         each = self.share[:, None, None] / (length.shape[1] * length.shape[2])
         if self.norm == "mean":
             return [

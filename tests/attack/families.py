@@ -14,7 +14,7 @@ import numpy as np
 
 from attack.plain_gear import SIZED
 from attack.plain_loads import number
-from attack.plain_scene import Table
+from attack.plain_scene import Table, norm_and_channel
 from attack.star_list import even_stars
 
 Generator = np.random.Generator
@@ -871,6 +871,25 @@ def sizes(rng: Generator) -> Table:
     return limits_at(rng, table, stresses, 0.9)
 
 
+def worst_means(rng: Generator) -> Table:
+    """Another family at several operating points, the largest mean of any of which counts."""
+    family = FAMILIES[str(rng.choice(OF_WORST_MEANS))]
+    while len((table := family(rng))["operating_points"]) < 2:
+        pass
+    told = dict(table["objective"])
+    terms = [told] if "minimise" in told else [dict(term) for term in told["terms"]]
+    for term in terms:
+        key = "minimise" if "minimise" in term else "quantity"
+        _, channel = norm_and_channel(term[key])
+        if channel in (*LOADS, *ELASTIC):
+            term[key] = f"worst mean {channel}"
+            term.pop("operating_points", None)
+    return {**table, "objective": terms[0] if "minimise" in told else {"terms": terms}}
+
+
+OF_WORST_MEANS = ("inline", "vee", "boxer", "radial", "points", "gas", "elastic-balance")
+"""Unbalances alone are decided for it."""
+
 FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "inline": of_unbalances(inline),
     "vee": of_unbalances(vee),
@@ -898,6 +917,7 @@ FAMILIES: dict[str, Callable[[Generator], Table]] = {
     "bank angle": banks,
     "shared leads": shared_leads,
     "sizes": sizes,
+    "worst means": worst_means,
 }
 
 

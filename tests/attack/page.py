@@ -16,7 +16,18 @@ VARIED = 30
 """And so many of each variation of a kind."""
 
 FAMILIES = {
-    "rigid mounts": ("inline", "vee", "boxer", "opposed-piston", "radial", "parts", "points", "gas", "places"),
+    "rigid mounts": (
+        "inline",
+        "vee",
+        "boxer",
+        "opposed-piston",
+        "radial",
+        "parts",
+        "points",
+        "gas",
+        "places",
+        "worst means",
+    ),
     "crank stars": ("stars",),
     "staggered and split vees": ("open-vees",),
     "uneven throws": ("uneven", "uneven crankcase"),

@@ -25,7 +25,7 @@ SEEDS = {
     "elastic-few": (1,), "convex-mounts": (0, 1), "elastic-balance": (1, 2),
     "yokes": (3, 4), "chambers": (2, 5), "rotary": (4, 8),
     "uneven": (0, 2), "places": (0,), "leads": (22, 25), "bank angle": (2, 3), "sizes": (100009, 100013),
-    "uneven crankcase": (1101, 101001),
+    "uneven crankcase": (1101, 101001), "worst means": (0, 2),
     "prices of elastic-balance": (1,), "prices of convex-mounts": (1,),
     "monotony of inline": (2,), "invariance of convex-mounts": (1,), "invariance of inline": (2,),
 }  # fmt: skip
