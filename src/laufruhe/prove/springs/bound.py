@@ -332,6 +332,9 @@ def _least(matrix: Array, reaches: Array) -> float:
 def _shifted(matrix: Array, reach: float) -> float:
     """Least over |v|^2 at most `reach`."""
     whole = 0.5 * (matrix + matrix.T)
+    if len(whole) == 1:
+        # nothing of it is open
+        return float(whole[0, 0])
     values, vectors = np.linalg.eigh(whole[1:, 1:])
     along = (vectors.T @ whole[1:, 0]) ** 2
     top, best = float(np.abs(values).max(initial=0.0)), -math.inf
@@ -339,4 +342,4 @@ def _shifted(matrix: Array, reach: float) -> float:
         if values[0] + shift > _FLAT * top and (shift == 0.0 or reach < math.inf):
             lost = shift * reach if shift else 0.0
             best = max(best, float(whole[0, 0] - np.sum(along / (values + shift))) - lost)
-    return best if len(values) else float(whole[0, 0])
+    return best
