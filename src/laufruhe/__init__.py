@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from laufruhe.problem.problem import Problem
     from laufruhe.solvers.result import Result
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 __all__ = [
     "InputError",
     "LaufruheError",
