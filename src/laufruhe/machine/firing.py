@@ -77,9 +77,10 @@ def pin_steps(layout: Layout, lattice: FiringLattice) -> tuple[tuple[int, ...], 
             nearest = round(float(apart))
             if abs(float(apart) - nearest) > SAME_TURN * lattice.steps:
                 raise NoEvenStarError(
-                    f"even firing needs bank angle plus split pins to be a multiple of {360.0 / lattice.steps:g} deg, "
-                    f"and they make {math.degrees(angle_of(layout.own_turn(0) - layout.own_turn(k))):.6g} deg; "
-                    "leave split_pin_angle open, or allow uneven intervals"
+                    "even firing needs the angle between dead centres on one throw (bank angle plus split pins, or "
+                    f"leads of cranks) to be a multiple of {360.0 / lattice.steps:g} deg, and they make "
+                    f"{math.degrees(angle_of(layout.own_turn(0) - layout.own_turn(k))):.6g} deg; "
+                    "change or open one of these angles, or allow uneven intervals"
                 )
             steps.append(nearest % lattice.steps)
         out.append(tuple(steps))
