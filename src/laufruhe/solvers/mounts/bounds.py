@@ -41,6 +41,9 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
         divided = _by_boxes(problem, value, room, found.design.values if found is not None else ())
         if not divided.places or passed() or not divides(problem) or not search.again(divided.places):
             break
+        # what is shown of a value is so of one that differs from it by less than counts
+        if search.best is not None and search.best.design.value > value - room:
+            break
     return divided
 
 
