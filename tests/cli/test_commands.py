@@ -142,7 +142,7 @@ def test_an_interrupt_keeps_the_earlier_result(here: Path, monkeypatch: pytest.M
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("laufruhe.cli.drawing.MOST", 0)
+    monkeypatch.setattr("laufruhe.cli.drawing.processors", lambda: 1)
     monkeypatch.setattr("laufruhe.plots.draw_and_show", interrupt)
     assert run("solve", path).exit_code == 130
     assert {name: (here / "results/scene" / name).read_bytes() for name in ALL_FILES} == before

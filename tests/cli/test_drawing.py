@@ -16,10 +16,9 @@ pytestmark = pytest.mark.slow
 
 
 def drawn(result: Result, folder: Path, count: int, monkeypatch: pytest.MonkeyPatch) -> dict[str, bytes]:
-    monkeypatch.setattr(drawing, "MOST", count)
-    monkeypatch.setattr(drawing, "processors", lambda: 3)
-    with drawing.artists(("png",)) as draws:
-        found = draws(result, folder)()
+    monkeypatch.setattr(drawing, "processors", lambda: count + 1)
+    with drawing.artist(("png",)) as ask:
+        found = drawing.drawing(ask, result, folder, ("png",))()
     files = {f"{name}.png": (folder / f"{name}.png").read_bytes() for name in found}
     assert {path.name for path in folder.iterdir()} == set(files)
     return files | {name: svg.encode() for name, svg in found.items()}
@@ -27,7 +26,7 @@ def drawn(result: Result, folder: Path, count: int, monkeypatch: pytest.MonkeyPa
 
 def test_by_whom_a_picture_is_drawn_cannot_be_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     result = solved("vee-two-90")
-    here, there = (drawn(result, tmp_path / str(count), count, monkeypatch) for count in (0, 2))
+    here, there = (drawn(result, tmp_path / str(count), count, monkeypatch) for count in (0, 3))
     assert list(here) == list(there)
     assert here == there
 

@@ -16,7 +16,7 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import tables_of
 from laufruhe.numerics.budget import left, limited
 from laufruhe.numerics.cluster import cluster
-from laufruhe.numerics.processes import Processes, WorkerDied
+from laufruhe.numerics.processes import Processes, WorkerDied, in_twins
 from laufruhe.numerics.workers import (
     HERE,
     Here,
@@ -61,6 +61,19 @@ def test_processes_answer_and_pass_errors_on() -> None:
             os.kill(pid, 0)
     with pytest.raises(RuntimeError, match="after shutdown"):
         pool.submit(abs, -1)
+
+
+@pytest.mark.slow
+def test_twins_of_a_process_share_its_work_and_a_dead_one_costs_no_answer() -> None:
+    with Processes(1) as pool:
+        known = {"in_twins": in_twins, "pid": os.getpid, "end": os._exit, "own": pool.submit(os.getpid).result()}
+        found = pool.submit(eval, "in_twins(lambda k: (k, pid()), 3)", known).result()
+        assert [k for k, _ in found] == [0, 1, 2]
+        assert len({pid for _, pid in found}) == 3
+        assert pool.submit(eval, "in_twins(lambda k: k if pid() == own else end(3), 3)", known).result() == [0, 1, 2]
+        with pytest.raises(ZeroDivisionError):
+            pool.submit(eval, "in_twins(lambda k: 1 / (2 - k), 3)", known).result()
+        assert len(pool.pids) == 1
 
 
 @pytest.mark.slow

@@ -17,7 +17,7 @@ from typer.core import TyperGroup
 
 from laufruhe import __version__
 from laufruhe.cli import options as o
-from laufruhe.cli.drawing import SELDOM, artists
+from laufruhe.cli.drawing import SELDOM, artist
 from laufruhe.cli.screen import (
     DONE,
     FAILED,
@@ -130,11 +130,11 @@ def solve(
     """
     kinds = () if no_plots else kind.kinds
     with (
-        exit_statuses(problem), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler), artists(kinds) as draws
+        exit_statuses(problem), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler), artist(kinds) as ask
     ):  # fmt: skip
         from laufruhe.cli.solve import Request, run, solved
 
-        run(Request("solve", problem, json, out, kinds, draws, animate, tolerance, series), solved)
+        run(Request("solve", problem, json, out, kinds, ask, animate, tolerance, series), solved)
 
 
 @app.command(epilog=_example("laufruhe evaluate problem.toml --series --json -"))
@@ -154,10 +154,10 @@ def evaluate(
     Mount forces and orders of the file's own numbers; nothing is decided.
     """
     kinds = () if no_plots else kind.kinds
-    with exit_statuses(problem), spoken(quiet, verbose), artists(kinds) as draws:
+    with exit_statuses(problem), spoken(quiet, verbose), artist(kinds) as ask:
         from laufruhe.cli.solve import Request, run, stated
 
-        run(Request("evaluate", problem, json, out, kinds, draws, animate, series=series), stated)
+        run(Request("evaluate", problem, json, out, kinds, ask, animate, series=series), stated)
 
 
 @app.command(epilog=_example("laufruhe page problem.toml", "laufruhe page problem.toml --no-browser --port 8600"))
@@ -197,12 +197,12 @@ def study(
     kept = "interrupted; finished points are kept, the same command goes on"
     with (
         exit_statuses(problem, kept), spoken(quiet, verbose), in_time(time_limit),
-        handing_out(json, problem) as hand_out, at_work(scheduler),
+        handing_out(json, problem) as hand_out, at_work(scheduler), artist(kind.kinds) as ask,
     ):  # fmt: skip
         from laufruhe.cli.study import studied
 
         with progress() as say:
-            found = studied(problem, out, jobs, say, kind.kinds)
+            found = studied(problem, out, jobs, say, ask, kind.kinds)
         hand_out(*found)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import typer
 
 from laufruhe.cli.check import doubt
-from laufruhe.cli.drawing import Draws
+from laufruhe.cli.drawing import Ask, drawing
 from laufruhe.cli.screen import DONE, FAILED, Watched, above_zero, complain, is_quiet, json_file, progress
 from laufruhe.errors import SolverError
 from laufruhe.files.reader import load
@@ -43,7 +43,7 @@ class Request:
     json: str | None
     out: Path | None
     kinds: tuple[str, ...]
-    draws: Draws
+    ask: Ask
     animated: bool = False
     tolerance: float | None = None
     series: bool = False
@@ -100,7 +100,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         what = "which parts go where" if problem.assembly else what
         say(f"deciding {what}" if open_numbers or problem.phasing is not None or problem.assembly else "evaluating")
         result = answer(problem, Watched(say, problem.objective_unit or ""))
-        drawn = request.draws(result, stage)
+        drawn = drawing(request.ask, result, stage, request.kinds)
         if request.animated:
             from laufruhe.plots.motion import animate
 
@@ -110,6 +110,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         say("writing tables")
         with _timed(seconds, "tables"):
             write_tables(result, stage)
+        live = live_model(problem, result)
         if request.kinds:
             say("drawing")
         with _timed(seconds, "plots"):
@@ -117,7 +118,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         result = replace(result, timing={**result.timing, **seconds})
         document = result_document(result, list(pictures), request.command)
         files.write(stage / files.REPORT, rendered(document, f".{request.kinds[0]}" if request.kinds else ""))
-        files.write(stage / files.PAGE, as_html(document, pictures, live_model(problem, result)))
+        files.write(stage / files.PAGE, as_html(document, pictures, live))
         for place in filter(None, (stage / files.RESULT, copy)):
             files.write(place, as_json(result, request.series))
     return result, folder

@@ -5,9 +5,9 @@ from __future__ import annotations
 import shlex
 import time
 from collections.abc import Callable, Sequence
-from functools import partial
 from pathlib import Path
 
+from laufruhe.cli.drawing import Ask
 from laufruhe.cli.screen import pace
 from laufruhe.errors import Complaint, InputError, printed
 from laufruhe.files.reader import shown_as
@@ -17,11 +17,12 @@ from laufruhe.report.strict_json import strict
 from laufruhe.report.study_report import as_json, file_names, write_study
 from laufruhe.studies import Scenes, run
 from laufruhe.studies.kept_points import KEPT
+from laufruhe.studies.picture import Picture
 from laufruhe.studies.reader import load_study
 
 
 def studied(
-    path: Path, out: Path | None, jobs: int | None, say: Callable[[str], None], kinds: Sequence[str] = ("png",)
+    path: Path, out: Path | None, jobs: int | None, say: Callable[[str], None], ask: Ask, kinds: Sequence[str]
 ) -> tuple[str, Callable[[], str]]:
     """Files of a study in their folder; what to say of them, and what makes JSON of all parts."""
     if jobs is not None and jobs < 1:
@@ -34,10 +35,11 @@ def studied(
     option, names = "--out" if out is not None else "results", file_names(study)
     with files.staged(files.Set(folder, option, "study", names, beside=[KEPT])) as stage:
         datasets, seconds = run(study, path.parent, kept, _Teller(say), jobs or processors())
-        # late: pictures are not needed where the study is refused
-        from laufruhe.plots.picture import save_picture
+        command = shlex.join(["laufruhe", "study", str(path)])
 
-        draw, command = partial(save_picture, kinds=kinds), shlex.join(["laufruhe", "study", str(path)])
+        def draw(picture: Picture, place: Path) -> Callable[[], str]:
+            return ask("laufruhe.plots.picture:save_picture", picture, place, kinds)
+
         write_study(study, datasets, seconds, stage, command, say, draw, f".{kinds[0]}")
     kept.unlink(missing_ok=True)
     spent = "".join(f"{duration:8.1f} s on one core  {name}\n" for name, duration in seconds.items())

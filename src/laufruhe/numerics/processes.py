@@ -12,8 +12,11 @@ import subprocess
 import sys
 import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from pkgutil import resolve_name
 from queue import SimpleQueue
 from types import TracebackType
 from typing import Any, ParamSpec, TypeAlias, TypeVar
@@ -25,7 +28,52 @@ P = ParamSpec("P")
 T = TypeVar("T")
 _Call: TypeAlias = tuple[Future[Any], bytes]
 _THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+_SERVES = False
 _PROGRAM = "from laufruhe.numerics.processes import serve; serve({})"
+
+
+def called(name: str, *args: Any) -> Any:
+    """Call what stands under a name as `package.module:function`; who asks another process to need not import it."""
+    return resolve_name(name)(*args)
+
+
+def in_twins(work: Callable[[int], T], count: int) -> list[T]:
+    """Answers to 0 ... count - 1: the first by this process, each other by a twin that has all that this one imported.
+
+    Only a process that serves has twins: its other thread waits for calls, and holds nothing that a twin needs.
+    """
+    with ExitStack() as ends:
+        twins = _SERVES and hasattr(os, "fork")
+        rest = [ends.enter_context(_twin(own)) if twins else own for own in (partial(work, k) for k in range(1, count))]
+        return [work(0), *(answer() for answer in rest)]
+
+
+@contextmanager
+def _twin(work: Callable[[], T]) -> Iterator[Callable[[], T]]:
+    """What waits for the answer of a twin; where that has died, the work is done here."""
+    read, write = os.pipe()
+    parent, twin = os.getpid(), os.fork()
+    if twin == 0:
+        try:
+            end_with_parent(parent)
+            with os.fdopen(write, "wb") as answers:
+                pickle.dump(work(), answers)
+        finally:
+            os._exit(0)
+    os.close(write)
+
+    def answer() -> T:
+        try:
+            found: T = pickle.load(answers_of_twin)
+        except (EOFError, pickle.UnpicklingError):
+            return work()
+        return found
+
+    try:
+        with os.fdopen(read, "rb") as answers_of_twin:
+            yield answer
+    finally:
+        os.waitpid(twin, 0)
 
 
 class WorkerDied(BrokenExecutor):
@@ -151,6 +199,8 @@ def _exchanged(child: subprocess.Popen[bytes], asked: bytes) -> tuple[bool, Any]
 
 def serve(parent: int) -> None:
     """Answer calls from standard input on standard output, until whoever asks is gone."""
+    global _SERVES
+    _SERVES = True
     answers = os.fdopen(os.dup(1), "wb")
     # what a library prints is no answer
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)

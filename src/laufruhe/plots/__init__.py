@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import chdir
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -14,6 +16,7 @@ with chdir(Path(__file__).parent):
 from matplotlib.figure import Figure
 
 from laufruhe.errors import Complaint, InputError
+from laufruhe.numerics.processes import in_twins
 from laufruhe.plots.style import as_svg, save
 from laufruhe.present.pictures import PICTURES
 from laufruhe.solvers.result import Result
@@ -48,6 +51,27 @@ def draw(result: Result, folder: Path, kinds: Sequence[str] = ("png",)) -> tuple
 def draw_and_show(result: Result, folder: Path, kinds: Sequence[str], wanted: Iterable[str]) -> dict[str, str]:
     """Some pictures as `draw` makes them, and what stands in a page: SVG by their names."""
     return {name: as_svg(figure) for name, _, figure in _drawn(result, folder, kinds, wanted)}
+
+
+def get_ready() -> None:
+    """Import all that draws."""
+    for name in PICTURES:
+        import_module(f"{__name__}.results.{name}")
+
+
+def draw_in_shares(result: Result, folder: Path, kinds: Sequence[str], count: int) -> dict[str, str]:
+    """All pictures of a result as `draw_and_show` makes them, by so many processes."""
+    wanted, (left, put) = names(result), os.pipe()
+    os.write(put, bytes(range(len(wanted))))
+    os.close(put)
+    # who is done with one takes the next: a byte of a pipe is read by one process alone
+    own = (wanted[number[0]] for number in iter(partial(os.read, left, 1), b""))
+    parts = in_twins(lambda _: draw_and_show(result, folder, kinds, own), count)
+    os.close(left)
+    found = {name: svg for part in parts for name, svg in part.items()}
+    # of a twin that died
+    found |= draw_and_show(result, folder, kinds, [name for name in wanted if name not in found])
+    return {name: found[name] for name in wanted}
 
 
 def _drawn(

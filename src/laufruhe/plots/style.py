@@ -24,6 +24,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
+from PIL import Image
 
 from laufruhe.plots.words import FAINT, FONT, INK, SMALL, fitted, round_ticks, typeset, width_of, wrapped
 from laufruhe.present.measures import changed, load_designs
@@ -231,8 +232,11 @@ def save(figure: Figure, path: Path) -> None:
     if path.suffix == ".svg":
         path.write_text(as_svg(figure), encoding="utf-8", newline="\n")
         return
+    canvas: Any = FigureCanvasAgg(figure)
     with styled():
-        figure.savefig(path, dpi=DPI, pil_kwargs={"compress_level": 4})
+        canvas.draw()
+    # all of it is opaque
+    Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]).save(path, compress_level=3, dpi=(DPI, DPI))
 
 
 def as_svg(figure: Figure) -> str:

@@ -55,12 +55,15 @@ def fitted(text: str, inches: float, size: float = SMALL) -> str:
 def wrapped(text: str, inches: float, size: float = SMALL, weight: str = "normal") -> list[str]:
     """Text broken into lines of this width; a word that is wider alone is cut."""
     lines: list[str] = []
+    # widths of words add up; most stand in several pictures
+    space, wide = width_of("n n", size, weight) - width_of("nn", size, weight), 0.0
     for word in text.split():
-        longer = f"{lines[-1]} {word}" if lines else word
-        if lines and width_of(longer, size, weight) <= inches:
-            lines[-1] = longer
+        longer = wide + space + width_of(word, size, weight)
+        if lines and longer <= inches:
+            lines[-1], wide = f"{lines[-1]} {word}", longer
         else:
             lines.append(fitted(word, inches, size))
+            wide = width_of(lines[-1], size, weight)
     return lines
 
 

@@ -36,7 +36,7 @@ def write_study(
     folder: Path,
     command: str,
     say: Callable[[str], None],
-    draw: Callable[[Picture, Path], str],
+    draw: Callable[[Picture, Path], Callable[[], str]],
     ending: str = ".png",
 ) -> None:
     """Datasets, tables, pictures and the report into a folder that exists.
@@ -46,11 +46,11 @@ def write_study(
     seconds
         What each part took.
     draw
-        Makes the files of a picture, whose place comes without an ending, and returns it as SVG.
+        Begins to make the files of a picture, whose place comes without an ending; gives what waits for it as SVG.
     ending
         Of the files that the Markdown page shows.
     """
-    pictures, sheets = {}, {}
+    drawn, sheets = {}, {}
     for part in study.study.parts:
         say(f"writing {part.name}")
         name, data = part.name, datasets[part.name]
@@ -62,10 +62,11 @@ def write_study(
             rows.to_csv(folder / f"{name}.csv")
             sheets[name] = Sheet([*rows.index.names, *rows.columns], rows.reset_index().to_numpy(dtype=object).tolist())
         if "png" in part.ends:
-            pictures[name] = draw(part.picture(data), folder / name)
+            drawn[name] = draw(part.picture(data), folder / name)
     if sheets:
         tables.write_book(sheets, folder / files.BOOK)
     document = study_document(study, datasets, seconds, command)
+    pictures = {name: picture() for name, picture in drawn.items()}
     files.write(folder / files.REPORT, rendered(document, ending))
     files.write(folder / files.PAGE, as_html(document, pictures))
 

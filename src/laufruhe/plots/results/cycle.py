@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,11 @@ from matplotlib.ticker import MultipleLocator
 
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.plots.style import Series, entry, headed, page, series_of, styled
 from laufruhe.plots.words import FAINT, INK, aligned, empty, fitted, in_thousands, left_out, round_ticks, width_of
 from laufruhe.present.measures import hardest_point, has_firing, has_loads
+from laufruhe.problem.evaluation import over
 from laufruhe.solvers.result import Result
 
 STEPS, MOST_POINTS, MOST_MOUNTS = 1440, 3, 6
@@ -61,7 +64,7 @@ def figure(result: Result) -> Figure:
     shown, mounts, series = _points(result), _mounts(result), series_of(result, loads=True)
     wide = {1: ALONE, 2: BESIDE}.get(len(shown), NARROW)
     degrees = np.linspace(0.0, math.degrees(result.final.engine.cycle.angle), STEPS + 1)
-    columns = [list(_rows(series, k, mounts, np.radians(degrees))) for k in shown]
+    columns = [list(_rows(series, k, mounts)) for k in shown]
     every = list(zip(*columns, strict=True))
     rows = [row for row in every if any(each.curves for each in row)]
     balanced = [row for row in every if not any(each.curves for each in row)]
@@ -136,20 +139,27 @@ def _left_out(result: Result, shown: Sequence[int], mounts: Sequence[int]) -> st
     return some + (f"The {len(mounts)} most loaded of {names} mounts. " if len(mounts) < names else "")
 
 
-def _rows(series: Sequence[Series], k: int, mounts: Sequence[int], angles: Array) -> Iterator[Row]:
+def _rows(series: Sequence[Series], k: int, mounts: Sequence[int]) -> Iterator[Row]:
     """Shaking force and moments about the origin (C2, C7), and the magnitude of every mount's force."""
     loads = [one.design.loads[k] for one in series]
-    x, y, z, roll, pitch, yaw = np.moveaxis(np.stack([load.wrench.values(angles) for load in loads]), -1, 0)
+    base = series[0].design.engine.cycle.base_order
+    x, y, z, roll, pitch, yaw = np.moveaxis(np.stack([_closed(load.wrench, base) for load in loads]), -1, 0)
     most = max(float(np.abs(load.wrench.coefficients).max(initial=0.0)) for load in loads)
     yield _row("shaking force", "N", {"vertical": z, "lateral": y, "longitudinal": x}, most)
     yield _row("roll moment", "N m", {"": roll}, most)
     yield _row("rocking couple", "N m", {"pitch": pitch, "yaw": yaw}, most)
-    forces = [load.mount_forces.values(angles) for load in loads if load.mount_forces is not None]
+    forces = [_closed(load.mount_forces, base) for load in loads if load.mount_forces is not None]
     sizes = [np.linalg.norm(np.stack([force[:, m] for force in forces]), axis=-1) for m in mounts]
     # mounts are compared: one scale serves them all
     top = max((float(size.max()) for size in sizes), default=0.0)
     for m, size in zip(mounts, sizes, strict=True):
         yield Row(series[0].design.mount_names[m], "N", {"": size}, (0.0, top))
+
+
+def _closed(signal: Spectrum, base: Fraction) -> Array:
+    """At every step of a cycle and at its end, where it is as at the beginning."""
+    samples = over(base, [signal])[0].sample(STEPS)
+    return np.concatenate([samples, samples[:1]])
 
 
 def _row(label: str, unit: str, curves: Mapping[str, Array], most: float) -> Row:
