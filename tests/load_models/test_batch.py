@@ -12,8 +12,6 @@ from laufruhe.errors import ModelError
 from laufruhe.fidelity.automatic import automatic
 from laufruhe.files.reader import load
 from laufruhe.load_models.batch import Designs, prepare, random_decisions
-from laufruhe.load_models.batch_engines import EngineArrays, EngineFamily
-from laufruhe.machine import OperatingPoint
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.problem import Problem
@@ -68,57 +66,6 @@ def test_automatic_holds_over_the_bounds() -> None:
     cheap = prepare(automatic(problem, 1e-3)).objective(values)
     exact = prepare(replace(problem, fidelity=Fidelity(samples=2880))).objective(values)
     assert np.mean(np.abs(cheap / exact - 1.0) <= 1e-3) >= 0.99
-
-
-@pytest.mark.parametrize("with_gas", [False, True])
-def test_engines_agree_with_evaluations(with_gas: bool) -> None:
-    problem = load(PROBLEMS / "tractor-three.toml")
-    gas = problem.points[0].gas if with_gas else None
-    quantity = problem.objective[0].measure
-    template = replace(
-        problem.engine,
-        slider_cranks=tuple(
-            replace(part, rod_inertia_deficit=-0.003, rotating_mass=0.3) for part in problem.engine.slider_cranks
-        ),
-    )
-    fidelity, rng, n = Fidelity(samples=360), np.random.default_rng(1), COUNT
-    arrays = EngineArrays(
-        speed=rng.uniform(50, 400, n), reciprocating_mass=rng.uniform(0.5, 2, n), rotating_mass=rng.uniform(0, 1, n),
-        crank_radius=None if gas else rng.uniform(0.04, 0.08, n), rod_ratio=None if gas else rng.uniform(0.15, 0.35, n),
-        rod_inertia_deficit=rng.uniform(-0.01, 0.01, n),
-        unbalances=rng.normal(size=(n, len(template.rotors))) * 0.03 * (1 + 1j),
-    )  # fmt: skip
-    found = EngineFamily(template, quantity, fidelity, gas).values(arrays)
-    for k in range(n):
-        first = template.slider_cranks[0]
-        radius = first.crank_radius if arrays.crank_radius is None else float(arrays.crank_radius[k])
-        ratio = first.rod_ratio if arrays.rod_ratio is None else float(arrays.rod_ratio[k])
-        assert arrays.reciprocating_mass is not None
-        assert arrays.rotating_mass is not None
-        assert arrays.rod_inertia_deficit is not None
-        assert arrays.unbalances is not None
-        parts = tuple(
-            replace(
-                part, crank_radius=radius, rod_length=radius / ratio, rotating_mass=float(arrays.rotating_mass[k]),
-                reciprocating_mass=float(arrays.reciprocating_mass[k]),
-                rod_inertia_deficit=float(arrays.rod_inertia_deficit[k]),
-            )
-            for part in template.slider_cranks
-        )  # fmt: skip
-        rotors = tuple(
-            replace(rotor, unbalance=complex(u)) for rotor, u in zip(template.rotors, arrays.unbalances[k], strict=True)
-        )
-        engine = replace(template, slider_cranks=parts, rotors=rotors)
-        point = OperatingPoint("one", float(arrays.speed[k]), gas)
-        alone = evaluate(replace(problem, engine=engine, decisions=(), points=(point,), fidelity=fidelity))
-        assert found[k] == pytest.approx(alone.value(quantity), rel=1e-12)
-
-
-def test_rod_ratios_do_not_go_with_gas() -> None:
-    problem = load(PROBLEMS / "tractor-three.toml")
-    family = EngineFamily(problem.engine, problem.objective[0].measure, Fidelity(samples=360), problem.points[0].gas)
-    with pytest.raises(ModelError, match="rod ratios"):
-        family.values(EngineArrays(np.ones(2), rod_ratio=np.array([0.2, 0.3])))
 
 
 @pytest.mark.parametrize(

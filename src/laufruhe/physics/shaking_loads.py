@@ -8,7 +8,6 @@ what the star cancels is zero and not a rounding.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -21,7 +20,7 @@ from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_moment
-from laufruhe.physics.mechanism import Direction, Effect, mass_effects, rod_effects
+from laufruhe.physics.mechanism import mass_effects, rod_effects
 from laufruhe.physics.star_loads import order_index, star_loads
 from laufruhe.physics.uneven_speed import uneven_geared_loads, uneven_loads, uneven_rotor_loads
 from laufruhe.physics.wrench import plane_parts
@@ -93,20 +92,6 @@ def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum
         return Spectrum(cycle.base_order, np.zeros((1, 6), dtype=complex))
     indices = [order_index(cycle, abs(rotor.shaft.ratio)) for rotor in turning]
     return Spectrum(cycle.base_order, cancelling_sums(_rotor_wrenches(turning, speed), indices))
-
-
-def unit_star_load(engine: Engine, order: int, coefficient: complex, roll: bool) -> Spectrum:
-    """Wrench of one order whose coefficient is the same at every cylinder (L6).
-
-    Parameters
-    ----------
-    coefficient
-        Of a force along each cylinder axis [N], or of a roll moment [N m].
-    """
-    series = np.zeros(order + 1, dtype=complex)
-    series[order] = coefficient
-    effect = Effect(Direction.ROLL if roll else Direction.AXIAL, 1.0, None, lambda: series)
-    return star_loads(engine, 1.0, lambda part: (replace(effect, size=1.0 / part.shaft.ratio**2),))
 
 
 def added_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
