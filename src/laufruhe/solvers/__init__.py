@@ -19,9 +19,12 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
 from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.apart import is_apart, solve_apart
+from laufruhe.solvers.boxes.flywheel import solve_flywheel
 from laufruhe.solvers.boxes.leads import solve_leads
 from laufruhe.solvers.boxes.places import solve_places
 from laufruhe.solvers.boxes.shared_leads import solve_shared_leads
+from laufruhe.solvers.boxes.sizes import solve_sizes
+from laufruhe.solvers.boxes.torsion import solve_torsion
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_sharply
@@ -30,7 +33,9 @@ from laufruhe.solvers.mounts.convex import is_convex, solve_convex_mounts
 from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.runs import solve_runs
+from laufruhe.solvers.stars.phasing import solve_phasing
 from laufruhe.solvers.stars.rooms import with_room
+from laufruhe.solvers.stars.sizes import solve_star_sizes
 from laufruhe.solvers.tolerances.assembly import solve_assembly
 from laufruhe.solvers.tolerances.robust import solve_robust
 
@@ -57,6 +62,8 @@ class Method:
         What its bounds can prove.
     solve
         The design, proven as far as it is.
+    judges_fidelity
+        Whether the fidelity is chosen again where the design needs a better one than that given (F11).
     """
 
     name: str
@@ -64,6 +71,11 @@ class Method:
     suits: Callable[[Problem], bool]
     reach: Reach
     solve: Callable[[Problem], Result]
+    judges_fidelity: bool = False
+
+    def decided(self, problem: Problem) -> Result:
+        """The design, accurate as far as that is looked at."""
+        return solve_within(problem, self.solve) if self.judges_fidelity else self.solve(problem)
 
 
 def kinds_of(problem: Problem) -> frozenset[Kind]:
@@ -78,38 +90,10 @@ def _smooth(problem: Problem) -> Result:
     return solve_joint(problem)
 
 
-def _stars(problem: Problem) -> Result:
-    from laufruhe.solvers.stars.phasing import solve_phasing
-
-    return solve_within(problem, solve_phasing)
-
-
 def _stars_on_mounts(problem: Problem) -> Result:
     from laufruhe.solvers.mounts.stars import solve_star_mounts
 
     return solve_star_mounts(problem)
-
-
-def _places(problem: Problem) -> Result:
-    return solve_within(problem, solve_places)
-
-
-def _flywheel(problem: Problem) -> Result:
-    from laufruhe.solvers.boxes.flywheel import solve_flywheel
-
-    return solve_flywheel(problem)
-
-
-def _torsion(problem: Problem) -> Result:
-    from laufruhe.solvers.boxes.torsion import solve_torsion
-
-    return solve_within(problem, solve_torsion)
-
-
-def _sizes(problem: Problem) -> Result:
-    from laufruhe.solvers.boxes.sizes import solve_sizes
-
-    return solve_within(problem, solve_sizes)
 
 
 def _mounted_sizes(problem: Problem) -> Result:
@@ -123,12 +107,6 @@ def _asks_mounted_sizes(problem: Problem) -> bool:
     others = [term for term in problem.objective if not term.measure.is_mounting]
     limits = [limit for limit in problem.limits if not limit.measure.is_mounting]
     return bool(others) and _asks_sizes(replace(problem, objective=tuple(others), limits=tuple(limits)))
-
-
-def _star_sizes(problem: Problem) -> Result:
-    from laufruhe.solvers.stars.sizes import solve_star_sizes
-
-    return solve_within(problem, solve_star_sizes)
 
 
 def _asks_sizes(problem: Problem) -> bool:
@@ -211,25 +189,23 @@ _T = Kind.TORSION
 METHODS: tuple[Method, ...] = (
     Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, state),
     Method("boxes of the flywheel", frozenset({_F}), lambda p: all(m.channel.is_flywheel for m in p.measures),
-           Reach.WHOLE, _flywheel),
-    Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, _torsion),
-    Method("boxes of sizes", frozenset({Kind.SIZE, _U}), _asks_sizes, Reach.WHOLE, _sizes),
-    Method("second-order cones", frozenset({_U, Kind.SHARE}), _asks_loads, Reach.WHOLE,
-           lambda problem: solve_within(problem, solve_sharply)),
-    Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE,
-           lambda problem: solve_within(problem, solve_sharply)),
-    Method("boxes of leads", frozenset({_U, Kind.LEAD}), _asks_led, Reach.WHOLE,
-           lambda problem: solve_within(problem, solve_leads)),
+           Reach.WHOLE, solve_flywheel),
+    Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, solve_torsion, True),
+    Method("boxes of sizes", frozenset({Kind.SIZE, _U}), _asks_sizes, Reach.WHOLE, solve_sizes, True),
+    Method("second-order cones", frozenset({_U, Kind.SHARE}), _asks_loads, Reach.WHOLE, solve_sharply, True),
+    Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE, solve_sharply,
+           True),
+    Method("boxes of leads", frozenset({_U, Kind.LEAD}), _asks_led, Reach.WHOLE, solve_leads, True),
     Method("boxes of leads between shared chambers", frozenset({Kind.LEAD}), _asks_shared, Reach.WHOLE,
-           lambda problem: solve_within(problem, solve_shared_leads)),
-    Method("cones over boxes of places", frozenset({_U, _P}), _asks_places, Reach.WHOLE, _places),
-    Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, _stars),
-    Method("stars, each with boxes of sizes", frozenset({_S, _U, Kind.SIZE}), _asks_sizes, Reach.WHOLE, _star_sizes),
+           solve_shared_leads, True),
+    Method("cones over boxes of places", frozenset({_U, _P}), _asks_places, Reach.WHOLE, solve_places, True),
+    Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, solve_phasing, True),
+    Method("stars, each with boxes of sizes", frozenset({_S, _U, Kind.SIZE}), _asks_sizes, Reach.WHOLE,
+           solve_star_sizes, True),
     Method("linear matrix inequalities", frozenset({_K}), is_convex, Reach.WHOLE, solve_convex_mounts),
     Method("smooth program, boxes of stiffness", frozenset({_K}), _adds_points, Reach.NEAR, _smooth),
     Method("smooth program", frozenset({_U, _K, _M}), _adds_points, Reach.ASIDE, _smooth),
-    Method("flywheel, crankshaft and the rest apart", frozenset(Kind) - {_S}, is_apart,
-           Reach.ASIDE, _apart),
+    Method("flywheel, crankshaft and the rest apart", frozenset(Kind) - {_S}, is_apart, Reach.ASIDE, _apart),
     Method("local programs of sizes and mounts", frozenset({Kind.SIZE, _U, _K, _M}), _asks_mounted_sizes, Reach.ASIDE,
            _mounted_sizes),
     Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), _asks_stars_on_mounts, Reach.ASIDE,
@@ -345,4 +321,4 @@ def _decided(problem: Problem) -> Result:
     conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and not kinds & {_S, _T, _F, Kind.SIZE} else ()
     if conflict:
         return none_within(problem, evaluate_start(problem), conflict, {})
-    return method.solve(problem)
+    return method.decided(problem)

@@ -22,6 +22,7 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.solvers.conclusion import broken_limits, with_limits
 from laufruhe.solvers.cones.run_limits import solve_run_cones
 from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.stars.phasing import by_each_order, every_star
 
 _LINEAR = frozenset({Kind.UNBALANCE, Kind.SHARE})
 _SMOOTH = frozenset({Kind.UNBALANCE, Kind.STIFFNESS, Kind.MOUNT})
@@ -96,6 +97,4 @@ def _of_stars(problem: Problem, phasing: Phasing, decide: Decide) -> Result | No
     """Each star that fires evenly by itself; None where throws may leave these, or mounts have bump stops."""
     if phasing.continuous or not all(math.isinf(spring.stop_gap) for _, spring in every_spring(problem.engine.mounts)):
         return None
-    from laufruhe.solvers.stars.phasing import by_each_order, every_star
-
     return by_each_order(problem, phasing, every_star(phasing), lambda own, _: decide(replace(own, phasing=None)))

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from laufruhe.load_models.star_model import StarProblem
 from laufruhe.numerics.arrays import Array
@@ -50,6 +49,8 @@ class Cut:
 
     def least(self, space: StarSpace) -> float:
         """A bound of every star: the best assignment of throws to steps; never under zero."""
+        from scipy.optimize import linear_sum_assignment
+
         if self.turns is not None:
             return 0.0
         rest = sum(domain.least(self.gradient) for domain in self.domains)

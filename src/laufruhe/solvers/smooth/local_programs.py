@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Any, Self, TypeAlias
 
 import numpy as np
-from scipy.optimize import minimize, nnls
 
 from laufruhe.errors import ModelError
 from laufruhe.numerics.arrays import Array
@@ -131,6 +130,8 @@ def searched(program: LocalProgram, places: list[Array], starts: int) -> Array:
 
 def _local(program: LocalProgram, place: Array) -> Array:
     """A local optimum by sequential quadratic programs, its slopes by differences."""
+    from scipy.optimize import minimize
+
     first = program.numbers(place)
     unit = first[0] if math.isfinite(first[0]) and first[0] > 0.0 else 1.0
     known: dict[bytes, Array] = {}
@@ -204,6 +205,8 @@ def proven(program: LocalProgram, best: Array, bounded: Bounded) -> Proven:
 
 def shown(program: LocalProgram, design: Design, bound: float, reach: Reach, method: str) -> Shown:
     """A bound, with multipliers of the limits and bounds that hold a design, and how far these are from balance."""
+    from scipy.optimize import nnls
+
     problem, best = program.problem, program.shares(design.values)
     slopes = program.slopes(best)
     rooms = program.numbers(best)[1:]
