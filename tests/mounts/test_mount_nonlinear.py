@@ -13,12 +13,14 @@ from cli.scenes import SECOND_ORDER_SHAFTS
 from lanes import first_fast
 from laufruhe.files.reader import load
 from laufruhe.numerics.norms import NORMS
+from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.measure import Measure, Term
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.cones.unbalances import solve_unbalances
-from laufruhe.solvers.mounts.nonlinear import solve_joint, solve_mounts
+from laufruhe.solvers.mounts.nonlinear import mounts_bound, solve_joint, solve_mounts
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.smooth.program import SmoothProgram
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, problem_of
@@ -124,6 +126,24 @@ def test_derivatives_agree_with_finite_differences(tmp_path):
 def solved(tmp_path_factory):
     problem = joint_problem(tmp_path_factory.mktemp("joint"))
     return problem, solve(problem)
+
+
+@pytest.mark.slow
+def test_forces_beside_other_terms_are_bounded_by_themselves(tmp_path):
+    """A sum of forces of mounts, of the block and of stiffness is not under what each of them is at least."""
+    problem = joint_problem(tmp_path, "rms")
+    shaken = Measure(channels.SHAKING_FORCE, NORMS["rms"])
+    terms = (*problem.objective, Term(shaken, 0.1), Term(Measure(channels.TOTAL_STIFFNESS), 1e-5))
+    search = replace(problem.search, boxes=4)
+    alone = replace(problem, decisions=problem.mount_decisions, limits=(), search=search)
+    mixed = replace(alone, objective=terms)
+    near = [d.lower if d.is_stiffness else d.start for d in mixed.decisions]
+    bound = mounts_bound(mixed, near)
+    assert bound > mounts_bound(mixed) + 0.5 * objective_value(alone, evaluate(alone, alone.design(near)))
+    generator = np.random.default_rng(5)
+    for _ in range(40):
+        values = [d.lower + generator.random() * (d.upper - d.lower) for d in mixed.decisions]
+        assert objective_value(mixed, evaluate(mixed, mixed.design(values))) >= bound
 
 
 @pytest.mark.slow

@@ -366,21 +366,6 @@ class TestSignals:
         points = shares(rng, len(signals))
         assert fine_value(norm, signals, points) <= norm.above(signals, points) * (1.0 + 1e-9)
 
-    @given(SEEDS)
-    def test_the_norm_is_not_under_its_orders(self, norm: Norm, seed: int) -> None:
-        """From what each order has at each operating point (E34)."""
-        _, signals, rng = scene(seed)
-        points = shares(rng, len(signals))
-        squares, roots = [], []
-        for signal in signals:
-            half = np.where(np.arange(len(signal.coefficients)) > 0, 0.5, 1.0)
-            size = np.sqrt((np.abs(signal.coefficients) ** 2).sum(axis=2))
-            orders = signal.orders.tolist()
-            squares.append(dict(zip(orders, half * (size**2).mean(axis=1), strict=True)))
-            roots.append(dict(zip(orders, half * size.mean(axis=1), strict=True)))
-        least = norm.least_of_orders(squares, roots, points)
-        assert 0.0 < least <= fine_value(norm, signals, points) * (1.0 + 1e-9)
-
     @given(SEEDS, st.sampled_from([5, 12, 24, 60]))
     def test_samples_are_off_by_no_more_than_said(self, norm: Norm, seed: int, steps: int) -> None:
         _, signals, rng = scene(seed)

@@ -19,8 +19,8 @@ from laufruhe.problem.decision import TURNED as ANGLES
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
+from laufruhe.prove.mounts.ranges import number_ranges
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bound
-from laufruhe.prove.mounts.transmitted import number_ranges
 from laufruhe.prove.springs import box
 from laufruhe.prove.springs import orders as orders_
 from laufruhe.prove.springs.bound import Multipliers, Program, Proposed

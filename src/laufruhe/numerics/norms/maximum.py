@@ -13,7 +13,6 @@ from laufruhe.numerics.norms.norm import (
     Cones,
     Grid,
     Norm,
-    OrderBounds,
     SmoothProgram,
     amplitudes,
     curvature,
@@ -97,10 +96,6 @@ class Maximum(Norm):
                 most, least = size.max(axis=(0, 1)), size.max(axis=0).min(axis=0)
                 errors.append(float((np.maximum(most, bent) - np.maximum(least, bent)).max(initial=0.0)))
         return max(errors) + max(bends)
-
-    def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
-        """No less than the root mean square at any operating point."""
-        return math.sqrt(max((sum(each.values()) for each in squares), default=0.0))
 
 
 def in_place(z: Array, steps: int, times: int) -> Array:

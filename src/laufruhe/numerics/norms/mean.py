@@ -13,7 +13,6 @@ from laufruhe.numerics.norms.norm import (
     Cones,
     Grid,
     Norm,
-    OrderBounds,
     SmoothProgram,
     curvature,
     fine_lengths,
@@ -107,7 +106,3 @@ class Mean(Norm):
             bend = float((step**2 / 8.0 * curvature(signal)[1] + step * jumped(signal)).mean())
             total += share * (float(np.abs(shifted - size.mean()).max()) + bend)
         return float(total)
-
-    def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
-        """At every operating point no less than its strongest order."""
-        return float(sum(share * max(each.values(), default=0.0) for share, each in zip(shares, roots, strict=True)))

@@ -10,9 +10,9 @@ asks which norm it has before it.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Protocol, TypeAlias
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,6 @@ from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 
 # squares of numbers between these neither overflow nor lose digits
 _LEAST, _MOST = 1e-140, 1e150
-
-
-OrderBounds: TypeAlias = Sequence[Mapping[float, float]]
-"""At every operating point a number of each order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,18 +209,6 @@ class Norm(ABC):
     @abstractmethod
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
         """How far the norm at `steps` samples a cycle can be off at the most (F7, F8)."""
-
-    @abstractmethod
-    def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
-        """A value that the norm is not under, from bounds of every order at every operating point (E34).
-
-        Parameters
-        ----------
-        squares
-            Of the mean over places of the mean square.
-        roots
-            Of the mean over places of the mean length.
-        """
 
 
 def between(z: Array, steps: int, times: int) -> Array:

@@ -21,7 +21,6 @@ from laufruhe.numerics.norms.norm import (  # fmt: skip
     Cones,
     Grid,
     Norm,
-    OrderBounds,
     SmoothProgram,
     amplitudes,
     curvature,
@@ -121,11 +120,6 @@ class PeakToPeak(Norm):
                 whole, starts = _reach(place, bent), (place[first::times] for first in range(times))
                 errors.append(max(whole - _reach(start, bent) for start in starts))
         return max(errors) + max(bends)
-
-    def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
-        """No less than twice the root mean square of what alternates, at any operating point."""
-        alternating = [sum(square for order, square in each.items() if order > 0.0) for each in squares]
-        return 2.0 * math.sqrt(max(alternating, default=0.0))
 
 
 def _signals(rows: Array, steps: int) -> Array:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.norms.norm import Cones, Grid, Norm, OrderBounds, SmoothProgram, lengths, mean_square
+from laufruhe.numerics.norms.norm import Cones, Grid, Norm, SmoothProgram, lengths, mean_square
 from laufruhe.numerics.spectrum import Spectrum
 
 
@@ -86,7 +86,3 @@ class RootMeanSquare(Norm):
         # the orders of corners beyond those that are counted add something between nothing and a bound
         counted = self.above([s.series for s in signals], shares)
         return max(abs(sampled - counted), abs(sampled - self.above(signals, shares)))
-
-    def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
-        """The squares of all orders and operating points add up."""
-        return math.sqrt(sum(share * sum(each.values()) for share, each in zip(shares, squares, strict=True)))

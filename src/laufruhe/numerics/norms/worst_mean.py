@@ -12,7 +12,7 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.mean import Mean
-from laufruhe.numerics.norms.norm import Cones, Grid, Norm, OrderBounds, SmoothProgram, lengths, softened_lengths
+from laufruhe.numerics.norms.norm import Cones, Grid, Norm, SmoothProgram, lengths, softened_lengths
 from laufruhe.numerics.spectrum import Spectrum
 
 _MEAN = Mean()
@@ -82,12 +82,6 @@ class WorstMean(Norm):
         """No more than that of the mean which is off most."""
         errors = (_MEAN.sampling_bound([own], np.ones(1), steps, finest) for own in _counted(signals, shares))
         return max(errors, default=0.0)
-
-    def least_of_orders(self, squares: OrderBounds, roots: OrderBounds, shares: Array) -> float:
-        """The largest of what the means are not under."""
-        one = np.ones(1)
-        pairs = zip(squares, roots, shares, strict=True)
-        return max((_MEAN.least_of_orders([s], [r], one) for s, r, share in pairs if share > 0.0), default=0.0)
 
     def _means(self, grid: Grid, rows: Array) -> Array:
         return np.asarray((_shares(grid) * lengths(rows)).reshape(grid.points, _size(grid)).sum(axis=1))

@@ -32,7 +32,7 @@ from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.boxes.twist_coordinates import TwistCoordinates
-from laufruhe.prove.mounts.box_numbers import SLACK
+from laufruhe.prove.mounts.ranges import SLACK
 
 # orders whose share of the squares is less, in the middle of the bounds and at their corners, are left out
 LEAST_SHARE = 1e-10

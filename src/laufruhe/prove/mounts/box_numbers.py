@@ -17,9 +17,7 @@ from laufruhe.problem.measure import Limit, Measure
 from laufruhe.prove.mounts.box_cases import held_loads
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.prove.mounts.box_shares import most_shares, shortfall
-
-SLACK = 1e-6
-"""Designs count as allowed when they break a limit by less."""
+from laufruhe.prove.mounts.ranges import SLACK
 
 
 def sag(model: BoxModel, x: Array) -> Array:

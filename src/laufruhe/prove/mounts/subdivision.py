@@ -21,8 +21,9 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided, divide
 from laufruhe.prove.mounts.box_norms import Under, root_under, under
-from laufruhe.prove.mounts.box_numbers import RANGES, SLACK, breaks
+from laufruhe.prove.mounts.box_numbers import RANGES, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, Expansion, Lines
+from laufruhe.prove.mounts.ranges import SLACK
 
 # open numbers that are divided without being asked for, and what all boxes may cost together
 MOST_OPEN = 4

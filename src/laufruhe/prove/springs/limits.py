@@ -1,6 +1,6 @@
 """Limits of forces, travel and transmissibility of a running engine, beside what is minimised (E61).
 
-A norm that is limited is at least its heads (E34, E45, E54), each of which then is not over a number. Transmissibility
+A norm that is limited is at least its heads (E45, E54), each of which then is not over a number. Transmissibility
 of an order is one inequality between the squares of its forces, and of those at rest under the same load.
 """
 
@@ -20,7 +20,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.transmitted import SLACK
+from laufruhe.prove.mounts.ranges import SLACK
 from laufruhe.prove.springs.bound import Budget, Cap
 from laufruhe.prove.springs.conditions import Held
 from laufruhe.prove.springs.lines import Felt, Line, squared

@@ -18,7 +18,7 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.channels import motion_indices
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.transmitted import SLACK
+from laufruhe.prove.mounts.ranges import SLACK
 from laufruhe.prove.springs.open_mounts import OpenMounts
 
 # share of a middle that the square of the radius of a ball is at least

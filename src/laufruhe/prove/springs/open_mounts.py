@@ -22,7 +22,7 @@ from laufruhe.physics.rigid_body import carried, point_motion
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import DAMPING, LAG, LOSS, POSITION, STIFFNESS, TURNED
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.transmitted import SLACK, limited_stiffness, number_ranges
+from laufruhe.prove.mounts.ranges import SLACK, limited_stiffness, number_ranges
 from laufruhe.prove.springs.opened import Framed, Opened, Place, Spring, own_axes
 from laufruhe.prove.springs.planes import Plane
 

@@ -15,7 +15,7 @@ from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.rigid_body import turned_axes
 from laufruhe.problem.decision import LAG, LOSS, POSITION, STIFFNESS, TURNED
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.transmitted import number_ranges
+from laufruhe.prove.mounts.ranges import number_ranges
 from laufruhe.prove.springs.planes import Plane
 
 # angle by which a mount is turned to see which of its axes stay [rad]

@@ -1,4 +1,4 @@
-"""What a norm of mount forces or travel is not under, by squares of single orders (E34, E45, E54)."""
+"""What a norm of mount forces or travel is not under, by squares of single orders (E45, E54)."""
 
 from __future__ import annotations
 
@@ -275,7 +275,7 @@ def lengths_of(head: Head, asked: Asked, lines: Sequence[Line], at: Sequence[int
 
 
 def heads_of(asked: Asked, parts: Sequence[OpenMounts]) -> list[Head]:
-    """What a norm is at least: one head, or one for every operating point, joined by their shares (E34, E45)."""
+    """What a norm is at least: one head, or one for every operating point, joined by their shares (E45)."""
     norm = asked.measure.norm
     if norm.is_euclidean:
         return [_root(asked)] if asked.orders else []

@@ -19,8 +19,8 @@ from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import NEARLY
+from laufruhe.prove.mounts.ranges import number_ranges
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divides
-from laufruhe.prove.mounts.transmitted import number_ranges
 from laufruhe.prove.springs.bound import Program
 from laufruhe.prove.springs.box import SpringBox
 from laufruhe.prove.springs.columns import columns_of

@@ -18,10 +18,11 @@ from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
-from laufruhe.prove.certificate import Reach, gap_of
+from laufruhe.prove.certificate import Reach, gap_of, room_of
 from laufruhe.prove.mounts.subdivision import divided_bound
-from laufruhe.prove.mounts.transmitted import transmitted_bound
+from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, decided, nearest_of, none_within, unbalances_of
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_unbalances
 from laufruhe.solvers.conflicts import smallest_conflict
@@ -99,7 +100,7 @@ def _solved(
         return _none(problem, search, initial, divided, timing), search.turns
     proven = _rebalanced(found.design)
     design = found.design if proven is None or proven[0].value >= found.design.value else proven[0]
-    return _result(search, initial, replace(found, design=design), proven, divided, timing), search.turns
+    return _result(search, initial, replace(found, design=design), proven, divided, timing, among), search.turns
 
 
 def _mounts(design: Design) -> list[float]:
@@ -145,14 +146,22 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
     return () if convex is None else solve_convex_mounts(convex).conflict
 
 
-def mounts_bound(problem: Problem) -> float:
+def mounts_bound(problem: Problem, near: Sequence[Value] = ()) -> float:
     """What no design goes under: each kind of terms alone, for none is under zero.
 
-    Mount forces by what is transmitted at least (E34), numbers of the mounts by what of them is convex (E16-E19),
-    loads of the block and masses by the unbalances alone, whatever the mounts (P4).
+    Numbers of the mounts by what of them is convex (E16-E19), loads of the block and masses by the unbalances alone,
+    whatever the mounts (P4); beside these, forces and travel of the mounts by their springs (E44), next to a design
+    whose values are given.
     """
-    found, parts = transmitted_bound(problem), []
-    block = tuple(term for term in problem.load_terms if not term.measure.on_mounts)
+    found, parts = 0.0, []
+    felt, block = (
+        tuple(term for term in problem.load_terms if term.measure.on_mounts == on_mounts) for on_mounts in (True, False)
+    )
+    if near and felt and (block or problem.mount_terms):
+        alone = replace(problem, objective=felt)
+        evaluation = evaluate(alone, alone.design(list(near)))
+        value = objective_value(alone, evaluation)
+        found += spring_bound(alone, value, room_of(value, alone.tolerance, nothing_of(alone)), near).bound
     if block:
         limits = tuple(limit for limit in problem.load_limits if not limit.measure.on_mounts)
         alone = replace(off_resonance(problem).balance, objective=block, limits=limits)
@@ -173,13 +182,14 @@ def _result(
     proven: tuple[Design, float] | None,
     divided: Divided,
     timing: dict[str, float],
+    among: bool,
 ) -> Result:
     problem, design, optimum = search.problem, found.design, found.optimum
     nothing = nothing_of(problem, design.evaluation.engine)
     bound = divided.bound
     # throws that move are not in the bound
     if search.moves is None and gap_of(design.value, bound, nothing) > problem.tolerance:
-        bound = max(bound, mounts_bound(problem))
+        bound = max(bound, mounts_bound(problem, () if among else design.values))
     shown = Shown(
         bound=bound,
         reach=Reach.NEAR if divided.boxes else Reach.ASIDE,

@@ -90,7 +90,7 @@ def _bound(problem: Problem, design: Design) -> float:
         return 0.0
     relaxed, near = with_masses(problem, model, design.values)
     room = room_of(design.value, problem.tolerance, nothing_of(problem, design.evaluation.engine))
-    return max(spring_bound(relaxed, design.value, room, near).bound, mounts_bound(relaxed))
+    return max(spring_bound(relaxed, design.value, room, near).bound, mounts_bound(relaxed, near))
 
 
 def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> tuple[Problem, list[Value]]:

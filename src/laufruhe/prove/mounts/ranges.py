@@ -1,0 +1,62 @@
+"""What bounds and limits of a problem leave of its mounts: numbers of springs, and stiffness in all (E31, E43, E53)."""
+
+from __future__ import annotations
+
+import math
+from typing import TypeAlias
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.modes import weight_wrench
+from laufruhe.problem import channels
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.problem import Problem
+
+SLACK = 1e-6
+"""Designs count as allowed when they break a limit by less."""
+
+
+def number_ranges(problem: Problem, lower: Array | None = None, upper: Array | None = None) -> tuple[Array, Array]:
+    """Least and largest values of the numbers of every spring, shape (springs, 14) each.
+
+    Parameters
+    ----------
+    lower, upper
+        Of the open numbers of the mounts; their bounds when left out.
+    """
+    low = np.array(problem.mount_numbers, dtype=float)
+    high = low.copy()
+    decisions = problem.mount_decisions
+    sides = [
+        [getattr(d, side) for d in decisions] if given is None else given.tolist()
+        for side, given in (("lower", lower), ("upper", upper))
+    ]
+    for decision, *edges in zip(decisions, *sides, strict=True):
+        for drive in decision.mount_drives:
+            ends = [drive.gain * (edge - decision.start_number) for edge in edges]
+            low[drive.mount, drive.number] += min(ends)
+            high[drive.mount, drive.number] += max(ends)
+    return low, high
+
+
+Band: TypeAlias = tuple[float, float]
+
+
+def limited_stiffness(problem: Problem, root: Array) -> tuple[list[Array], list[Array], list[Band]]:
+    """L that A is not under, by least frequency and largest sag (E31), U that it is not over (E43), and bands (E53).
+
+    Bands are of squares of angular frequencies, less what a limit may be broken by.
+    """
+    floors, ceilings, bands = [], [], []
+    weight = weight_wrench(mounting_in(problem.engine).block)
+    for limit in problem.mount_limits:
+        if limit.measure.channel is channels.FREQUENCIES:
+            floors += [(math.tau * limit.minimum) ** 2 * np.eye(6)] if limit.minimum > 0.0 else []
+            ceilings += [(math.tau * limit.maximum) ** 2 * np.eye(6)] if limit.maximum < math.inf else []
+            for low, high in [limit.outside] if limit.outside is not None else []:
+                bands.append(((math.tau * low * (1.0 + SLACK)) ** 2, (math.tau * high * (1.0 - SLACK)) ** 2))
+        if limit.measure.channel is channels.SAG and 0.0 < limit.maximum < math.inf:
+            pull = root @ weight
+            floors.append(np.outer(pull, pull) / (limit.maximum * -weight[2]))
+    return floors, ceilings, bands
