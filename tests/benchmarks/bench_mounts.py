@@ -139,7 +139,7 @@ def joint(problem: Problem) -> list[str]:
         f"| IPOPT, exact derivatives | {STARTS} | {alone:.1f} | {len(usable)} | {ended} | {min(usable):.4f} |",
         f"| SLSQP, finite differences | {STARTS} | {sum(t for _, t, _ in found):.1f} | {len(values)} | {reached} | "
         f"{min(values, default=math.nan):.4f} |",
-        f"| search of `laufruhe solve`, ended when no further optimum is to be expected (N5) | {tried} | "
+        f"| search of `laufruhe solve`, ended when nothing better is to be expected (N5) | {tried} | "
         f"{ended_early:.1f} | | | {search.chosen.design.value:.4f} |",
         f"| `laufruhe solve`: with balance anew and bounds by boxes | {tried} | {ours:.1f} | | | "
         f"{result.objective.value:.4f} |",

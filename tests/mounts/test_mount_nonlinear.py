@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import casadi as ca
@@ -269,3 +270,21 @@ def test_few_starts_find_the_best_known_optimum_of_the_powertrain(seed):
     problem = load(PROBLEMS / "powertrain-least-force.toml")
     problem = replace(problem, search=replace(problem.search, starts=2, seed=seed, boxes=0))
     assert solve_joint(problem).objective.value == pytest.approx(13.106325, rel=1e-5)
+
+
+def test_a_limit_that_is_left_out_at_first_comes_back_where_it_is_felt(tmp_path, monkeypatch):
+    def found(most: float, room: float):
+        monkeypatch.setattr("laufruhe.solvers.mounts.search.ROOM", room)
+        limits = f'[[constraints]]\nlimit = "rms mount force"\nmax = "{most} N"\n'
+        return solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], limits, SEARCH))
+
+    whole, felt = found(3.0, math.inf), found(3.0, -math.inf)
+    assert felt.limits[0].active
+    assert felt.limits[0].value == pytest.approx(3.0, rel=1e-5)
+    assert felt.objective.value == pytest.approx(whole.objective.value, rel=1e-6)
+    assert felt.limits[0].shadow_price == pytest.approx(whole.limits[0].shadow_price, rel=1e-3)
+    assert felt.limits[0].shadow_price > 0.0
+    wide, free = found(1e6, -math.inf), found(1e6, math.inf)
+    assert wide.objective.value == pytest.approx(free.objective.value, rel=1e-6)
+    assert wide.objective.value < 0.9 * felt.objective.value
+    assert wide.limits[0].shadow_price == 0.0

@@ -34,6 +34,8 @@ class PointResponse:
 def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], quantity: Measure) -> tuple[Any, Grid]:
     """Vectors at samples and their weights, as `load_rows` has them (P1).
 
+    Of a norm that knows nothing but squares these are the orders' own (Parseval).
+
     Parameters
     ----------
     names
@@ -50,20 +52,26 @@ def sampled_rows(points: Sequence[PointResponse], names: Sequence[str], quantity
     whole = sum(point.weight for point in chosen)
     blocks: list[Any] = []
     weights: list[float] = []
+    exact = quantity.norm.is_euclidean
     # points keep orders of their own: every signal has as many steps as the finest needs
     finest = max(float(point.orders.max(initial=0.0)) / point.base for point in chosen)
     samples = max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * finest))
     for point in chosen:
         signal = point.response.force if quantity.channel is channels.MOUNT_FORCE else point.response.travel
         counted = np.flatnonzero(quantity.counted(point.orders)).tolist()
-        cosine, sine = waves(point.orders[counted].tolist(), point.base, samples)
-        values = signal[0][:, counted] @ cosine - signal[1][:, counted] @ sine
+        orders, (real, imaginary) = point.orders[counted], (part[:, counted] for part in signal)
+        if exact:
+            still = orders == 0.0
+            values, steps = ca.horzcat(real, imaginary), np.append(0.5 + 0.5 * still, 0.5 - 0.5 * still)
+        else:
+            cosine, sine = waves(orders.tolist(), point.base, samples)
+            values, steps = real @ cosine - imaginary @ sine, np.full(samples, 1.0 / samples)
         for k in mounts:
             rows = values[3 * k : 3 * k + 3, :].T
             if quantity.direction_weights is not None:
                 rows = rows @ ca.diag(ca.DM(list(quantity.direction_weights)))
             blocks.append(rows)
-            weights += [point.weight / whole / len(mounts) / samples] * samples
+            weights += [*(point.weight / whole / len(mounts) * steps)]
     return ca.vertcat(*blocks), Grid(np.array(weights), samples, points=len(chosen))
 
 

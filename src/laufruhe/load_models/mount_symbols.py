@@ -119,8 +119,9 @@ def elimination() -> Any:
     for p in range(6):
         inverse = _inverse(rows[p][p])
         for j in range(p + 1, 6):
-            factor = _times(rows[j][p], inverse)
-            for k in range(p + 1, 7):
+            # symmetric all the way: the lower half is never looked at
+            factor = _times(rows[p][j], inverse)
+            for k in range(j, 7):
                 rows[j][k] = _minus(rows[j][k], _times(factor, rows[p][k]))
     y: list[tuple[Any, Any]] = [(0.0, 0.0)] * 6
     for p in reversed(range(6)):

@@ -28,7 +28,7 @@ AHEAD = 3
 LOSSES = 3
 """Times that one piece may be lost with its worker; what ends several is the fault of the piece."""
 WORTH_PROCESSES = 4.0
-"""Seconds of work that pay for starting processes."""
+"""Processor seconds of work that pay for starting processes."""
 LONGEST_WAIT = 1e9
 
 _given: ContextVar[Executor | None] = ContextVar("given", default=None)
@@ -140,10 +140,10 @@ def in_turn(work: Callable[[T], A], pieces: Sequence[T], what: str) -> list[A]:
     what
         They are, in words, for who listens to progress.
     """
-    began, found = time.perf_counter(), list[A]()
+    began, found = time.process_time(), list[A]()
     for piece in in_time(pieces):
         rest = len(pieces) - len(found)
-        if found and count_of() > 1 and (time.perf_counter() - began) * (rest / len(found)) > WORTH_PROCESSES:
+        if found and count_of() > 1 and (time.process_time() - began) * (rest / len(found)) > WORTH_PROCESSES:
             break
         tell(what, len(found), len(pieces))
         found.append(work(piece))

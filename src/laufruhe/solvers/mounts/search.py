@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +13,9 @@ from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed, rounds
 from laufruhe.numerics.progress import tell
+from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -39,6 +41,9 @@ RUN_ITERATIONS = 60
 SMALL = 1e-2
 MOST_SIZES = 3
 SPREAD = 0.4
+# starts at which limits are looked at, share of a limit that has to be left there, and within which it is felt
+LOOKED = 6
+ROOM, FELT = 0.5, 0.05
 # of the throws that a search starts from, about their star [rad]
 NUDGE = 0.02
 
@@ -95,23 +100,25 @@ class MountSearch:
         tell("starts of the mounts")
         self._points, self._size = start_points(problem)
         self._points = self._points if first is None else [first, *self._points[0 if beside else 1 :]]
+        self._left_out = self._kept_anyway()
         tell("smooth program of all that is open")
-        self.joint = SmoothProgram(problem, self._size, moves=moves)
+        self.joint = self._program()
         self._given = given_design(problem, initial) if moves is None else None
         self.best: Found | None = None
         self._near: list[Found] = []
+        self._felt: set[Limit] = set()
         self.optima: tuple[LocalOptimum, ...] = ()
 
     def run(self) -> None:
         """From all starts, and again in a smaller size where that of the starts hid what was found."""
         nothing = nothing_of(self.problem)
-        self._search(self._points)
+        self._under_what_is_felt(lambda: self._search(self._points))
         for _ in rounds(MOST_SIZES):
             if self.best is None or self.best.design.value >= SMALL * self._size or self._size <= nothing:
                 break
             # a search ends at a share of the size that it counts in
             self._size = max(self.best.design.value, nothing)
-            self.joint = SmoothProgram(self.problem, self._size, moves=self.moves)
+            self.joint = self._program()
             self._search([_point(self.best), *self._points[1:]])
         self._tighten()
 
@@ -123,7 +130,7 @@ class MountSearch:
         if self.best is not None and self.best.optimum not in ends[:MOST_REFINED]:
             places.append(_point(self.best))
         self._coarser = 1
-        self.joint = SmoothProgram(self.problem, self._size, moves=self.moves, coarser=1)
+        self.joint = self._program()
         starts = [self.joint.start(*place) for place in places]
         self._take(self._ends(starts))
         self._tighten()
@@ -140,8 +147,9 @@ class MountSearch:
             # what passes a limit by a rounding is no better for it
             if alone is not None and alone.excess <= 0.0:
                 self._keep(Found(alone, self.joint))
-        starts = [self.joint.start(place.tolist(), columns) for place in places]
-        self._take(self._ends(starts))
+        self._under_what_is_felt(
+            lambda: self._take(self._ends([self.joint.start(place.tolist(), columns) for place in places]))
+        )
         self._tighten()
         return self.best is not None and (before is None or self.best.rank < before.rank)
 
@@ -182,6 +190,33 @@ class MountSearch:
             optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in more))
         self._take(optima)
 
+    def _program(self, margin: float = 0.0) -> SmoothProgram:
+        """Of the limits that may be felt, tightened by a share."""
+        limits = tuple(limit for limit in self.problem.limits if limit not in self._left_out)
+        asked = self.problem if not self._left_out else replace(self.problem, limits=limits)
+        return SmoothProgram(asked, self._size, margin, self.moves, coarser=self._coarser)
+
+    def _kept_anyway(self) -> set[Limit]:
+        """Limits on loads that are kept where the search starts, with room to spare: each is hundreds of rows."""
+        if self.moves is not None:
+            return set()
+        limits = [x for x in self.problem.load_limits if not x.measure.is_mass and not x.measure.channel.is_checked]
+        domains = domains_of(self.problem.unbalances)
+        for mounts, columns in self._points[:LOOKED] if limits else ():
+            own, sizes = iter(mounts), iter(domain.complex_value(columns) for domain in domains)
+            values: list[Value] = [next(sizes) if d.is_affine else next(own) for d in self.problem.decisions]
+            design = judged_at(self.problem, values)
+            limits = [x for x in limits if design is not None and design.evaluation.standing(x).excess < -ROOM]
+        return set(limits)
+
+    def _under_what_is_felt(self, search: Callable[[], None]) -> None:
+        """A search, and again under the limits that were left out where its best ends come near them."""
+        search()
+        while self._felt and not passed():
+            self._left_out, self._felt, self.optima, self._near = self._left_out - self._felt, set(), (), []
+            self.joint = self._program()
+            search()
+
     @property
     def _iterations(self) -> int:
         return ITERATIONS if self.joint.program.told is None else RUN_ITERATIONS
@@ -196,15 +231,27 @@ class MountSearch:
     def _take(self, optima: Sequence[LocalOptimum]) -> None:
         """Judge where starts ended; whatever the solver says of an end, the exact model tells."""
         self.optima += tuple(optima)
+        designs: list[Design] = []
         for k, optimum in enumerate(optima):
             kept = self.best is not None and self.best.design.excess <= SLACK
             tell("ends judged", k, len(optima), self.best.design.value if self.best is not None and kept else np.inf)
             design = self._judged(optimum, self.joint)
             if design is not None:
+                designs.append(design)
                 found = Found(design, self.joint, optimum)
                 self._keep(found)
                 if FEASIBLE < design.excess <= NEAR:
                     self._near.append(found)
+
+        self._felt = {limit for limit in self._left_out if any(self._feels(design, limit) for design in designs)}
+
+    def _feels(self, design: Design, limit: Limit) -> bool:
+        """Whether a design that is as good as the best but for what was left out is near a limit, or over it."""
+        best = self.best
+        if best is not None and best.design.excess <= SLACK and design.value > best.design.value:
+            return False
+        held = [other for other in self.problem.limits if other not in self._left_out]
+        return design.evaluation.standing(limit).excess > -FELT and design.evaluation.excess(held) <= NEAR
 
     def _keep(self, found: Found) -> None:
         if self.best is None or found.rank < self.best.rank:
@@ -215,7 +262,7 @@ class MountSearch:
             return None
         mounts, unbalances = (iter(part) for part in joint.split(optimum.x))
         try:
-            problem = joint.designed(optimum.x)
+            problem = self.problem if self.moves is None else joint.designed(optimum.x)
         except ModelError:
             # throws where a search was left may not fire in their order
             return None
@@ -244,7 +291,7 @@ class MountSearch:
             if near.optimum is None or not FEASIBLE < near.design.excess <= NEAR:
                 break
             margin += 1.001 * near.design.excess
-            joint = SmoothProgram(self.problem, self._size, margin, self.moves, coarser=self._coarser)
+            joint = self._program(margin)
             ends = solve_nonlinear(joint.program, [near.optimum.x], 1, self._iterations)
             design = self._judged(ends[0], joint) if ends else None
             if design is None:

@@ -205,7 +205,7 @@ def _with_outside(function: Any, outside: Outside) -> tuple[Any, _Told]:
 
 
 def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptimum:
-    began = time.perf_counter()
+    began = time.process_time()
     y, iterations, ending = point / task.scales, 0, Ending.FAILED
     sides = {"lbx": task.lower, "ubx": task.upper, "lbg": task.constraint_lower, "ubg": task.constraint_upper}
     m = b = np.zeros(0)
@@ -236,7 +236,7 @@ def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptim
         kkt_residual=residual,
         violation=violation,
         iterations=iterations,
-        seconds=time.perf_counter() - began,
+        seconds=time.process_time() - began,
         ending=ending,
         start=k,
     )

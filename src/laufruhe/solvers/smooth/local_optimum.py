@@ -9,8 +9,10 @@ from enum import StrEnum
 from laufruhe.numerics.arrays import Array
 
 _NEAR = 1e-6
-# optima that a rule may miss on average
-_MISSED = 0.5
+# share of their scale within which values are the same
+_SAME = 1e-4
+# chance that one more start leads to what is better than all, under which no other is tried
+_MISSED = 1.0 / 36.0
 
 
 class Ending(StrEnum):
@@ -42,7 +44,7 @@ class LocalOptimum:
     violation
         The part of it that the limits alone have.
     iterations, seconds
-        Over all stages.
+        Over all stages; seconds of the processor.
     ending
         In words.
     start
@@ -69,7 +71,7 @@ class LocalOptimum:
         return self.ending in (Ending.CONVERGED, Ending.ACCEPTABLE) and self.violation <= _NEAR
 
 
-def distinct(optima: Sequence[LocalOptimum], scale: float, tolerance: float = 1e-4) -> tuple[LocalOptimum, ...]:
+def distinct(optima: Sequence[LocalOptimum], scale: float, tolerance: float = _SAME) -> tuple[LocalOptimum, ...]:
     """One of every group of usable optima whose values agree to `tolerance` of `scale`, best first."""
     kept: list[LocalOptimum] = []
     for optimum in sorted((o for o in optima if o.usable), key=lambda o: o.value):
@@ -79,11 +81,14 @@ def distinct(optima: Sequence[LocalOptimum], scale: float, tolerance: float = 1e
 
 
 def is_explored(optima: Sequence[LocalOptimum], scale: float) -> bool:
-    """Whether starts spread at random have very likely met every optimum (N5).
+    """Whether starts spread at random have very likely met the best optimum, and more than once (N5).
 
-    Where n starts led to w different ones, w (n - 1) / (n - w - 2) are expected (Boender and Rinnooy Kan, Math.
-    Programming 37, 1987, 59-80). A start that leads to none counts as one of its own.
+    Where n starts led to w different ones, the next one leads to another with a chance of w (w + 1) / (n (n - 1))
+    (Boender and Rinnooy Kan, Math. Programming 37, 1987, 59-80); that is the best of w + 1 with a chance of one in so
+    many. A start that leads to none counts as one of its own.
     """
-    n = sum(optimum.starts for optimum in optima)
-    w = len(distinct(optima, scale)) + sum(optimum.starts for optimum in optima if not optimum.usable)
-    return n > w + 2 and w * (n - 1) <= (w + _MISSED) * (n - w - 2)
+    n, apart = sum(optimum.starts for optimum in optima), distinct(optima, scale)
+    w = len(apart) + sum(optimum.starts for optimum in optima if not optimum.usable)
+    near = apart[0].value + _SAME * scale if apart else 0.0
+    met = sum(optimum.starts for optimum in optima if optimum.usable and optimum.value <= near)
+    return met > 1 and w <= _MISSED * n * (n - 1)

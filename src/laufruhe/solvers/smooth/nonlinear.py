@@ -178,11 +178,11 @@ def _first_ends(
 ) -> tuple[list[LocalOptimum], Several]:
     """Where starts end, and who looked for that."""
     # one start tells whether the others are worth processes of their own
-    began = time.perf_counter()
+    began = time.process_time()
     found, rest = run((task, points[:1])), points[1:]
     count = min(len(rest), workers if workers is not None else count_of())
     spent = sum(o.seconds for o in found)
-    pays = spent * len(rest) > WORTH_PROCESSES + (time.perf_counter() - began - spent)
+    pays = spent * len(rest) > WORTH_PROCESSES + (time.process_time() - began - spent)
     several: Several = _Shared(stack, count) if count > 1 and pays else run
     while rest and not passed() and not (enough is not None and enough(_grouped(found, task))):
         some, rest = (rest[:ROUND], rest[ROUND:]) if enough is not None else (rest, [])
