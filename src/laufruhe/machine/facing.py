@@ -95,7 +95,7 @@ class SharedChamber(SliderCrank):
         """Where the chamber is least."""
         return self.dead_centres[0]
 
-    @property
+    @cached_property
     def stroke(self) -> float:
         """Largest less least of both together [m]."""
         top, bottom = self.dead_centres

@@ -84,7 +84,17 @@ def _first_octant(turn: Fraction) -> tuple[float, float]:
 
 @lru_cache(maxsize=256)
 def _roots(denominator: int) -> NDArray[np.complex128]:
-    table = np.array([cis(Fraction(k, denominator)) for k in range(denominator)])
+    # `cis` of every fraction, in eighths of 1 / denominator
+    eighths, rest = np.divmod(8 * np.arange(denominator), denominator)
+    small = np.where(eighths % 2 == 1, denominator - rest, rest)
+    angles = (math.tau * (small / (8.0 * denominator))).tolist()
+    cosines, sines = np.array([(math.cos(angle), math.sin(angle)) for angle in angles]).T
+    for exact, share in ((Fraction(1, 12), 12 * small == 8 * denominator), (Fraction(1, 8), small == denominator)):
+        cosines[share], sines[share] = _first_octant(exact)
+    across, up = np.where(eighths % 2 == 1, (sines, cosines), (cosines, sines))
+    table = np.empty(denominator, dtype=complex)
+    table.real = np.choose(eighths // 2, [across, -up, -across, up])
+    table.imag = np.choose(eighths // 2, [up, across, -up, -across])
     table.setflags(write=False)
     return table
 

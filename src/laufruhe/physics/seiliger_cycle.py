@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -37,6 +38,7 @@ def seiliger_pressure(gas: Seiliger, part: SliderCrank, cycle: Cycle, angles: Ar
     return cylinder.pressure(closed, angles)
 
 
+@lru_cache(maxsize=64)
 def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
     """Volume at the cut-off over the smallest volume, solved for the indicated mean pressure (G6).
 
@@ -75,11 +77,11 @@ def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
 def cut_off_angle(gas: Seiliger, part: SliderCrank, cycle: Cycle) -> float:
     """Crank angle from the firing dead centre at which the heat ends [rad] (G5)."""
     top, bottom = dead_centres(part)
-    cylinder = ChargedCylinder(gas, part, cycle)
-    wanted = cylinder.smallest * seiliger_cut_off(gas, cycle)
+    ratio, smallest = part.shaft.ratio, ChargedCylinder(gas, part, cycle).smallest
+    wanted = part.travel(np, part.dead_centres[0]) + part.stroke * smallest * (seiliger_cut_off(gas, cycle) - 1.0)
 
     def beyond(angle: float) -> float:
-        return float(cylinder.volume(np.array([angle]))[0]) - wanted
+        return float(part.travel(np, part.fires_at + ratio * angle) - wanted)
 
     if beyond(top) >= 0.0 or beyond(bottom) <= 0.0:
         return top if beyond(top) >= 0.0 else bottom
