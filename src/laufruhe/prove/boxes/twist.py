@@ -3,13 +3,8 @@
 The inertia of all that turns, and how evenly it does, go one way with every disc (V14): a corner bounds them.
 
 The dynamic stiffness of an order is affine in inertia, stiffness and damping; of a diameter its stiffness is the
-coordinate. About the centre of a box, with A_i what half its side i changes,
-
-    q = q0 - Q q0 + (1 + Q)^-1 Q^2 q0,    Q = sum_i s_i D^-1 A_i,    q0 = D^-1 T,    -1 <= s_i <= 1,
-
-so that the twist is known to the first order, and the rest is no larger than
-sum_ij |D^-1 A_i D^-1 A_j q0| / (1 - rho), rho = sum_i |D^-1 A_i| < 1. Orders where it is not count as nothing: a
-root of squares is no larger without them.
+coordinate. So the response over a box is that series of E37, in coordinates in which the inertia of the centre is one.
+Orders whose series need not end count as nothing: a root of squares is no larger without them.
 """
 
 from __future__ import annotations
@@ -24,7 +19,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Flywheel, Torsion
-from laufruhe.numerics.arrays import Array, ComplexArray
+from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torsion import dynamic_stiffness, inertias, natural_modes, receptances, throw_torques
 from laufruhe.problem.evaluation import Evaluation
@@ -32,13 +27,14 @@ from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.boxes.twist_coordinates import TwistCoordinates
+from laufruhe.prove.mounts.box_norms import Under, root_under
+from laufruhe.prove.mounts.box_response import Answer, Expansion, inverses, mapped, series
 from laufruhe.prove.mounts.ranges import SLACK
 
 # orders whose share of the squares is less, in the middle of the bounds and at their corners, are left out
 LEAST_SHARE = 1e-10
 MOST_CORNERS = 16
 _SAME = 1e-9
-_ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,39 +61,6 @@ class _Lines:
     mean: Array
     middle: ComplexArray
     sides: ComplexArray
-
-
-@dataclass(frozen=True, eq=False)
-class _Twist:
-    """Twist of the sections on a box: in its centre, by its sides, and what that leaves out.
-
-    Attributes
-    ----------
-    value, slopes, rest
-        Shapes (orders, sections), (coordinates, orders, sections) and (orders, sections).
-    pull
-        How much of the twist each side changes at most, shape (coordinates,).
-    """
-
-    value: ComplexArray
-    slopes: ComplexArray
-    rest: Array
-    pull: Array
-
-
-@dataclass(frozen=True, eq=False)
-class _Under:
-    """value + slopes . s - rest is nowhere above a root mean square (E38)."""
-
-    value: float
-    slopes: Array
-    rest: float
-
-    @property
-    def least(self) -> float:
-        """On the box; nothing where the rest is not known."""
-        found = self.value - self.rest - float(np.abs(self.slopes).sum())
-        return max(found, 0.0) if math.isfinite(found) else 0.0
 
 
 class _OfInertia:
@@ -172,15 +135,11 @@ class TwistBoxes:
         chains = [self.coordinates.chain(x) for x in (lower, centre, upper)]
         if any(of.least(chains) > most * (1.0 + SLACK) for most, of in self._uneven):
             return math.inf, int(np.argmax(wide))
-        twists = [self._twist(lines, chains[1], centre, half) for lines in self._lines]
-        if any(self._under(q, chains, twists).least > most * (1.0 + SLACK) for most, q in self._limits):
+        twists = [self._expanded(lines, chains[1], centre, half) for lines in self._lines]
+        if any(_least([(1.0, self._under(q, chains, twists))]) > most * (1.0 + SLACK) for most, q in self._limits):
             return math.inf, int(np.argmax(wide))
-        found = [(weight, self._under(measure, chains, twists)) for weight, measure in self._terms]
-        slopes = sum((weight * under.slopes for weight, under in found), np.zeros(len(lower)))
-        whole = sum(weight * (under.value - under.rest) for weight, under in found)
-        least = whole - float(np.abs(slopes).sum())
-        least = max(least, 0.0) if math.isfinite(least) else 0.0
-        pull = np.max([np.nan_to_num(twist.pull, nan=1.0, posinf=1.0) for twist in twists], axis=0)
+        least = _least([(weight, self._under(measure, chains, twists)) for weight, measure in self._terms])
+        pull = np.max([twist.sides[0] for twist in twists], axis=0)
         turning = sum(weight * of.least(chains) for weight, of in self._turning)
         if not self._terms:
             # each goes one way with every inertia, and nothing else moves it
@@ -218,81 +177,67 @@ class TwistBoxes:
         highest = len(torques.coefficients) - 1
         return _Lines(loads, highest, orders, drives, torques.coefficients[0].real, at, np.array(sides))
 
-    def _twist(self, lines: _Lines, chain: Torsion, centre: Array, half: Array) -> _Twist:
-        """By the series above, in coordinates in which the inertia of the centre is one."""
-        root, count = np.sqrt(inertias(chain)), len(chain.sections)
+    def _expanded(self, lines: _Lines, chain: Torsion, centre: Array, half: Array) -> Expansion:
+        """Angles of discs and rings times the roots of their inertia."""
+        root = np.sqrt(inertias(chain))
         scale = np.outer(root, root)
         middle = 0.5 * (self.coordinates.lower + self.coordinates.upper)
         dynamic = lines.middle + np.tensordot(centre - middle, lines.sides, axes=(0, 0))
-        try:
-            inverse = np.linalg.inv(dynamic / scale)
-        except np.linalg.LinAlgError:
-            inverse = np.full_like(dynamic, np.inf)
-        moved = inverse @ (half[:, None, None, None] * lines.sides / scale)
+        inverse = inverses(dynamic / scale)
         still = np.einsum("lab,lb->la", inverse, lines.torques / root)
-        first = -np.einsum("ilab,lb->ila", moved, still)
-        second = np.linalg.norm(np.einsum("ilab,jlb->ijla", moved, first), axis=-1).sum(axis=(0, 1))
-        sizes = np.linalg.norm(moved, axis=(2, 3))
-        rho = sizes.sum(axis=0)
-        rest = np.where(rho < 1.0, second / (1.0 - np.where(rho < 1.0, rho, 0.0)), np.inf)
-        angles, slopes = still / root, first / root
-        apart = np.sqrt(1.0 / root[:count] ** 2 + 1.0 / root[1 : count + 1] ** 2)
-        return _Twist(
-            angles[:, :count] - angles[:, 1 : count + 1],
-            slopes[:, :, :count] - slopes[:, :, 1 : count + 1],
-            np.where(np.isfinite(rest), rest, np.inf)[:, None] * apart,
-            sizes.max(axis=1, initial=0.0),
-        )
+        sides = np.moveaxis(lines.sides / scale, 0, 1)
+        return series(centre[None], half[None], inverse[None], sides[None], still[None])
 
-    def _under(self, measure: Measure, chains: Sequence[Torsion], twists: Sequence[_Twist]) -> _Under:
+    def _under(self, measure: Measure, chains: Sequence[Torsion], twists: Sequence[Expansion]) -> Under:
         """A linear function under a root mean square over orders, sections and operating points."""
         names = [section.name for section in chains[1].sections]
         places = measure.load.places(self.problem.engine)
-        chosen = [names.index(places[k]) for k in measure.places(places)]
-        square, slopes, rest = 0.0, np.zeros(len(self.coordinates.lower)), 0.0
-        shares = measure.shares([lines.loads.point for lines in self._lines])
+        chosen = np.array([names.index(places[k]) for k in measure.places(places)], dtype=np.intp)
+        shares = measure.shares([lines.loads.point for lines in self._lines]) / len(chosen)
+        found, weights = list[Answer](), list[Array]()
         for share, lines, twist in zip(shares, self._lines, twists, strict=True):
-            if share == 0.0:
-                continue
-            rows = [self._alternating(measure, chains, lines, twist)]
+            found.append(self._alternating(measure, chains, lines, twist, chosen))
+            weights.append(np.where(measure.counted(lines.orders), 0.5 * share, 0.0))
             if bool(measure.counted(np.zeros(1))[0]):
-                rows.append(self._mean(measure, chains, lines))
-            for weight, (value, by_side, left) in zip((0.5, 1.0), rows, strict=False):
-                weight *= share / len(chosen)
-                value, by_side, left = value[..., chosen], by_side[..., chosen], left[..., chosen]
-                known = np.isfinite(left)
-                value, left = np.where(known, value, 0.0), np.where(known, left, 0.0)
-                by_side = np.where(known, by_side, 0.0)
-                square += weight * float(np.sum(np.abs(value) ** 2))
-                slopes += weight * np.sum((value.conj() * by_side).real.reshape(len(slopes), -1), axis=1)
-                rest += weight * float(np.sum(left**2))
-        size = math.sqrt(square)
-        return _Under(size, slopes / (size or 1.0), math.sqrt(rest) + _ROUNDING * size)
+                found.append(self._mean(measure, chains, lines, chosen))
+                weights.append(np.array([share]))
+        parts = (
+            np.concatenate([getattr(each, part) for each in found], axis=1) for part in ("value", "slopes", "rest")
+        )
+        return root_under(Answer(*parts), np.concatenate(weights))
 
     def _alternating(
-        self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, twist: _Twist
-    ) -> tuple[ComplexArray, ComplexArray, Array]:
-        """Value, slopes and rest of what a measure makes of the twist, in every order that counts."""
-        speed, counted = lines.loads.point.speed, measure.counted(lines.orders)
-        low, here, high = (measure.load.factors(chain, lines.orders[counted], speed) for chain in chains)
+        self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, twist: Expansion, chosen: Indices
+    ) -> Answer:
+        """What a measure makes of the twist of the chosen sections in every order."""
+        root, own = np.sqrt(inertias(chains[1])), np.arange(len(chains[1].sections))
+        apart = np.zeros((len(own), len(root)))
+        apart[own, own], apart[own, own + 1] = 1.0 / root[own], -1.0 / root[own + 1]
+        low, here, high = (
+            measure.load.factors(chain, lines.orders, lines.loads.point.speed)[:, chosen, None] for chain in chains
+        )
         # each factor is of its own stiffness, and bends one way: so much the secant may be off
-        turn, bend = 0.5 * (high - low), np.abs(here - 0.5 * (high + low))
-        value, by_side, left = twist.value[counted], twist.slopes[:, counted], twist.rest[counted]
-        moved = np.abs(by_side).sum(axis=0) + left
-        slopes = here * by_side + self.coordinates.owners[:, None, :] * (turn * value)
-        rest = np.abs(turn) * moved + bend * (np.abs(value) + moved) + np.abs(here) * left
-        return here * value, slopes, np.where(np.isnan(rest), np.inf, rest)
+        turn, bend = 0.5 * (high - low), np.abs(here - 0.5 * (high + low))[..., 0]
+        owners = self.coordinates.owners[:, chosen, None]
+        slopes = owners * turn[:, None] * apart[chosen]
+        found = mapped(twist, (here * apart[chosen])[None], slopes[None])
+        if not bend.any():
+            return found
+        moved = np.broadcast_to(apart[chosen], (1, len(lines.orders), len(chosen), len(root)))
+        alone = mapped(twist, moved, 0.0 * slopes[None])
+        most = np.abs(alone.value) + np.abs(alone.slopes).sum(axis=2) + alone.rest[..., None]
+        return replace(found, rest=found.rest + np.linalg.norm(np.where(bend > 0.0, bend * most, 0.0), axis=-1))
 
-    def _mean(
-        self, measure: Measure, chains: Sequence[Torsion], lines: _Lines
-    ) -> tuple[ComplexArray, ComplexArray, Array]:
+    def _mean(self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, chosen: Indices) -> Answer:
         """The same of order zero, each section of its own stiffness alone."""
         zero, speed = np.zeros(1), lines.loads.point.speed
         low, here, high = (
-            (receptances(chain, zero, speed)[0] @ lines.mean) * measure.load.factors(chain, zero, speed)[0]
+            ((receptances(chain, zero, speed)[0] @ lines.mean) * measure.load.factors(chain, zero, speed)[0])[chosen]
             for chain in chains
         )
-        return here, self.coordinates.owners * (0.5 * (high - low)), np.abs(here - 0.5 * (high + low))
+        slopes = self.coordinates.owners[:, chosen] * (0.5 * (high - low))
+        rest = np.array([[float(np.linalg.norm(here - 0.5 * (high + low)))]])
+        return Answer(here[None, None], slopes[None, None], rest)
 
     def _breaks(self, limit: Limit, lower: Array, upper: Array) -> bool:
         """Whether natural frequencies break a limit all over a box: they rise with stiffness and fall with inertia."""
@@ -316,3 +261,10 @@ def _turns(measure: Measure) -> bool:
 
 def _is_square(measure: Measure) -> bool:
     return measure.is_twist and measure.norm.is_euclidean
+
+
+def _least(terms: Sequence[tuple[float, Under]]) -> float:
+    """Of a sum of root mean squares on a box; nothing where what is left out is not known."""
+    slopes = sum((weight * under.slopes[0] for weight, under in terms), np.zeros(1))
+    found = sum(weight * float(under.value[0] - under.rest[0]) for weight, under in terms) - float(np.abs(slopes).sum())
+    return max(found, 0.0) if math.isfinite(found) else 0.0

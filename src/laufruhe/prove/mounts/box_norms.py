@@ -108,8 +108,8 @@ def _turns(model: BoxModel, lines: Lines, p: int, own: NDArray[np.intp]) -> NDAr
 def root_under(answer: Answer, weights: Array) -> Under:
     """Under the root of a weighted sum of squares; orders whose series need not end count as nothing."""
     known = np.isfinite(answer.rest)
-    value = np.where(known[..., None], answer.value, 0.0)
+    value, slopes = np.where(known[..., None], answer.value, 0.0), np.where(known[..., None, None], answer.slopes, 0.0)
     size = np.sqrt(np.einsum("k,bkr->b", weights, np.abs(value) ** 2))
-    slopes = np.einsum("k,bkr,bknr->bn", weights, value.conj(), answer.slopes).real
+    slopes = np.einsum("k,bkr,bknr->bn", weights, value.conj(), slopes).real
     rest = np.sqrt(np.einsum("k,bk->b", weights, np.where(known, answer.rest, 0.0) ** 2))
     return Under(size, slopes / np.where(size > 0.0, size, 1.0)[:, None], rest)

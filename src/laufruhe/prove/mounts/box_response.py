@@ -91,6 +91,11 @@ class Expansion:
     rest: Array
     pull: Array
 
+    @property
+    def sides(self) -> Array:
+        """By how much each side of every box keeps the expansion from ending, shape (boxes, n)."""
+        return np.asarray(np.nan_to_num(self.pull, nan=1.0, posinf=1.0).max(axis=1, initial=0.0))
+
 
 @dataclass(frozen=True, eq=False)
 class Answer:
@@ -249,7 +254,7 @@ class BoxModel:
         impedance = impedance - omegas**2 * np.eye(6)
         lost = moving[:, None] * self._slopes["loss"] + omegas[:, None] * self._slopes["damping"]
         slopes = self._slopes["stiffness"] + 1j * lost
-        inverse = _inverse(np.asarray(impedance, dtype=np.complex128))
+        inverse = inverses(np.asarray(impedance, dtype=np.complex128))
         motion = np.einsum("bkij,kj->bki", inverse, lines.loads)
         return series(centres, halves, inverse, slopes[None], motion)
 
@@ -318,14 +323,11 @@ def _both_ways(second: ComplexArray) -> ComplexArray:
     return np.asarray(0.5 * (second + np.swapaxes(second, 2, 3)))
 
 
-def _inverse(matrices: ComplexArray) -> ComplexArray:
-    """Inverses; not a number where there is none, which leaves a box without a bound."""
+def inverses(matrices: ComplexArray) -> ComplexArray:
+    """Inverses; infinite where there is none, which leaves a box without a bound."""
     try:
         return np.asarray(np.linalg.inv(matrices))
     except np.linalg.LinAlgError:
-        flat = matrices.reshape(-1, 6, 6)
-        singular = np.abs(np.linalg.det(flat)) == 0.0
-        flat = np.where(singular[:, None, None], np.eye(6), flat)
-        found = np.linalg.inv(flat)
-        found[singular] = np.inf
-        return np.asarray(found.reshape(matrices.shape))
+        singular = np.linalg.det(matrices) == 0.0
+        found = np.linalg.inv(np.where(singular[..., None, None], np.eye(matrices.shape[-1]), matrices))
+        return np.asarray(np.where(singular[..., None, None], np.inf, found))

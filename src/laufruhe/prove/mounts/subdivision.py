@@ -22,7 +22,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided, divide
 from laufruhe.prove.mounts.box_norms import Under, root_under, under
 from laufruhe.prove.mounts.box_numbers import RANGES, breaks
-from laufruhe.prove.mounts.box_response import BoxModel, Expansion, Lines
+from laufruhe.prove.mounts.box_response import BoxModel, Lines
 from laufruhe.prove.mounts.ranges import SLACK
 
 # open numbers that are divided without being asked for, and what all boxes may cost together
@@ -128,7 +128,7 @@ class StiffnessBoxes:
             least = under(self.model, quantity, lines, at)
             total += weight * (least.value - least.rest - left_out)
             slopes += weight * least.slopes
-            pull = np.maximum(pull, _pull(at))
+            pull = np.maximum(pull, at.sides)
         found = self.constant + _known(total - np.abs(slopes).sum(axis=1))
         for asked, weight in ((term.measure, term.weight) for term in self.problem.mount_terms):
             if _is_ratio(asked):
@@ -178,7 +178,7 @@ class StiffnessBoxes:
             bend = bent / (2.0 * np.where(known, bottom.value, 1.0))
             least = _least_ratio(top, Under(bottom.value, bottom.slopes, bottom.rest + bend))
             best = np.maximum(best, np.where(known, least, 0.0))
-        return best, _pull(at)
+        return best, at.sides
 
 
 def _is_ratio(quantity: Measure) -> bool:
@@ -220,11 +220,6 @@ def _felt(model: BoxModel, quantity: Measure, budget: float) -> tuple[Lines, flo
     kept[out] = False
     # a peak to peak is twice a largest length at most
     return lines.kept(kept), (1.0 if quantity.norm.of_row_lengths else 2.0) * float(felt[out].sum())
-
-
-def _pull(at: Expansion) -> Array:
-    """By how much each side of every box keeps the expansion from ending, shape (boxes, n)."""
-    return np.asarray(np.nan_to_num(at.pull, nan=1.0, posinf=1.0).max(axis=1, initial=0.0))
 
 
 def _known(bound: Array) -> Array:
