@@ -12,8 +12,8 @@ import numpy as np
 from laufruhe.numerics.arrays import Array, Indices
 
 
-def answered(cost: Array, rows: Any, right: Array, cones: Sequence[Any], settings: Mapping[str, Any]) -> Any:
-    """What Clarabel says of least cost' x with right - rows x in the cones."""
+def solver_of(cost: Array, rows: Any, right: Array, cones: Sequence[Any], settings: Mapping[str, Any]) -> Any:
+    """Clarabel's solver of least cost' x with right - rows x in the cones."""
     import clarabel
     from scipy.sparse import csc_array
 
@@ -21,7 +21,7 @@ def answered(cost: Array, rows: Any, right: Array, cones: Sequence[Any], setting
     for name, value in settings.items():
         setattr(told, name, value)
     nothing = csc_array((len(cost), len(cost)))
-    return clarabel.DefaultSolver(nothing, cost, rows, right, cones, told).solve()
+    return clarabel.DefaultSolver(nothing, cost, rows, right, cones, told)
 
 
 @cache
@@ -35,3 +35,11 @@ def column(matrices: Array) -> Array:
     """The upper triangles column by column, so that lengths are kept, shape (..., n (n + 1) / 2)."""
     i, j, factor = triangle(matrices.shape[-1])
     return np.asarray(matrices[..., i, j] * factor)
+
+
+def matrix_of(entries: Array, size: int) -> Array:
+    """From such a triangle, shape (size, size)."""
+    i, j, factor = triangle(size)
+    matrix = np.zeros((size, size))
+    matrix[i, j] = matrix[j, i] = entries / factor
+    return matrix

@@ -21,7 +21,7 @@ from laufruhe.prove.springs.means import Mean, mean_of
 from laufruhe.prove.springs.modes import Mode, shapes_of
 from laufruhe.prove.springs.open_mounts import OpenMounts
 from laufruhe.prove.springs.orders import Asked, Head, Order, lengths_of, most_of
-from laufruhe.prove.springs.program import aimed, proposed
+from laufruhe.prove.springs.program import Stated, proposed
 
 # share of what a solver takes for the least that its multipliers should prove,
 # and where that is of a mean, which its own ends hold back more
@@ -162,7 +162,7 @@ class SpringBox:
         shapes = np.zeros(5 * len(self.modes))
         for (order, _), line in zip(head.beside, self._of_head(head), strict=True):
             if np.any(line.slopes):
-                found = next(aimed(self.under_all(heads, least), [np.append(-line.slopes, shapes)]))
+                found, _ = Stated(self.under_all(heads, least)).least(np.append(-line.slopes, shapes))
                 known = self.search.felt_at_most.get(id(order), math.inf)
                 self.search.felt_at_most[id(order)] = min(known, line.constant - found)
         self._taken.clear()

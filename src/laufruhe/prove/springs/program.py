@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from laufruhe.numerics.arrays import Array, Indices
-from laufruhe.prove.quadratics import answered, column, triangle
+from laufruhe.prove.quadratics import column, matrix_of, solver_of, triangle
 from laufruhe.prove.springs.bound import Cap, Multipliers, Priced, Program, Proposed, Root, follows
 from laufruhe.prove.springs.conditions import Held
 from laufruhe.prove.springs.modes import Shapes
@@ -25,6 +25,7 @@ _SETTINGS = {
     "tol_gap_abs": 1e-6,
     "tol_feas": 1e-7,
     "max_threads": 1,
+    "direct_solve_method": "faer",
     "presolve_enable": False,
     "chordal_decomposition_enable": False,
     "iterative_refinement_enable": False,
@@ -39,14 +40,6 @@ def proposed(program: Program) -> Iterator[Proposed]:
         yield stated.answer(program, scaled)
 
 
-def aimed(program: Program, aims: Iterable[Array]) -> Iterator[float]:
-    """Least of every aim under the same conditions, as multipliers prove."""
-    stated = Stated(program)
-    for aim in aims:
-        own = replace(program, aim=aim)
-        yield follows(own, stated.answer(own, True, ROUGH).multipliers)
-
-
 class Stated:
     """Variables: heads, blocks of the caps, roots and their lengths, s, moments of every order and of every mode."""
 
@@ -55,6 +48,7 @@ class Stated:
         self.rows: list[Any] = []
         self.right: list[Array] = []
         self.cones: list[Any] = []
+        self._solvers: dict[tuple[bool, float], Any] = {}
         blocks = [_entries(size) for cap in program.caps for size in cap.blocks]
         heads = len(program.prices)
         self.blocks = np.cumsum([heads, *blocks])
@@ -108,10 +102,10 @@ class Stated:
     def _priced(self, shapes: Shapes, parts: Sequence[Array]) -> Priced:
         """From the multipliers of these rows."""
         matrices = [
-            _matrix(part, tensor.shape[1])
+            matrix_of(part, tensor.shape[1])
             for part, tensor in zip(parts[4 : 4 + len(shapes.matrices)], shapes.matrices, strict=True)
         ]
-        both = [_matrix(part, 6) for part in parts[4 + len(shapes.matrices) :]]
+        both = [matrix_of(part, 6) for part in parts[4 + len(shapes.matrices) :]]
         return Priced(matrices, parts[3], -parts[2], parts[1], [*zip(both[::2], both[1::2], strict=True)])
 
     def _add(self, block: Array, columns: Indices, right: Array, cone: Any) -> None:
@@ -266,18 +260,23 @@ class Stated:
             cost[self._moment(order)] = -ASIDE * _diagonal(size)
         return cost
 
+    def least(self, aim: Array) -> tuple[float, Array]:
+        """Of an aim under the same conditions, as multipliers prove it, and s and w where the solver has it."""
+        own = replace(self.program, aim=aim)
+        found = self.answer(own, True, ROUGH)
+        return follows(own, found.multipliers), np.concatenate(
+            [found.middle, *(each[0, 0, 1:] for each in found.shapes)]
+        )
+
     def answer(self, program: Program, scaled: bool, enough: float = 1e-5) -> Proposed:
         """As multipliers and moments of a program with the same conditions."""
-        from scipy.sparse import csc_array, vstack
-
-        first, settings = self.first, {**_SETTINGS, "equilibrate_enable": scaled, "tol_gap_rel": enough}
-        cost = self._cost(program)
-        found = answered(cost, csc_array(vstack(self.rows)), np.concatenate(self.right), self.cones, settings)
+        first, cost = self.first, self._cost(program)
+        found = self._solved(cost, scaled, enough)
         z, x = np.nan_to_num(np.array(found.z)), np.nan_to_num(np.array(found.x))
         parts = np.split(z, np.cumsum([len(right) for right in self.right])[:-1])
         links = len(program.sizes) - 1 if program.columns else 0
         corner = 1 + program.columns
-        linked = [_matrix(np.append(0.0, part), corner) for part in parts[1 : 1 + links]]
+        linked = [matrix_of(np.append(0.0, part), corner) for part in parts[1 : 1 + links]]
         after = parts[3 + links :]
         sets, after = after[: len(program.sets)], after[len(program.sets) :]
         budgets, after = after[: len(program.budgets)], after[len(program.budgets) :]
@@ -292,22 +291,35 @@ class Stated:
         along = [after[start : start + count] for start, count in zip(starts, counts, strict=False)]
         after = after[: starts[0]]
         last = after[len(after) - len(program.caps) - len(program.held) :]
-        caps = [_matrix(part, cap.size) for part, cap in zip(last, program.caps, strict=False)]
+        caps = [matrix_of(part, cap.size) for part, cap in zip(last, program.caps, strict=False)]
         rest = last[len(program.caps) :]
-        held = [_matrix(part, limit.size) for part, limit in zip(rest, program.held, strict=True)]
+        held = [matrix_of(part, limit.size) for part, limit in zip(rest, program.held, strict=True)]
         lines = _numbers([parts[0] for parts in along])
         lengths = [_lengths(root, parts[2:]) for root, parts in zip(program.roots, along, strict=True)]
         multipliers = Multipliers(
             caps, held, _numbers(budgets), _numbers(sets), linked, lines, lengths, goal, shaped[::-1]
         )
-        moments = [_matrix(x[self._moment(k)], size) for k, size in enumerate(program.sizes)]
+        moments = [matrix_of(x[self._moment(k)], size) for k, size in enumerate(program.sizes)]
         middle = np.clip(x[first : first + program.numbers], -1.0, 1.0)
         return Proposed(multipliers, middle, moments, float(cost @ x), [self._found(x, k) for k in range(len(shaped))])
+
+    def _solved(self, cost: Array, scaled: bool, enough: float) -> Any:
+        """By one solver for all that is minimised under the same conditions."""
+        from scipy.sparse import csc_array, vstack
+
+        solver = self._solvers.get((scaled, enough))
+        if solver is None:
+            settings = {**_SETTINGS, "equilibrate_enable": scaled, "tol_gap_rel": enough}
+            rows, right = csc_array(vstack(self.rows)), np.concatenate(self.right)
+            solver = self._solvers[scaled, enough] = solver_of(cost, rows, right, self.cones, settings)
+        else:
+            solver.update(q=cost)
+        return solver.solve()
 
     def _found(self, x: Array, number: int) -> Array:
         """Z, Z_1 ... of a mode."""
         own = x[self.shapes[number] : self.shapes[number + 1]].reshape(1 + self.program.numbers, -1)
-        return np.array([_matrix(each, 6) for each in own])
+        return np.array([matrix_of(each, 6) for each in own])
 
 
 def _lengths(root: Root, parts: Sequence[Array]) -> list[Array]:
@@ -332,11 +344,3 @@ def _diagonal(size: int) -> Array:
     """One where an entry of a triangle is on the diagonal."""
     i, j, _ = triangle(size)
     return np.where(i == j, 1.0, 0.0)
-
-
-def _matrix(entries: Array, size: int) -> Array:
-    """From a triangle column by column."""
-    i, j, factor = triangle(size)
-    matrix = np.zeros((size, size))
-    matrix[i, j] = matrix[j, i] = entries / factor
-    return matrix

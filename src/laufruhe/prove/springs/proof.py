@@ -13,7 +13,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import NEARLY, Box, Divided, Halving, Parts, Waiting, divide, halves
 from laufruhe.prove.springs.open_mounts import is_lifted
-from laufruhe.prove.springs.program import aimed
+from laufruhe.prove.springs.program import Stated
 from laufruhe.prove.springs.search import SpringBoxes
 
 # shares of the value that are shown one after the other to be out of reach
@@ -24,6 +24,8 @@ MOST_RELAXED, AHEAD = 100, 3
 FIRST, FEW_RELAXED = (0.3, 0.2, 0.15), 45
 # of the largest, pulls of sides that are not narrowed; of what is to be shown, what a round of these has to bring
 LITTLE, PROGRESS = 0.1, 0.1
+# share of a side from its end in which a design of the relaxation leaves nothing to win there
+WON = 0.3
 
 
 def spring_bound(problem: Problem, value: float, room: float, near: Sequence[Value]) -> Divided:
@@ -165,14 +167,22 @@ def narrowed(boxes: SpringBoxes, lower: Array, upper: Array, pull: Array) -> tup
         (number, side, sign) for number, side in sides if pull[side] > LITTLE * pull.max()
         for sign in (1.0, -1.0) if not boxes.is_at(lower, upper, side, sign)
     ]  # fmt: skip
-    whole = np.eye(numbers + len(lower) - count)
-    found = aimed(program, (sign * whole[number] for number, _, sign in ends))
-    for solved, (_, side, sign) in enumerate(ends, 1):
-        edge = middle[side] + sign * half[side] * next(found)
+    aims, stated, solved = np.eye(numbers + len(lower) - count), Stated(program), 0
+    own, along = (np.array(each, dtype=np.intp) for each in zip(*sides, strict=True))
+    # the least and the largest of every side that designs of the relaxation have
+    ends_seen = np.array([upper, -lower])
+    for number, side, sign in ends:
+        seen = float(ends_seen[0 if sign > 0.0 else 1, side]) - sign * float((lower if sign > 0.0 else upper)[side])
+        if seen < WON * (upper[side] - lower[side]):
+            continue
+        share, stands = stated.least(sign * aims[number])
+        solved += 1
+        edge, at = middle[side] + sign * half[side] * share, middle[along] + half[along] * stands[own]
+        ends_seen[:, along] = np.minimum(ends_seen[:, along], [at, -at])
         if sign > 0.0:
             least[side] = max(least[side], edge)
         else:
             most[side] = min(most[side], edge)
         if least[side] > most[side]:
             return None, solved
-    return (least, most), len(ends)
+    return (least, most), solved
