@@ -49,7 +49,6 @@ def test_trade_measures_every_fidelity(tmp_path: Path) -> None:
     assert {p.name for p in out.iterdir()} == {".laufruhe.json", "scene.html", "scene.md", "scene.png"}
     (data,) = json.loads((tmp_path / "trade.json").read_text(encoding="utf-8"))
     assert len(data["rows"]) >= 10
-    assert data["rigid_part"]["error"] < 2e-15
     for row in data["rows"]:
         assert row["error"] <= row["estimate"], row["name"]
         assert row["regret"] >= -1e-7, row["name"]

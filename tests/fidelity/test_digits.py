@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import pytest
 
+import rigid_digits
 from fidelity.scenes import random_problem
 from laufruhe.files.reader import load
 from laufruhe.problem.problem import Problem
-from laufruhe.studies import rigid_digits
-from laufruhe.studies.rigid_digits import rigid_part
 from problem_files import PROBLEMS
+from rigid_digits import rigid_part
 
 
 @pytest.mark.parametrize("seed", range(24))

@@ -27,7 +27,6 @@ HEAVY = {
     "distributed",
     "jinja2",
     "matplotlib",
-    "mpmath",
     "netCDF4",
     "pandas",
     "pint",

@@ -39,13 +39,12 @@ INDEX = (
 
 def trade_document(found: Trade, picture: str | None, command: str) -> Document:
     """Table, picture if there is one, by its name, and the choice for one problem."""
-    problem, part = found.problem, found.rigid_part
+    problem = found.problem
     optimum = "" if math.isnan(found.optimum) else f", of its optimum {found.optimum:.6g}"
     blocks: list[Block] = [
         Paragraph(
             f"Reference: {REFERENCE_NAME} over the cycle; objective of the design as given {found.value:.6g}{optimum} "
-            f"(SI). Double precision against 50 digits, from the kinematics of every cylinder to the vectors of the "
-            f"{' and '.join(part.covered)}: relative error {max(part.error, 1e-17):.0e}."
+            "(SI)."
         ),
         Paragraph(f"**Take** {advice(found)}", marked=True),
         Illustration(picture, "Time against error of every fidelity; colour is regret", is_captioned=False)
@@ -109,7 +108,6 @@ def as_json(found: Trade) -> str:
     return strict({
         "problem": found.problem.name,
         "reference": {"objective": found.value, "optimum": found.optimum},
-        "rigid_part": asdict(found.rigid_part),
         "uneven_speed": found.flywheel and dict(zip(("crank_inertia", "change"), found.flywheel, strict=True)),
         "time_domain": found.time_domain and asdict(found.time_domain),
         "rows": [asdict(row) for row in found.rows],

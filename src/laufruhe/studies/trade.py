@@ -31,7 +31,6 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.result import Status
-from laufruhe.studies.rigid_digits import RigidPart, rigid_part
 
 REFERENCE_STEPS = 1440
 """Steps over the period at which the optimum beside which a regret is counted is solved."""
@@ -94,8 +93,6 @@ class Trade:
     ----------
     value, optimum
         Reference objective of the design as given, and of the reference optimum [SI]; NaN where nothing is open.
-    rigid_part
-        Disagreement of the rigid reference with 50 digits.
     flywheel
         Crank inertia at which the constant speed was priced [kg m2], and the relative
         change of the objective that the uneven speed makes; None where no load is asked.
@@ -109,7 +106,6 @@ class Trade:
     rows: tuple[Row, ...]
     value: float
     optimum: float
-    rigid_part: RigidPart
     flywheel: tuple[float, float] | None
     time_domain: TimeDomain | None
     whole: bool = True
@@ -149,7 +145,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     say("uneven crank speed")
     even_only = any(measure.is_inside for measure in problem.measures)
     flywheel = _price_of_constant_speed(problem) if problem.load_terms and not even_only else None
-    return Trade(problem, tuple(rows), truth, least, rigid_part(problem), flywheel, _price_of_time(problem), whole)
+    return Trade(problem, tuple(rows), truth, least, flywheel, _price_of_time(problem), whole)
 
 
 def is_open(problem: Problem) -> bool:
