@@ -84,9 +84,14 @@ class SolverError(LaufruheError, RuntimeError):
     """A solver stopped without an answer that can be used."""
 
 
+def refused(where: str, value: str, rule: str, remedy: str, source: object = "laufruhe") -> InputError:
+    """One line of complaint, led by the file it stands in."""
+    return InputError(str(source), (Complaint(where, value, rule, remedy),))
+
+
 def wrong_call(where: str, given: object, rule: str, remedy: str) -> InputError:
     """What a call in Python is refused with: an argument, as it was given, the rule and the remedy."""
-    return InputError("laufruhe", (Complaint(where, printed(repr(given), 60), rule, remedy),))
+    return refused(where, printed(repr(given), 60), rule, remedy)
 
 
 def check_whole(where: str, given: object, least: int, most: float = math.inf) -> None:

@@ -10,10 +10,10 @@ from pathlib import Path
 import typer
 
 from laufruhe.cli.questions import asked, described
-from laufruhe.errors import Complaint, InputError
+from laufruhe.errors import refused
 from laufruhe.files import drafts, ready
 from laufruhe.files.catalogue import CatalogueEngine, engine_named, engines
-from laufruhe.files.complaints import Refused, nearest
+from laufruhe.files.complaints import in_file, nearest
 from laufruhe.files.toml_text import toml_value
 from laufruhe.report import files
 
@@ -47,9 +47,9 @@ def _asked_for(file: Path) -> str | None:
     """What to begin from, as the user types it; None for an engine of their own."""
     if not _someone_answers():
         rule, remedy = "asks questions, and nobody is there to answer", "add --from with an engine or a ready problem"
-        raise _refused("init", "", rule, remedy)
+        raise refused("init", "", rule, remedy)
     if file.exists():
-        raise _refused("file", str(file), *_TAKEN)
+        raise refused("file", str(file), *_TAKEN)
     typer.echo("An engine of the catalogue (laufruhe engines), a ready problem (laufruhe examples),")
     source: str | None = asked("or nothing, to describe your own", "", lambda text: _known(text) if text else None)
     return source
@@ -59,12 +59,8 @@ def _known(source: str) -> str:
     """What --from names; `InputError` where there is none of that name."""
     if source not in engines() and source.removesuffix(".toml") not in ready.ready():
         advice = nearest(source, [*engines(), *ready.ready()], "laufruhe engines and laufruhe examples list them")
-        raise _refused("--from", source, "is no engine and no ready problem", advice)
+        raise refused("--from", source, "is no engine and no ready problem", advice)
     return source
-
-
-def _refused(where: str, value: str, rule: str, remedy: str) -> InputError:
-    return InputError("laufruhe", (Complaint(where, value, rule, remedy),))
 
 
 def copied(names: Sequence[str], folder: Path) -> str:
@@ -80,7 +76,7 @@ def _write(texts: Mapping[Path, str]) -> None:
     for path, text in texts.items():
         kept = path.name in ready.SCHEMAS
         if path.exists() and not kept and path.read_bytes() != text.encode():
-            raise _refused("file", str(path), *_TAKEN)
+            raise refused("file", str(path), *_TAKEN)
     for path, text in texts.items():
         files.write(path, text)
 
@@ -108,14 +104,8 @@ def _line(one: CatalogueEngine) -> str:
 
 def shown(names: Sequence[str]) -> str:
     """What the catalogue says of some engines."""
-    return "\n".join(_described_one(_named(name)) for name in names)
-
-
-def _named(name: str) -> CatalogueEngine:
-    try:
-        return engine_named(name, "engine")
-    except Refused as refused:
-        raise InputError("laufruhe", (refused.complaint,)) from None
+    with in_file("laufruhe"):
+        return "\n".join(_described_one(engine_named(name, "engine")) for name in names)
 
 
 def _described_one(found: CatalogueEngine) -> str:

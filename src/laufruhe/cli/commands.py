@@ -31,7 +31,7 @@ from laufruhe.cli.screen import (
     spoken,
 )
 from laufruhe.cli.supervised import supervised
-from laufruhe.errors import Complaint, InputError
+from laufruhe.errors import refused
 
 
 class _Commands(TyperGroup):
@@ -47,7 +47,7 @@ class _Commands(TyperGroup):
                 command = next((word for word in args if word in takers), takers[0])
                 remedy = f"write it there, as in: laufruhe {command} ... {option}"
                 with exit_statuses(Path("laufruhe")):
-                    raise InputError("laufruhe", (Complaint(option, "", "stands behind the command", remedy),))
+                    raise refused(option, "", "stands behind the command", remedy)
         return super().parse_args(ctx, args)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.errors import Complaint, InputError
+from laufruhe.errors import refused
 from laufruhe.fidelity.automatic import Choice, choose
 from laufruhe.fidelity.mount_needs import needs
 from laufruhe.files.reader import load, load_tables, tables_of
@@ -68,7 +68,7 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
         if problem.flywheel_decisions:
             # a cheap model makes one that breaks its limits, and what that costs no error of the objective tells
             rule = "is open, and no cheap model is traded for a flywheel that keeps its limits"
-            raise InputError(str(path), (Complaint("flywheel", "", rule, "fix it"),))
+            raise refused("flywheel", "", rule, "fix it", path)
     found: dict[int, Trade] = {}
     for k, one in _measured(paths, problems, say):
         problem, path, found[k] = problems[k], paths[k], one
@@ -122,5 +122,5 @@ def _with_objective(path: Path) -> Problem:
     problem = load(path)
     if not problem.objective:
         rule, remedy = "is missing: accuracy is that of an objective", "add [objective] or mounts"
-        raise InputError(str(path), (Complaint("objective", "", rule, remedy),))
+        raise refused("objective", "", rule, remedy, path)
     return problem

@@ -9,7 +9,7 @@ from pathlib import Path
 import typer
 
 from laufruhe.cli.screen import above_zero
-from laufruhe.errors import Complaint, InputError, check_whole
+from laufruhe.errors import check_whole, refused
 from laufruhe.server.serving import Page
 
 LARGEST_PORT = 65535
@@ -30,7 +30,7 @@ def served(wanted: Wanted) -> None:
     """Serve, say where, and open a browser there."""
     if str(wanted.problem) == "-":
         rule, remedy = "is standard input, and a page watches its file", "save it, and name the file"
-        raise InputError("laufruhe", (Complaint("PROBLEM", "-", rule, remedy),))
+        raise refused("PROBLEM", "-", rule, remedy)
     if wanted.port is not None:
         check_whole("--port", wanted.port, 1, LARGEST_PORT)
     seconds = above_zero("--time-limit", wanted.time_limit, "60")

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 
 import typer
 
-from laufruhe.errors import Complaint, InputError
+from laufruhe.errors import InputError, refused
 from laufruhe.files.catalogue import engines
 from laufruhe.files.catalogue import shown as written
 from laufruhe.files.complaints import nearest
@@ -120,8 +120,7 @@ def _is_asked(key: str, answers: Answers) -> bool:
 def _tried(question: _Question, before: Answers, text: str) -> Any:
     """An answer as a file has it; `InputError` where no engine has it beside those before."""
     if question.among and text not in question.among:
-        complaint = Complaint(question.key, text, "is none of these", nearest(text, question.among))
-        raise InputError("laufruhe", (complaint,))
+        raise refused(question.key, text, "is none of these", nearest(text, question.among))
     between = _SEPARATORS.get(question.key)
     value = _value(text) if between is None else [_value(part) for part in re.split(between, text) if part]
     _try({**before, question.key: value})

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import typer
 
-from laufruhe.errors import Complaint, InputError, ModelError, SolverError, printed
+from laufruhe.errors import Complaint, InputError, ModelError, SolverError, printed, refused
 from laufruhe.numerics.progress import Step
 
 QUIET, PLAIN, VERBOSE = -1, 0, 1
@@ -48,15 +48,14 @@ def json_file(json: str | None, problems: Iterable[Path], places: ExitStack) -> 
         return None
     path = Path(json)
     if path.resolve() in [problem.resolve() for problem in problems]:
-        raise InputError("laufruhe", (Complaint("--json", str(path), "is the problem file", "name another file"),))
+        raise refused("--json", str(path), "is the problem file", "name another file")
     return places.enter_context(files.staged_file(path, "--json"))
 
 
 def above_zero(option: str, value: float, example: str) -> float:
     """Refuse a value that is no number above zero."""
     if not (math.isfinite(value) and value > 0.0):
-        complaint = Complaint(option, f"{value:g}", "must be a number above zero", f"try {example}")
-        raise InputError("laufruhe", (complaint,))
+        raise refused(option, f"{value:g}", "must be a number above zero", f"try {example}")
     return value
 
 
@@ -120,7 +119,7 @@ def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was writt
 def spoken(quiet: bool, verbose: bool) -> Iterator[None]:
     """What is typed as -q and -v, before a command or behind it: nothing but errors is said within, or every step."""
     if quiet and verbose:
-        raise InputError("laufruhe", (Complaint("-q", "", "is given beside -v", "give one of them"),))
+        raise refused("-q", "", "is given beside -v", "give one of them")
     before = _loudness.set(QUIET if quiet else VERBOSE if verbose else _loudness.get())
     try:
         yield

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from laufruhe.cli.drawing import Ask
 from laufruhe.cli.screen import pace
-from laufruhe.errors import Complaint, InputError, printed
+from laufruhe.errors import printed, refused
 from laufruhe.files.reader import shown_as
 from laufruhe.numerics.cores import processors
 from laufruhe.report import files
@@ -26,8 +26,7 @@ def studied(
 ) -> tuple[str, Callable[[], str]]:
     """Files of a study in their folder; what to say of them, and what makes JSON of all parts."""
     if jobs is not None and jobs < 1:
-        complaint = Complaint("--jobs", str(jobs), "must be one or more", "leave it out to use every core")
-        raise InputError("laufruhe", (complaint,))
+        raise refused("--jobs", str(jobs), "must be one or more", "leave it out to use every core")
     started = time.perf_counter()
     study = load_study(path)
     folder = out if out is not None else Path("results") / shown_as(path).stem

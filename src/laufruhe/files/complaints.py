@@ -13,7 +13,7 @@ from typing import Any, TypeAlias, get_args
 from pydantic import BaseModel, ValidationError
 
 from laufruhe import units
-from laufruhe.errors import Complaint, LaufruheError, ModelError, printed
+from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, printed
 
 Loc: TypeAlias = tuple[str | int, ...]
 MOST_COMPLAINTS = 20
@@ -171,6 +171,15 @@ class Refused(LaufruheError):
     def __init__(self, where: str, value: Any, rule: str, remedy: str) -> None:
         self.complaint = Complaint(where, "" if value is None else short(value), rule, remedy)
         super().__init__(str(self.complaint))
+
+
+@contextmanager
+def in_file(source: object) -> Iterator[None]:
+    """What is refused within is led by the name of the file it stands in."""
+    try:
+        yield
+    except Refused as refused:
+        raise InputError(str(source), (refused.complaint,)) from None
 
 
 def measured(text: str, unit: str, where: str, given: str | None = None) -> float:

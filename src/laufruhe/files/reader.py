@@ -16,13 +16,13 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from laufruhe.errors import Complaint, InputError, ModelError, wrong_call
+from laufruhe.errors import Complaint, InputError, ModelError, refused, wrong_call
 from laufruhe.files import edits
 from laufruhe.files.asked import limits_of, objectives_of
 from laufruhe.files.assembly import assembly_of
 from laufruhe.files.bearings import MainBearingTable, bearings_of, one_by_one
 from laufruhe.files.catalogue import with_catalogue
-from laufruhe.files.complaints import Refused, beside, complaints_of, key_path
+from laufruhe.files.complaints import Refused, beside, complaints_of, in_file, key_path
 from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
 from laufruhe.files.fidelity import at_fidelity
 from laufruhe.files.flywheel import check_told_alike, flywheel_of
@@ -90,24 +90,19 @@ def given(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Path]
 def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
     """A problem from the tables of its file, changed or not; complaints name the file (`InputError`)."""
     if "study" in tables:
-        raise InputError(str(path), (Complaint("study", "", "makes this a study file", "use laufruhe study"),))
+        raise refused("study", "", "makes this a study file", "use laufruhe study", path)
     try:
-        plain, written = parted(tables)
-    except Refused as refused:
-        raise InputError(str(path), (refused.complaint,)) from None
-    try:
-        file = ProblemFile.model_validate(plain)
+        with in_file(path):
+            plain, written = parted(tables)
+            file = ProblemFile.model_validate(plain)
+            problem = _of_file(file, path)
+            each = tolerances_of(written, file.tolerances, problem, plain)
+            over = over_of(file.robust, each)
+            if each:
+                problem = problem.changed(tolerances=Tolerances(each, _Rebuilt(plain, path)), over=over)
+            return replace(problem, origin=_Origin(tables, path))
     except ValidationError as error:
         raise InputError(str(path), complaints_of(error, ProblemFile)) from None
-    try:
-        problem = _of_file(file, path)
-        each = tolerances_of(written, file.tolerances, problem, plain)
-        over = over_of(file.robust, each)
-        if each:
-            problem = problem.changed(tolerances=Tolerances(each, _Rebuilt(plain, path)), over=over)
-        return replace(problem, origin=_Origin(tables, path))
-    except Refused as refused:
-        raise InputError(str(path), (refused.complaint,)) from None
     except ModelError as error:
         raise InputError(str(path), (Complaint.of(error, "engine"),)) from None
 
@@ -156,11 +151,9 @@ class _Origin:
 
     def _edited(self, *each: Callable[[Mapping[str, Any]], dict[str, Any]]) -> Problem:
         tables: Mapping[str, Any] = self.tables
-        try:
+        with in_file(self.path):
             for edit in each:
                 tables = edit(tables)
-        except Refused as refused:
-            raise InputError(str(self.path), (refused.complaint,)) from None
         return load_tables(tables, self.path)
 
 
@@ -193,10 +186,8 @@ def tables_of(path: Path) -> dict[str, Any]:
 def _whole(tables: dict[str, Any], path: Path) -> dict[str, Any]:
     """Tables as a user gave them, looked through, an engine of the catalogue written out."""
     _check_shape(tables, path)
-    try:
+    with in_file(path):
         return with_catalogue(tables)
-    except Refused as refused:
-        raise InputError(str(path), (refused.complaint,)) from None
 
 
 def _check_shape(tables: dict[str, Any], path: Path) -> None:
@@ -205,15 +196,16 @@ def _check_shape(tables: dict[str, Any], path: Path) -> None:
     while left:
         at, node = left.popleft()
         if len(at) > DEEPEST:
-            raise _refused(path, key_path(at), f"is nested more than {DEEPEST} deep", "flatten it")
+            raise refused(key_path(at), "", f"is nested more than {DEEPEST} deep", "flatten it", path)
         strange = _UNSEEN.search("".join(text for text in (*at[-1:], node) if isinstance(text, str)))
         if strange is not None:
             rule = f"holds U+{ord(strange.group()):04X}, which is no character to read"
-            raise _refused(path, key_path(at), rule, "take it out; a path has / in place of \\")
+            raise refused(key_path(at), "", rule, "take it out; a path has / in place of \\", path)
         if isinstance(node, dict | list) and len(node) > MOST_ENTRIES:
-            raise _refused(path, key_path(at) or "file", f"has {len(node)} entries", f"at most {MOST_ENTRIES} are read")
+            most = f"at most {MOST_ENTRIES} are read"
+            raise refused(key_path(at) or "file", "", f"has {len(node)} entries", most, path)
         if isinstance(node, int) and not -LARGEST <= node <= LARGEST:
-            raise _refused(path, key_path(at), "is a whole number of more than 64 bits", "write a smaller one")
+            raise refused(key_path(at), "", "is a whole number of more than 64 bits", "write a smaller one", path)
         pairs = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
         left.extend(((*at, key), entry) for key, entry in pairs)
 
@@ -258,11 +250,7 @@ def is_study(path: Path) -> bool:
 
 
 def _unreadable(path: Path, rule: str, remedy: str) -> InputError:
-    return _refused(path, "file", rule, remedy)
-
-
-def _refused(path: Path, where: str, rule: str, remedy: str) -> InputError:
-    return InputError(str(path), (Complaint(where, "", rule, remedy),))
+    return refused("file", "", rule, remedy, path)
 
 
 def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False, *, path: Path) -> Problem:

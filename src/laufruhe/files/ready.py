@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from laufruhe.errors import Complaint, InputError
+from laufruhe.errors import refused
 from laufruhe.files.complaints import nearest
 from laufruhe.files.problem_file import SCHEMA
 
@@ -63,7 +63,7 @@ def ready_named(name: str) -> Ready:
     found = ready().get(name.removesuffix(".toml"))
     if found is None:
         advice = nearest(name, list(ready()), "laufruhe examples lists them")
-        raise InputError("laufruhe", (Complaint("name", name, "is no ready problem", advice),))
+        raise refused("name", name, "is no ready problem", advice)
     return found
 
 

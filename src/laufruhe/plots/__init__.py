@@ -15,7 +15,7 @@ with chdir(Path(__file__).parent):
 
 from matplotlib.figure import Figure
 
-from laufruhe.errors import Complaint, InputError
+from laufruhe.errors import refused
 from laufruhe.numerics.processes import in_twins
 from laufruhe.plots.style import as_svg, save
 from laufruhe.present.pictures import PICTURES
@@ -38,7 +38,7 @@ def figure(result: Result, name: str) -> Figure:
     picture = import_module(f"{__name__}.results.{name}") if name in PICTURES else None
     if picture is None or not picture.applies(result):
         known = ", ".join(names(result))
-        raise InputError("figure", (Complaint("name", f'"{name}"', "is no picture of this result", f"one of {known}"),))
+        raise refused("name", f'"{name}"', "is no picture of this result", f"one of {known}", "figure")
     drawn: Figure = picture.figure(result)
     return drawn
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from laufruhe.errors import Complaint, InputError
+from laufruhe.errors import InputError, refused
 from laufruhe.present.pictures import CURVES, PICTURES, PRINTED_SHEETS, SHEETS
 
 try:
@@ -97,8 +97,7 @@ class Set:
 
     def refused(self, rule: str) -> InputError:
         """One line about the folder."""
-        complaint = Complaint(self.option, str(self.folder), rule, "name another place")
-        return InputError("laufruhe", (complaint,))
+        return refused(self.option, str(self.folder), rule, "name another place")
 
 
 @contextmanager
@@ -159,9 +158,9 @@ def staged_file(path: Path, option: str) -> Iterator[Path]:
         yield path
         return
     if path.is_dir():
-        raise InputError("laufruhe", (Complaint(option, str(path), "is a folder", "name a file in it"),))
+        raise refused(option, str(path), "is a folder", "name a file in it")
     if path.is_file() and not os.access(path, os.W_OK):
-        raise InputError("laufruhe", (Complaint(option, str(path), "cannot be written", "check its permissions"),))
+        raise refused(option, str(path), "cannot be written", "check its permissions")
     if path.is_file() and not _is_data(path):
         raise place.refused("is a file that Laufruhe did not make")
     with ExitStack() as until_then:

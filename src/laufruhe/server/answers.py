@@ -13,9 +13,9 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, SolverError
+from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, SolverError, refused
 from laufruhe.files import edits
-from laufruhe.files.complaints import Refused
+from laufruhe.files.complaints import in_file
 from laufruhe.files.reader import load_tables
 from laufruhe.files.toml_text import toml_text
 from laufruhe.live import decided
@@ -61,11 +61,9 @@ def _offered(text: str, path: Path) -> tuple[str, ...]:
 
 def _asked_about(source: Source, asked: Asked, with_held: bool) -> tuple[dict[str, Any], Problem]:
     """Tables and problem of a request, through the same reading as files (`InputError`)."""
-    try:
+    with in_file(source.path.name):
         asked.check(_offered(json.dumps(source.tables, default=str), source.path))
         tables = asked.tables(source.tables, with_held)
-    except Refused as refused:
-        raise InputError(source.path.name, (refused.complaint,)) from None
     return tables, load_tables(tables, Path(source.path))
 
 
@@ -245,7 +243,7 @@ def _front(source: Source, asked: Asked, across: str) -> Front:
     if _fronts.get("key") != key:
         own = partners(problem)
         if across not in own:
-            raise InputError(source.path.name, (Complaint("front", across, "is no measure of this problem"),))
+            raise refused("front", across, "is no measure of this problem", "", source.path.name)
         _fronts.clear()
         _fronts.update(key=key, front=Front(problem, own[across]))
     found = _fronts["front"]
@@ -279,14 +277,12 @@ def save(source: Source, asked: Asked) -> str:
     def found() -> dict[str, Any]:
         tables, problem = _asked_about(source, asked, with_held=True)
         units = {e.name: e.unit for d in problem.decisions for e in decision_values(d, d.start)}
-        try:
+        with in_file(source.path.name):
             for name, value in asked.design.items():
                 if name in units:
                     unit, factor = typed(units[name])
                     text = f"{factor * value!r} {unit}".rstrip()
                     tables = edits.with_value(tables, name, text if unit else factor * value)
-        except Refused as refused:
-            raise InputError(source.path.name, (refused.complaint,)) from None
         load_tables(tables, source.path)
         return {"toml": toml_text(tables), "file": f"{source.path.stem}-page.toml"}
 

@@ -14,7 +14,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, ParamSpec
 
-from laufruhe.errors import Complaint, InputError, SolverError, printed
+from laufruhe.errors import Complaint, SolverError, printed, refused
 from laufruhe.files.complaints import Refused
 from laufruhe.live import page_assets
 from laufruhe.present.pictures import PICTURES
@@ -188,4 +188,4 @@ def _listening(port: int | None, texts: dict[str, str]) -> Server:
         if port is None:
             return Server(0, texts)
         rule = "is in use" if error.errno == errno.EADDRINUSE else "is for the system's own services"
-        raise InputError("laufruhe", (Complaint("--port", str(port), rule, "name another, or leave it out"),)) from None
+        raise refused("--port", str(port), rule, "name another, or leave it out") from None

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from laufruhe.errors import Complaint, InputError
+from laufruhe.errors import InputError, refused
 from laufruhe.files.complaints import key_path
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.server.answers import Source
@@ -90,7 +90,7 @@ def _check_inside(tables: Mapping[str, Any], path: Path) -> None:
     for where, name in _files_in(tables, ()):
         if not (folder / name).resolve().is_relative_to(folder):
             rule, remedy = "is outside the folder of the problem, and a page reads nothing there", "copy it beside it"
-            raise InputError(str(path), (Complaint(key_path(where), f'"{name}"', rule, remedy),))
+            raise refused(key_path(where), f'"{name}"', rule, remedy, path)
 
 
 def _files_in(node: Any, at: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], str]]:

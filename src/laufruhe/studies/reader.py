@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, Union
 
 from pydantic import Field, ValidationError, model_validator
 
-from laufruhe.errors import Complaint, InputError
+from laufruhe.errors import Complaint, InputError, refused
 from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.fields import Table
 from laufruhe.files.hover import HOVER
@@ -71,7 +71,7 @@ def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
     """
     tables, path = given(source)
     if "study" not in tables:
-        raise _refused(path, "study", "", "is missing, so this is no study file", "use laufruhe solve for a problem")
+        raise refused("study", "", "is missing, so this is no study file", "use laufruhe solve for a problem", path)
     try:
         file = StudyFile.model_validate(tables)
     except ValidationError as error:
@@ -81,17 +81,18 @@ def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
     for k, part in enumerate(file.study.parts):
         where = f"study.parts[{k + 1}]"
         if max(names.count(own.name) for own in part.each_reading()) > 1:
-            raise _refused(path, f"{where}.name", part.name, "is given twice", "give each part its own name")
+            raise refused(f"{where}.name", part.name, "is given twice", "give each part its own name", path)
         cases = [case.name for case in part.cases]
         if len(set(cases)) < len(cases):
-            raise _refused(path, f"{where}.cases", "", "has two cases of one name", "give each its own")
+            raise refused(f"{where}.cases", "", "has two cases of one name", "give each its own", path)
         _check_quantities(part, path, where)
         if part.size() > MOST_POINTS:
-            raise _refused(path, where, "", f"makes {part.size()} points; a study takes {MOST_POINTS}", "ask for fewer")
+            rule = f"makes {part.size()} points; a study takes {MOST_POINTS}"
+            raise refused(where, "", rule, "ask for fewer", path)
     whole = sum(part.size() for part in parts)
     if whole > MOST_POINTS:
         rule = f"make {whole} points; a study takes {MOST_POINTS}"
-        raise _refused(path, "study.parts", "", rule, "make two studies of them")
+        raise refused("study.parts", "", rule, "make two studies of them", path)
     return file.model_copy(update={"study": file.study.model_copy(update={"parts": parts})})
 
 
@@ -99,14 +100,9 @@ def _check_quantities(part: Part, path: Path, where: str) -> None:
     for key, read in part.swept_or_drawn():
         try:
             read()
-        except Refused as refused:
-            found = refused.complaint
-            at = f"{where}.{key}.{found.where}"
-            raise _refused(path, at, found.value, found.rule, found.remedy) from None
-
-
-def _refused(path: Path, where: str, value: str, rule: str, remedy: str) -> InputError:
-    return InputError(str(path), (Complaint(where, value, rule, remedy),))
+        except Refused as error:
+            found = error.complaint
+            raise InputError(str(path), (replace(found, where=f"{where}.{key}.{found.where}"),)) from None
 
 
 def study_schema() -> str:

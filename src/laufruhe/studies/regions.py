@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.errors import Complaint, InputError
+from laufruhe.errors import refused
 from laufruhe.studies.part import Record, Template
 
 try:
@@ -125,7 +125,7 @@ def _laid_out(root: Path, name: str, template: Template) -> tuple[Any, Any]:
 
     whole = zarr.open_group(root, mode="a", zarr_format=3)
     if whole.attrs.get("made_by") != MADE_BY and any(entry.name != "zarr.json" for entry in root.iterdir()):
-        raise _refused(root, "holds what Laufruhe did not make", "name another place by --out")
+        raise refused("results", str(root), "holds what Laufruhe did not make", "name another place by --out")
     whole.attrs["made_by"] = MADE_BY
     about = {"columns": {key: asdict(column) for key, column in template.columns.items()}, "cases": [*template.cases]}
     cases, pieces = len(template.cases), -(-template.draws // template.chunk)
@@ -162,12 +162,14 @@ def kept_to_one(root: Path) -> Iterator[None]:
     try:
         import zarr  # noqa: F401
     except ImportError:
-        raise _refused(root, "needs Zarr, which is not installed", "pip install 'laufruhe[cluster]'") from None
+        rule = "needs Zarr, which is not installed"
+        raise refused("results", str(root), rule, "pip install 'laufruhe[cluster]'") from None
     try:
         root.mkdir(parents=True, exist_ok=True)
         handle = os.open(root, os.O_RDONLY)
     except OSError as error:
-        raise _refused(root, f"cannot be written ({error.strerror})", "name another place by --out") from None
+        rule = f"cannot be written ({error.strerror})"
+        raise refused("results", str(root), rule, "name another place by --out") from None
     try:
         if fcntl is not None:
             _lock(handle, root)
@@ -180,11 +182,8 @@ def _lock(handle: int, root: Path) -> None:
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise _refused(root, "is being written by another run", "wait for it, or name another --out") from None
+        rule = "is being written by another run"
+        raise refused("results", str(root), rule, "wait for it, or name another --out") from None
     except OSError:
         # a file system without locks
         return
-
-
-def _refused(root: Path, rule: str, remedy: str) -> InputError:
-    return InputError("laufruhe", (Complaint("results", str(root), rule, remedy),))

@@ -5,14 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from laufruhe.errors import Complaint, InputError, ModelError
-from laufruhe.files.complaints import Refused, beside, nearest
+from laufruhe.errors import Complaint, InputError, ModelError, refused
+from laufruhe.files.complaints import beside, in_file, nearest
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.files.study_tables import CaseTable, changed
 from laufruhe.machine import Role
@@ -80,15 +80,13 @@ class Scenes:
         if path not in self._files:
             if not path.exists():
                 advice = beside(path, "paths begin in the folder of the study")
-                raise InputError(
-                    str(path), (Complaint("file", "", "is named by the study and does not exist", advice),)
-                )
+                raise refused("file", "", "is named by the study and does not exist", advice, path)
             self._files[path] = tables_of(path)
         return self._files[path]
 
     def refused(self, case: CaseTable, where: str, rule: str, remedy: str) -> InputError:
         """One line about the scene of a case."""
-        return InputError(str(self.folder / case.problem), (Complaint(where, "", rule, remedy),))
+        return refused(where, "", rule, remedy, self.folder / case.problem)
 
     def problem(self, point: Point) -> Problem:
         """The problem of a point, with its shafts, at the power that its case asks for; `InputError` where bad."""
@@ -107,13 +105,9 @@ class Scenes:
             rule, remedy = "is open, and decides on shafts by itself", "use laufruhe solve, or fix it"
             raise self.refused(case, "phasing", rule, remedy)
 
-    @contextmanager
-    def named(self, case: CaseTable) -> Iterator[None]:
+    def named(self, case: CaseTable) -> AbstractContextManager[None]:
         """What is refused in the scene of a case is led by the name of its problem file."""
-        try:
-            yield
-        except Refused as refused:
-            raise InputError(str(self.folder / case.problem), (refused.complaint,)) from None
+        return in_file(self.folder / case.problem)
 
     @contextmanager
     def blamed(self, point: Point, where: str = "point") -> Iterator[None]:

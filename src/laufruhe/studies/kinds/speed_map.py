@@ -11,10 +11,9 @@ import numpy as np
 import xarray as xr
 from pydantic import Field, model_validator
 
-from laufruhe.errors import InputError
 from laufruhe.files import fields as f
 from laufruhe.files.asked import QuantityName
-from laufruhe.files.complaints import Refused, measured, nearest
+from laufruhe.files.complaints import measured, nearest
 from laufruhe.files.scene import QuantityTable, Scene
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine import Engine, OperatingPoint
@@ -112,15 +111,13 @@ class SpeedMap(Part):
     def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[Measure, float]:
         """What is mapped, at whatever speed, and the part's own limits."""
         scene, asked = Scene(problem.engine, problem.points), dict.fromkeys(problem.measures, math.inf)
-        try:
+        with scenes.named(case):
             if self.measures:
                 asked = {}
             for k, table in enumerate(self.measures, 1):
                 measure = scene.measure(table.quantity, table, f"measures[{k}].quantity")
                 where = f"measures[{k}].limit"
                 asked[measure] = math.inf if table.limit is None else measured(table.limit, measure.unit, where)
-        except Refused as refused:
-            raise InputError(str(scenes.folder / case.problem), (refused.complaint,)) from None
         return {replace(m, points=None): limit for m, limit in asked.items() if set(ON_BLOCK) <= set(m.channel.keys)}
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
