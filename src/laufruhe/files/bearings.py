@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from pydantic import Field
-
 from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, nearest
@@ -27,7 +25,7 @@ class MainBearingTable(Table):
     diameter: f.OpenPositiveLength | None = f.told(
         "Diameter of the journal; needed for a pressure and for friction power."
     )
-    width: f.OpenPositiveLength | None = Field(default=None, description="Width of the journal; needed for a pressure.")
+    width: f.OpenPositiveLength | None = f.told("Width of the journal; needed for a pressure.")
     friction: f.NonNegative | None = f.told("Coefficient of friction; needed for friction power.")
 
 

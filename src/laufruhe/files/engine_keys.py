@@ -18,10 +18,10 @@ class RodTable(Table):
     """The connecting rod as a rigid body."""
 
     mass: f.PositiveMass
-    centre_of_gravity: f.Length = Field(
-        description="Distance of the centre of gravity from the crank pin, on the line of the pins."
+    centre_of_gravity: f.Length = f.needed(
+        "Distance of the centre of gravity from the crank pin, on the line of the pins."
     )
-    inertia: f.Inertia = Field(description="Moment of inertia about the centre of gravity.")
+    inertia: f.Inertia = f.needed("Moment of inertia about the centre of gravity.")
 
 
 class BigEndTable(Table):
@@ -41,7 +41,7 @@ class ShaftTable(Table):
 
     name: Name
     ratio: f.Ratio = 1.0
-    position: f.Pair[f.Length] = Field(description="Position of the axis: y to the left, z up.")
+    position: f.Pair[f.Length] = f.needed("Position of the axis: y to the left, z up.")
     lead: f.OpenAngle = f.told("Crank angle by which all that it carries comes earlier.", 0.0)
 
 

@@ -21,10 +21,10 @@ class ArmsTable(Table):
     """Oval arms between hub and rim."""
 
     count: Annotated[int, Field(ge=2, le=24)]
-    at_rim: f.Pair[f.PositiveLength] = Field(
-        description="Width of an arm across the plane of rotation, and depth in it, at the rim."
+    at_rim: f.Pair[f.PositiveLength] = f.needed(
+        "Width of an arm across the plane of rotation, and depth in it, at the rim."
     )
-    at_hub: f.Pair[f.PositiveLength] = Field(description="Width and depth of an arm at the hub.")
+    at_hub: f.Pair[f.PositiveLength] = f.needed("Width and depth of an arm at the hub.")
     hub_diameter: f.PositiveLength
 
 
@@ -32,9 +32,9 @@ class RimTable(Table):
     """A ring of a rectangular section."""
 
     mean_diameter: f.OpenPositiveLength
-    width: f.OpenPositiveLength = Field(description="Width along the shaft.")
-    height: f.OpenPositiveLength = Field(description="Height of the rim along a radius.")
-    density: f.Density = Field(default=7250.0, description="Density of the rim; by default that of cast iron.")
+    width: f.OpenPositiveLength = f.needed("Width along the shaft.")
+    height: f.OpenPositiveLength = f.needed("Height of the rim along a radius.")
+    density: f.Density = f.told("Density of the rim; by default that of cast iron.", 7250.0)
     whole: Annotated[float, f.Number("", least=1.0)] = f.told("Mass of the whole flywheel over that of its rim.", 1.0)
     arms: ArmsTable | None = None
 

@@ -78,7 +78,7 @@ class SteamTable(Table):
     makes: ClassVar = Steam
     admission: f.PositivePressure
     back_pressure: f.PositivePressure
-    cut_off: f.Part = Field(description="Part of the stroke from the dead centre at which admission ends.")
+    cut_off: f.Part = f.needed("Part of the stroke from the dead centre at which admission ends.")
     release: f.Part = f.told("Part of the stroke at which the outlet opens.", 1.0)
     compression: f.Part = f.told(
         "Part of the stroke before the dead centre at which the outlet closes on the way back.", 0.0
@@ -109,9 +109,7 @@ class ChamberTable(Table):
 
     name: f.Name | None = None
     cylinders: list[f.CylinderNumber] | None = f.told("Cylinders whose rods carry such a piston; all by default.")
-    end: Literal["head", "crank"] = Field(
-        description="head: pressure drives the piston towards the crank; crank: away from it."
-    )
+    end: Literal["head", "crank"] = f.needed("head: pressure drives the piston towards the crank; crank: away from it.")
     bore: f.PositiveLength
     rod: f.NonNegativeLength = f.told("Diameter of the piston rod where it passes through this end.", 0.0)
     steam: SteamTable | None = None

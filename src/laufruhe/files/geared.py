@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, TypeAlias
 
-from pydantic import Field
-
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused
 from laufruhe.files.fields import Name, Open, Table
@@ -22,8 +20,8 @@ class GearedInertiaTable(Table):
     """A second crank, or a flywheel on a shaft of its own."""
 
     name: Name
-    ratio: f.Ratio = Field(default=-1.0, description="Speed over crank speed; negative runs against the crank.")
-    share: OpenShare = Field(description="Share of the inertia of all that turns, reduced to the crank.")
+    ratio: f.Ratio = f.told("Speed over crank speed; negative runs against the crank.", -1.0)
+    share: OpenShare = f.needed("Share of the inertia of all that turns, reduced to the crank.")
 
 
 def geared_of(tables: Sequence[GearedInertiaTable]) -> tuple[tuple[GearedInertia, ...], list[Decision]]:

@@ -51,11 +51,9 @@ _NOT_ELASTIC = ('is for kind = "rigid" only', "give stiffness instead")
 class BlockTable(Table):
     """The rigid body that elastic mounts carry."""
 
-    mass: f.PositiveMass = Field(description="Mass of everything that the mounts carry, moving parts included.")
+    mass: f.PositiveMass = f.needed("Mass of everything that the mounts carry, moving parts included.")
     centre_of_gravity: f.Three[f.Length] = Field(default=[0.0, 0.0, 0.0])
-    inertia: f.Three[f.Inertia] = Field(
-        description="Moments of inertia about x, y and z through the centre of gravity."
-    )
+    inertia: f.Three[f.Inertia] = f.needed("Moments of inertia about x, y and z through the centre of gravity.")
     inertia_products: f.Three[f.Inertia] = f.told(
         "Products of inertia xy, xz, yz of the tensor: xy = - integral of x y dm.", [0.0, 0.0, 0.0]
     )

@@ -81,7 +81,7 @@ class BalancerShaftTable(Table):
 
     name: Name
     ratio: f.Ratio
-    position: f.Pair[f.OpenLength] = Field(description="Position of the axis: y to the left, z up.")
+    position: f.Pair[f.OpenLength] = f.needed("Position of the axis: y to the left, z up.")
     unbalances: list[UnbalanceTable] = Field(min_length=1)
     optional: bool = f.told("Whether the shaft is built is decided too.", False)
     shaft_mass: f.Mass = f.told("Mass of an optional shaft without its unbalances.", 0.0)

@@ -26,8 +26,8 @@ from laufruhe.problem.sets import Interval
 class WebsTable(Table):
     """The two webs beside every pin."""
 
-    width: f.OpenPositiveLength = Field(description="Width of a web across the shaft.")
-    thickness: f.OpenPositiveLength = Field(description="Width along the shaft.")
+    width: f.OpenPositiveLength = f.needed("Width of a web across the shaft.")
+    thickness: f.OpenPositiveLength = f.needed("Width along the shaft.")
 
 
 class ShankTable(Table):
@@ -55,7 +55,7 @@ class BoltsTable(Table):
     """The bolts of every big end."""
 
     count: Annotated[int, Field(ge=1, le=12)] = 2
-    diameter: f.OpenPositiveLength = Field(description="Diameter of a bolt at the root of the thread.")
+    diameter: f.OpenPositiveLength = f.needed("Diameter of a bolt at the root of the thread.")
 
 
 class RunningGearTable(Table):

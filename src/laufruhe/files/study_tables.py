@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field
 
 from laufruhe import units
-from laufruhe.files import fields
+from laufruhe.files import fields as f
 from laufruhe.files.asked import limit_name
 from laufruhe.files.complaints import Refused, measured, nearest
 from laufruhe.files.fields import Name, Table, refusal
@@ -41,18 +41,18 @@ End: TypeAlias = Annotated[int | float | str | None, BeforeValidator(_single)]
 class SweepTable(Table):
     """One quantity of the problem and the values that it takes: listed, or spaced between two ends."""
 
-    quantity: str = Field(description="Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
+    quantity: str = f.needed("Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
     values: list[Value] | None = None
     first: End = Field(default=None, alias="from")
     last: End = Field(default=None, alias="to")
-    points: int | None = Field(default=None, description="Number of values from the first to the last.")
+    points: int | None = f.told("Number of values from the first to the last.")
     spacing: Literal["linear", "log"] | None = None
 
 
 class DrawnTable(Table):
     """One quantity of the problem that is drawn at random, evenly between two ends."""
 
-    quantity: str = Field(description="Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
+    quantity: str = f.needed("Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
     first: int | float | str = Field(alias="from")
     last: int | float | str = Field(alias="to")
     spacing: Literal["linear", "log"] = "linear"
@@ -63,14 +63,10 @@ class CaseTable(Table):
 
     name: Name
     problem: str
-    set: dict[str, Setting] = Field(
-        default_factory=dict, description="Paths of the problem file and their new values, or lists of these."
-    )
-    without: list[str] = Field(
-        default_factory=list, description="Tables that are left out, such as balancer_shafts or gas."
-    )
-    equal_power_to: Annotated[int, Field(ge=1, le=48)] | None = Field(
-        default=None, description="The engine is rebuilt with the power of this many of its cylinders."
+    set: dict[str, Setting] = f.told("Paths of the problem file and their new values, or lists of these.", {})
+    without: list[str] = f.told("Tables that are left out, such as balancer_shafts or gas.", [])
+    equal_power_to: Annotated[int, Field(ge=1, le=48)] | None = f.told(
+        "The engine is rebuilt with the power of this many of its cylinders."
     )
 
 
@@ -158,7 +154,7 @@ def _name_of(entry: dict[str, Any]) -> object:
     return entry.get("name") or (limit_name(entry) if "limit" in entry else None)
 
 
-def field_at(where: str) -> fields.Number | None:
+def field_at(where: str) -> f.Number | None:
     """How the number at a path is read; None where text, a list or a choice stands there."""
     here: list[Any] = [ProblemFile]
     for part in parts_of(where):
@@ -173,14 +169,14 @@ def _inside(annotation: Any, part: str) -> list[Any]:
         return [] if field is None else [Annotated[field.annotation, *field.metadata, None]]
     if get_origin(annotation) is list:
         return list(get_args(annotation))
-    if isinstance(annotation, fields.OrOpen):
+    if isinstance(annotation, f.OrOpen):
         return _inside(annotation.inner, part)
     # what is annotated and its notes, or the members of a union
     return [inner for one in get_args(annotation) for inner in _inside(one, part)]
 
 
-def _numbers(annotation: Any) -> list[fields.Number]:
-    if isinstance(annotation, fields.Number):
+def _numbers(annotation: Any) -> list[f.Number]:
+    if isinstance(annotation, f.Number):
         return [annotation]
     if get_origin(annotation) is list:
         return []

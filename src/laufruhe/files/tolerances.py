@@ -59,7 +59,7 @@ class TolerancesTable(Table):
 class RobustTable(Table):
     """Design for engines as built: for the worst case within the tolerances, or for a share of them."""
 
-    over: str = Field(default="worst case", description='"worst case", or a share of engines such as "95 %".')
+    over: str = f.told('"worst case", or a share of engines such as "95 %".', "worst case")
     engines: int = Field(default=1000, ge=20, le=100_000, description="Number of engines that are drawn.")
     seed: int = Field(default=1, ge=0)
 

@@ -63,15 +63,15 @@ class DiscTable(Table):
     name: Name
     end: Literal["front", "rear"]
     inertia: f.OpenInertia
-    damping: f.TorsionalDamping = Field(default=0.0, description="Viscous damping against the block.")
-    shaft: ShaftTable = Field(description="Shaft from this disc to the next one towards the throws.")
+    damping: f.TorsionalDamping = f.told("Viscous damping against the block.", 0.0)
+    shaft: ShaftTable = f.needed("Shaft from this disc to the next one towards the throws.")
 
 
 class AbsorberTable(Table):
     """A viscous or rubber damper, or a pendulum."""
 
     name: Name
-    on: str = Field(description="Name of its disc, or throw 1, throw 2 ...")
+    on: str = f.needed("Name of its disc, or throw 1, throw 2 ...")
     inertia: f.OpenInertia
     damping: f.OpenTorsionalDamping = 0.0
     stiffness: f.OpenTorsionalStiffness | None = None
@@ -83,8 +83,8 @@ class AbsorberTable(Table):
 class TorsionTable(Table):
     """Discs and shafts of the torsional system of the crankshaft."""
 
-    throw_inertia: f.Inertias = Field(
-        description="Moment of inertia of a throw: pin, webs and counterweights, without rod and piston."
+    throw_inertia: f.Inertias = f.needed(
+        "Moment of inertia of a throw: pin, webs and counterweights, without rod and piston."
     )
     cylinder_damping: f.TorsionalDampings = f.told("Viscous damping of every throw against the block.", [0.0])
     loss_factor: f.LossFactor = f.told("Hysteretic loss factor of every shaft that has none of its own.", 0.0)

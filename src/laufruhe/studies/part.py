@@ -10,6 +10,7 @@ from typing import Annotated, Any, TypeAlias
 import xarray as xr
 from pydantic import Field
 
+from laufruhe.files import fields as f
 from laufruhe.files.fields import Name, Table
 from laufruhe.files.study_tables import CaseTable, Value
 from laufruhe.studies.picture import Picture
@@ -56,10 +57,10 @@ class Part(Table):
     title: Annotated[str, Field(min_length=1)]
     source: str = ""
     cases: list[CaseTable] = Field(min_length=1)
-    readings: dict[Name, dict[str, Value]] = Field(
-        default_factory=dict,
-        description="Where a number of the source may be misprinted: paths and values, by a name of each reading; "
+    readings: dict[Name, dict[str, Value]] = f.told(
+        "Where a number of the source may be misprinted: paths and values, by a name of each reading; "
         "in a replication, numbers and values.",
+        {},
     )
 
     def each_reading(self) -> list[Part]:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, Union
 from pydantic import Field, ValidationError, model_validator
 
 from laufruhe.errors import Complaint, InputError, refused
+from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.fields import Table
 from laufruhe.files.hover import HOVER
@@ -30,7 +31,7 @@ else:
 class StudyTable(Table):
     """What a study consists of."""
 
-    common: dict[str, Any] = Field(default_factory=dict, description="Keys of every part that does not give its own.")
+    common: dict[str, Any] = f.told("Keys of every part that does not give its own.", {})
     parts: list[AnyPart] = Field(min_length=1)
 
     @model_validator(mode="before")

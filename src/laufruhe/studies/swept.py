@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from laufruhe.errors import ModelError, SolverError
+from laufruhe.files import fields as f
 from laufruhe.files.asked import QuantityName
 from laufruhe.files.study_tables import Axis, CaseTable, SweepTable, axis_of, changed, keys_of
 from laufruhe.present.measures import limits_of, main_load, mount_orders, shaking_orders
@@ -203,9 +204,7 @@ def _table(name: str, records: Sequence[Mapping[str, Any]], columns: Sequence[st
 class SweptPart(Part):
     """Cases at every combination of the swept values."""
 
-    metric: QuantityName | None = Field(
-        default=None, description="What is compared, in place of the objective of the problem files."
-    )
+    metric: QuantityName | None = f.told("What is compared, in place of the objective of the problem files.")
     sweep: list[SweepTable] = Field(default_factory=list, max_length=2)
 
     def swept_or_drawn(self) -> list[tuple[str, Callable[[], object]]]:

@@ -66,7 +66,7 @@ class MeasureTable(QuantityTable):
     """One line of the map."""
 
     quantity: QuantityName
-    limit: str | None = Field(default=None, description="Limit that is drawn beside those of the problem.")
+    limit: str | None = f.told("Limit that is drawn beside those of the problem.")
 
 
 class SpeedMap(Part):
@@ -74,17 +74,12 @@ class SpeedMap(Part):
 
     kind: Literal["speed map"]
     speeds: SpeedsTable
-    measures: list[MeasureTable] = Field(
-        default_factory=list,
-        description="Measures of the map; by default all that the problem minimises or limits.",
+    measures: list[MeasureTable] = f.told(
+        "Measures of the map; by default all that the problem minimises or limits.", []
     )
-    operating_point: str | None = Field(
-        default=None, description="Operating point whose load is kept at every speed; the first by default."
-    )
+    operating_point: str | None = f.told("Operating point whose load is kept at every speed; the first by default.")
     designs: list[DesignName] = Field(default=["as given", "as decided"], min_length=1)
-    by_order: bool = Field(
-        default=False, description="Whether the amplitude of every order of the first measure is shown too."
-    )
+    by_order: bool = f.told("Whether the amplitude of every order of the first measure is shown too.", False)
 
     def points(self, scenes: Scenes) -> list[Point]:
         """A case each: what is decided does not hang on the speeds."""

@@ -47,26 +47,24 @@ class GridTable(Table):
 class ReplicaCase(CaseTable):
     """One case, its numbers in place of those of the part."""
 
-    problem: str = Field(description="A name under problems, or a problem file.")
-    numbers: dict[str, Any] = Field(default_factory=dict, description="Numbers in place of those of the part.")
-    sweep: dict[str, GridTable] = Field(default_factory=dict, description="Numbers that take several values.")
+    problem: str = f.needed("A name under problems, or a problem file.")
+    numbers: dict[str, Any] = f.told("Numbers in place of those of the part.", {})
+    sweep: dict[str, GridTable] = f.told("Numbers that take several values.", {})
 
 
 class StatementTable(Table):
     """What the source says, and how the same is found here."""
 
     text: Annotated[str, Field(min_length=1)]
-    where: str = Field(default="", description="Figure, page or equation.")
-    printed: str | None = Field(
-        default=None, description="Words or number of the source; without it the statement is not counted."
-    )
+    where: str = f.told("Figure, page or equation.", "")
+    printed: str | None = f.told("Words or number of the source; without it the statement is not counted.")
     value: str
     unit: str = ""
     expected: Expression | None = Field(default=None, alias="is", description="Printed number in that unit.")
-    within: int | float | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")] | None = Field(
-        default=None, description='Allowed: a number in that unit, or "15 %".'
+    within: int | float | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")] | None = f.told(
+        'Allowed: a number in that unit, or "15 %".'
     )
-    holds: str | None = Field(default=None, description="Condition, with the name value, in place of is and within.")
+    holds: str | None = f.told("Condition, with the name value, in place of is and within.")
     why: str = ""
 
     @model_validator(mode="after")
@@ -83,25 +81,19 @@ class AxisTable(Table):
 
     label: str = ""
     ends: list[Expression] | None = Field(default=None, min_length=2, max_length=2)
-    names: list[str] | str | None = Field(
-        default=None, description="Names of the places 0, 1, 2 ..., in place of numbers."
-    )
+    names: list[str] | str | None = f.told("Names of the places 0, 1, 2 ..., in place of numbers.")
     ticks: list[int | float] | None = None
-    log: list[Annotated[float, Field(ge=1.0, lt=10.0)]] = Field(
-        default_factory=list, description="First digits of the ticks of a logarithmic axis."
-    )
+    log: list[Annotated[float, Field(ge=1.0, lt=10.0)]] = f.told("First digits of the ticks of a logarithmic axis.", [])
 
 
 class CurveTable(Table):
     """A line, or dots where it has a marker and no width."""
 
     y: Expression
-    x: Expression | None = Field(
-        default=None, description="Place along the horizontal axis; by default the dimension of y."
-    )
+    x: Expression | None = f.told("Place along the horizontal axis; by default the dimension of y.")
     each: Each = Field(default_factory=dict, alias="for")
     label: str = ""
-    end: str = Field(default="", description="Words beside the last point.")
+    end: str = f.told("Words beside the last point.", "")
     colours: list[Hue] = Field(default=list(SERIES), min_length=1)  # type: ignore[arg-type]
     width: Points = 2.0
     dash: list[Points] = Field(default_factory=list, max_length=2)
@@ -148,7 +140,7 @@ class PanelTable(Table):
     """A panel with two axes, drawn once for every reading."""
 
     title: str = ""
-    once: bool = Field(default=False, description="Whether one drawing serves all readings.")
+    once: bool = f.told("Whether one drawing serves all readings.", False)
     x: AxisTable = AxisTable()
     y: AxisTable = AxisTable()
     areas: list[AreaTable] = Field(default_factory=list)

@@ -9,8 +9,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from pydantic import Field
 
+from laufruhe.files import fields as f
 from laufruhe.files.scene import QuantityTable, Scene
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.metrics import turning_parts
@@ -44,9 +44,7 @@ class AskedTable(QuantityTable):
     """A quantity of every case, narrowed."""
 
     quantity: str
-    of: list[str] | None = Field(
-        default=None, description="Names of the counterweights or balancers whose mass counts."
-    )
+    of: list[str] | None = f.told("Names of the counterweights or balancers whose mass counts.")
 
 
 @dataclass(frozen=True)
