@@ -19,7 +19,7 @@ from laufruhe.problem.evaluation import evaluate, measured, objective_value
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.report.json_result import as_json
-from laufruhe.report.markdown import as_markdown
+from laufruhe.report.result_report import result_document
 from laufruhe.solvers import solve, state
 from laufruhe.solvers.result import Status
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed, problem_of
@@ -56,7 +56,7 @@ def test_a_result_that_stays_on_the_resonance_shows_what_is_finite(tmp_path: Pat
     result = replace(state(resonant(tmp_path), to_start_from=True), status=Status.FAILED)
     drawn = draw(result, tmp_path)
     assert drawn == ("engine.png", "transmissibility.png", "campbell.png", "modes.png", "run_up.png")
-    text = as_markdown(result, drawn, "")
+    text = result_document(result, [name.removesuffix(".png") for name in drawn], "").as_markdown(".png")
     for curves in (result.forces, result.orders):
         with pytest.raises(ModelError, match="there are no finite loads"):
             curves()

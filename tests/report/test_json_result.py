@@ -19,7 +19,7 @@ from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
 from laufruhe.problem.measure import Measure
 from laufruhe.report.json_result import as_json
-from laufruhe.report.markdown import as_markdown
+from laufruhe.report.result_report import result_document
 from laufruhe.report.screen import show
 from laufruhe.report.wording import fired
 from laufruhe.solvers import Result, state
@@ -185,7 +185,7 @@ def test_cylinders_that_fire_at_once_are_named(tmp_path: Path) -> None:
     words = "Firing order 1-2-3, intervals 0, 180, 540 deg. Cylinder 1 and cylinder 2 fire at once."
     assert fired(result) == words
     assert words in text.getvalue()
-    page = as_markdown(result, (), "laufruhe evaluate twin.toml")
+    page = result_document(result, (), "laufruhe evaluate twin.toml").as_markdown("")
     assert words in page
     assert "firing: is at once in cylinder 1 and cylinder 2; give a firing order" in page
     assert parsed(result)["warnings"] == [str(doubt) for doubt in result.problem.doubts]

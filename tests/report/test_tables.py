@@ -11,7 +11,7 @@ import pytest
 
 from cli import scenes
 from laufruhe.report.grid import escaped
-from laufruhe.report.markdown import as_markdown
+from laufruhe.report.result_report import result_document
 from laufruhe.report.screen import show
 from laufruhe.report.sections import tables_of
 from laufruhe.report.wording import explained, headline, why_star
@@ -73,7 +73,7 @@ def test_the_certificate_takes_two_sentences() -> None:
 
 def test_the_report_holds_everything() -> None:
     result = scenes.solved(scenes.TIGHT)
-    text = as_markdown(result, ("polar.png", "bars.png"), "laufruhe solve scene.toml")
+    text = result_document(result, ("polar", "bars"), "laufruhe solve scene.toml").as_markdown(".png")
     assert text.startswith("# Four in line\n")
     assert "](polar.png)" in text
     assert "spectrum.png" not in text
@@ -86,7 +86,7 @@ def test_the_report_holds_everything() -> None:
 
 
 def test_source_and_assumptions_are_told() -> None:
-    text = as_markdown(scenes.solved(scenes.PARTS), (), "")
+    text = result_document(scenes.solved(scenes.PARTS), (), "").as_markdown("")
     assert "Source: nowhere." in text
     assert "- none" in text
 

@@ -11,7 +11,6 @@ import pytest
 from cli import scenes
 from laufruhe.report.document import Bullets, Code, Document, Heading, Illustration, Paragraph
 from laufruhe.report.grid import Grid
-from laufruhe.report.markdown import as_markdown, rendered
 from laufruhe.report.result_report import result_document
 from laufruhe.report.web_page import as_html
 
@@ -100,7 +99,7 @@ def test_both_pages_say_the_same() -> None:
     result = scenes.solved(scenes.TIGHT)
     document = result_document(result, [], "laufruhe solve scene.toml")
     words = " ".join(" ".join(_Page(as_html(document, {})).words).split())
-    for line in as_markdown(result, (), "laufruhe solve scene.toml").splitlines():
+    for line in result_document(result, (), "laufruhe solve scene.toml").as_markdown("").splitlines():
         for cell in line.strip("| ").split(" | "):
             told = re.sub(r"\\(.)", r"\1", cell).lstrip("#- ").strip()
             if told and not set(told) <= set("-:| `sh"):
@@ -120,4 +119,4 @@ def test_what_looks_like_a_tag_is_text() -> None:
     assert ">**no**</th>" in text
     assert "<strong>no</strong></th>" in text
     _Page(text)
-    assert "\\*\\*no\\*\\*" in rendered(Document("t", blocks), ".png")
+    assert "\\*\\*no\\*\\*" in Document("t", blocks).as_markdown(".png")

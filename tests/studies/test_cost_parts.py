@@ -14,7 +14,6 @@ from laufruhe.cli import app
 from laufruhe.errors import InputError
 from laufruhe.plots.picture import draw
 from laufruhe.report.document import Document
-from laufruhe.report.markdown import rendered
 from laufruhe.report.study_report import told as blocks_of
 from laufruhe.studies import run
 from laufruhe.studies.kinds import KINDS
@@ -84,7 +83,7 @@ def part_of(folder: Path, text: str) -> xr.Dataset:
 
 def told(kind: str, data: xr.Dataset) -> str:
     blocks = tuple(block for text in KINDS[kind].table(data) for block in blocks_of(text))
-    return rendered(Document("part", blocks), ".png")
+    return Document("part", blocks).as_markdown(".png")
 
 
 @pytest.mark.slow

@@ -173,9 +173,9 @@ def page(
     Sliders for what is open, for limits, speed and load, crank and mounts; the optimum follows.
     """
     with exit_statuses(problem, "the page is no longer served"):
-        from laufruhe.cli.page import Wanted, served
+        from laufruhe.cli.page import served
 
-        served(Wanted(problem, port, time_limit, ends_after, not no_browser))
+        served(problem, port, time_limit, ends_after, not no_browser)
 
 
 @app.command(epilog=_example("laufruhe study tractor-sweeps.toml --jobs 4"))

@@ -22,7 +22,6 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report import explain, files
 from laufruhe.report import trade as report
-from laufruhe.report.markdown import rendered
 from laufruhe.report.web_page import as_html
 from laufruhe.studies.trade import Trade, seconds, trade
 
@@ -81,7 +80,7 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
                 pictures[problem.name] = as_svg(drawn)
             command = shlex.join(["laufruhe", "trade", str(path)])
             document = report.trade_document(one, next(iter(pictures), None), command)
-            files.write(stage / page, rendered(document, ".png"))
+            files.write(stage / page, document.as_markdown(".png"))
             files.write(stage / shown, as_html(document, pictures))
     trades = [found[k] for k in range(len(problems))]
     index = report.index(trades)

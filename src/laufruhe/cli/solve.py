@@ -22,7 +22,6 @@ from laufruhe.numerics.progress import Listener
 from laufruhe.problem.problem import Problem
 from laufruhe.report import files
 from laufruhe.report.json_result import as_json
-from laufruhe.report.markdown import rendered
 from laufruhe.report.result_report import result_document
 from laufruhe.report.tables import write_tables
 from laufruhe.report.web_page import as_html
@@ -117,7 +116,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
             pictures = drawn()
         result = replace(result, timing={**result.timing, **seconds})
         document = result_document(result, list(pictures), request.command)
-        files.write(stage / files.REPORT, rendered(document, f".{request.kinds[0]}" if request.kinds else ""))
+        files.write(stage / files.REPORT, document.as_markdown(f".{request.kinds[0]}" if request.kinds else ""))
         files.write(stage / files.PAGE, as_html(document, pictures, live))
         for place in filter(None, (stage / files.RESULT, copy)):
             files.write(place, as_json(result, request.series))

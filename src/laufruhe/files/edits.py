@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 
 from laufruhe import units
 from laufruhe.files.complaints import Refused, nearest
+from laufruhe.files.nested import at, put
 from laufruhe.files.problem_file import ProblemFile
 from laufruhe.files.study_tables import keys_of
 
@@ -21,29 +22,29 @@ _NUMBER = re.compile(r"\s*-\s*(?=[\d.])")
 def with_value(tables: Mapping[str, Any], name: str, value: Any) -> dict[str, Any]:
     """The number at another value; where it is open, it starts there and stays open."""
     keys = keys_by_name(tables, name)
-    now = _at(tables, keys)
-    return _put(tables, keys, {**now, "start": value} if _is_open(now) else value)
+    now = at(tables, keys)
+    return put(tables, keys, {**now, "start": value} if _is_open(now) else value)
 
 
 def opened(tables: Mapping[str, Any], name: str, low: Any, high: Any, start: Any = None) -> dict[str, Any]:
     """The number left open between two bounds; it starts where it stands unless told."""
     keys = keys_by_name(tables, name)
-    now = _at(tables, keys)
+    now = at(tables, keys)
     given = start if start is not None else now.get("start") if _is_open(now) else now
-    return _put(tables, keys, {"between": [low, high], **({} if given is None else {"start": given})})
+    return put(tables, keys, {"between": [low, high], **({} if given is None else {"start": given})})
 
 
 def fixed(tables: Mapping[str, Any], name: str, value: Any = None) -> dict[str, Any]:
     """The number no longer open: at a value, or where it starts."""
     keys = keys_by_name(tables, name)
-    now = _at(tables, keys)
+    now = at(tables, keys)
     if value is None:
         if not _is_open(now):
             raise Refused(name, now, "is not open", "give the value that it is to have")
         value = now.get("start", _start(*now["between"]))
-    found = _put(tables, keys, value)
+    found = put(tables, keys, value)
     # an angle is open with its size, or not at all
-    if keys[-1] in _SIZES and _is_open(_at(found, (*keys[:-1], "angle"))):
+    if keys[-1] in _SIZES and _is_open(at(found, (*keys[:-1], "angle"))):
         return fixed(found, f"{name.rpartition('.')[0]}.angle")
     return found
 
@@ -64,7 +65,7 @@ def _is_negative(value: Any) -> bool:
 
 def unit_of_bounds(tables: Mapping[str, Any], name: str) -> str:
     """The unit in which the bounds of an open number are written; empty where they have none."""
-    now = _at(tables, keys_by_name(tables, name))
+    now = at(tables, keys_by_name(tables, name))
     bound = now["between"][-1] if _is_open(now) else now
     return units.unit_of(bound) if isinstance(bound, str) else ""
 
@@ -79,13 +80,13 @@ def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
     # a part may be called as a table is: the name that results show comes first
     known = [(label, keys) for label, keys in named if name.startswith(f"{label}.")]
     for label, keys in sorted(known, key=lambda pair: -len(pair[0])):
-        found = _below(_at(tables, keys), name.removeprefix(f"{label}.").split("."))
+        found = _below(at(tables, keys), name.removeprefix(f"{label}.").split("."))
         if found is not None:
             return (*keys, *found)
     if first in ProblemFile.model_fields and rest and (first in tables or first not in {label for label, _ in named}):
         parent, _, last = name.rpartition(".")
         keys = keys_of(dict(tables), parent)
-        here = _at(tables, keys)
+        here = at(tables, keys)
         return (*keys, last) if isinstance(here, dict) else keys_of(dict(tables), name)
     raise Refused(name, None, "is no number of this problem", nearest(name, _examples(tables, named)))
 
@@ -124,28 +125,10 @@ def _examples(tables: Mapping[str, Any], named: Sequence[tuple[str, Keys]]) -> l
     return [
         f"{label}.{key}"
         for label, keys in named
-        for key, value in _at(tables, keys).items()
+        for key, value in at(tables, keys).items()
         if key not in ("name", "mirror_of") and isinstance(value, numbers) and not isinstance(value, bool)
     ] or ["engine.stroke"]
 
 
 def _is_open(value: Any) -> bool:
     return isinstance(value, dict) and "between" in value
-
-
-def _at(tables: Mapping[str, Any], keys: Keys) -> Any:
-    here: Any = tables
-    for key in keys:
-        here = here.get(key) if isinstance(here, dict) else here[key]
-    return here
-
-
-def _put(tables: Mapping[str, Any], keys: Keys, value: Any) -> dict[str, Any]:
-    """Tables with another value at a place; the rest is shared with those given."""
-    whole: Any = dict(tables)
-    here = whole
-    for key in keys[:-1]:
-        here[key] = here[key].copy()
-        here = here[key]
-    here[keys[-1]] = value
-    return whole  # type: ignore[no-any-return]

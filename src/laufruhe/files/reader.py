@@ -7,7 +7,6 @@ import os
 import re
 import sys
 import tomllib
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -32,6 +31,7 @@ from laufruhe.files.geared import geared_of
 from laufruhe.files.leads import leads_of
 from laufruhe.files.load_cases import load_cases_of
 from laufruhe.files.mounts import mounts_of
+from laufruhe.files.nested import inside
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
 from laufruhe.files.piston_masses import check_factors, piston_masses
@@ -192,9 +192,7 @@ def _whole(tables: dict[str, Any], path: Path) -> dict[str, Any]:
 
 def _check_shape(tables: dict[str, Any], path: Path) -> None:
     """Refuse texts that would command a screen, and tables without end."""
-    left = deque[tuple[tuple[str | int, ...], Any]]([((), tables)])
-    while left:
-        at, node = left.popleft()
+    for at, node in inside(tables):
         if len(at) > DEEPEST:
             raise refused(key_path(at), "", f"is nested more than {DEEPEST} deep", "flatten it", path)
         strange = _UNSEEN.search("".join(text for text in (*at[-1:], node) if isinstance(text, str)))
@@ -206,8 +204,6 @@ def _check_shape(tables: dict[str, Any], path: Path) -> None:
             raise refused(key_path(at) or "file", "", f"has {len(node)} entries", most, path)
         if isinstance(node, int) and not -LARGEST <= node <= LARGEST:
             raise refused(key_path(at), "", "is a whole number of more than 64 bits", "write a smaller one", path)
-        pairs = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
-        left.extend(((*at, key), entry) for key, entry in pairs)
 
 
 @cache

@@ -8,10 +8,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from laufruhe.errors import refused
 from laufruhe.files.complaints import nearest
+from laufruhe.files.nested import texts_in
 from laufruhe.files.problem_file import SCHEMA
 
 STUDY_SCHEMA = "laufruhe-study.schema.json"
@@ -98,13 +98,5 @@ def schema_file(is_study: bool = False) -> tuple[str, str]:
 def _found(name: str, use: str) -> Ready:
     path = folder() / f"{name}.toml"
     tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    needs = sorted({text for text in _texts(tables) if "/" not in text and (folder() / text).is_file()})
+    needs = sorted({t for _, t in texts_in(tables) if 0 < len(t) <= 80 and "/" not in t and (folder() / t).is_file()})
     return Ready(name, tables["title"], use, path, "study" in tables, tuple(needs))
-
-
-def _texts(node: Any) -> list[str]:
-    """All short texts in tables."""
-    if isinstance(node, str):
-        return [node] if 0 < len(node) <= 80 else []
-    inner = node.values() if isinstance(node, dict) else node if isinstance(node, list) else ()
-    return [text for one in inner for text in _texts(one)]

@@ -13,6 +13,7 @@ from pydantic import BaseModel, BeforeValidator, Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
+from laufruhe.files import nested
 from laufruhe.files.asked import limit_name
 from laufruhe.files.complaints import Refused, measured, nearest
 from laufruhe.files.fields import Name, Table, refusal
@@ -72,21 +73,12 @@ class CaseTable(Table):
 
 def at(tables: dict[str, Any], where: str) -> Any:
     """What stands at a path such as counterweights.web.balance_factor; `Refused` where it leads nowhere."""
-    here: Any = tables
-    for key in keys_of(tables, where):
-        here = here[key]
-    return here
+    return nested.at(tables, keys_of(tables, where))
 
 
 def changed(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
     """Tables with another value at a path, `Refused` where it leads nowhere; the rest is shared with those given."""
-    keys = keys_of(tables, where)
-    whole = here = dict(tables)
-    for key in keys[:-1]:
-        here[key] = here[key].copy()
-        here = here[key]
-    here[keys[-1]] = value
-    return whole
+    return nested.put(tables, keys_of(tables, where), value)
 
 
 def joined(tables: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:

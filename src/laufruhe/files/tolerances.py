@@ -14,6 +14,7 @@ from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, key_path
 from laufruhe.files.fields import Table
+from laufruhe.files.nested import put
 from laufruhe.machine import Engine, Rotor
 from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
 from laufruhe.problem.problem import Problem
@@ -174,17 +175,10 @@ def _written(text: str, path: Path) -> Written:
 
 def with_numbers(tables: Mapping[str, Any], changes: Mapping[Path, str | float]) -> dict[str, Any]:
     """Tables with other numbers at some places."""
-    return {key: _changed(value, (key,), changes) for key, value in tables.items()}
-
-
-def _changed(node: Any, path: Path, changes: Mapping[Path, str | float]) -> Any:
-    if path in changes:
-        return changes[path]
-    if isinstance(node, dict):
-        return {key: _changed(value, (*path, key), changes) for key, value in node.items()}
-    if isinstance(node, list):
-        return [_changed(value, (*path, k), changes) for k, value in enumerate(node)]
-    return node
+    found = dict(tables)
+    for place, number in changes.items():
+        found = put(found, place, number)
+    return found
 
 
 def over_of(table: RobustTable | None, tolerances: Sequence[Tolerance]) -> Over | None:

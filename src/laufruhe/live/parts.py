@@ -182,21 +182,17 @@ class LiveModel:
             "turns": self.turns,
             "sliders": [asdict(slider) for slider in self.sliders],
             "signals": signals,
-            "curves": [_curve(curve) for curve in self.curves],
+            "curves": [asdict(curve) for curve in self.curves],
             "measures": [_measure(measure) for measure in self.measures],
             "designs": {design.name: _design(design) for design in self.designs},
             "objective": {"name": self.objective, **with_unit(self.unit)},
             "proved": asdict(self.proved) if self.proved else None,
             "unmoved": [{"name": name, "why": why} for name, why in self.unmoved],
             "whyNot": self.why_not,
-            "save": {"text": self.save.text, "numbers": self.save.numbers, "note": self.save.note},
+            "save": asdict(self.save),
             "data": data,
         }
         return json.dumps(plain, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
-
-
-def _curve(curve: Curve) -> dict[str, Any]:
-    return {"title": curve.title, "signal": curve.signal}
 
 
 def _measure(shown: Shown) -> dict[str, Any]:

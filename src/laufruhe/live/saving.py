@@ -12,6 +12,7 @@ import numpy as np
 from laufruhe.errors import InputError
 from laufruhe.files import edits
 from laufruhe.files.complaints import Refused
+from laufruhe.files.nested import texts_in
 from laufruhe.files.reader import given, load_tables
 from laufruhe.files.toml_text import toml_text
 from laufruhe.machine import Engine
@@ -65,7 +66,7 @@ def saved(problem: Problem, result: Result, moving: Problem, values: Mapping[str
         return Saved(note=f"This design cannot be written as a problem file: {error}.")
     if not _alike(read.engine, moving.engine) or read.fidelity != moving.fidelity:
         return Saved(note="This design cannot be written as a problem file that is evaluated alike.")
-    beside = sorted({text for text in _texts(tables) if text.endswith(".csv")})
+    beside = sorted({text for _, text in texts_in(tables) if text.endswith(".csv")})
     note = f"Save it beside {' and '.join(beside)}." if beside else ""
     return Saved(text, marks, note)
 
@@ -143,10 +144,3 @@ def _numbers(engine: Engine) -> np.ndarray:
     rotors = [(r.unbalance.real, r.unbalance.imag, r.shaft.ratio, *r.place) for r in engine.rotors]
     mounts = [(*mount.position, *mount.stiffness) for mount in engine.mounts]
     return np.array([number for row in (*parts, *rotors, *mounts) for number in row])
-
-
-def _texts(node: Any) -> list[str]:
-    if isinstance(node, str):
-        return [node]
-    inner = node.values() if isinstance(node, Mapping) else node if isinstance(node, list) else ()
-    return [text for each in inner for text in _texts(each)]

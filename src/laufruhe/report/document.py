@@ -1,6 +1,6 @@
 """A report as data: headings, paragraphs, tables and pictures in the order in which they are read.
 
-It is assembled once; `markdown` and `web_page` put it on pages.
+It is assembled once. Every block knows how it is written in Markdown; `web_page` puts all of them on a page.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from laufruhe.report.grid import Grid
+from laufruhe.report.grid import Grid, escaped
 
 
 @dataclass(frozen=True)
@@ -17,6 +17,10 @@ class Heading:
     """Of a section."""
 
     text: str
+
+    def as_markdown(self) -> str:
+        """On a line of its own."""
+        return f"## {escaped(self.text)}"
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,10 @@ class Paragraph:
     text: str
     marked: bool = False
 
+    def as_markdown(self) -> str:
+        """As it is where it is marked."""
+        return self.text if self.marked else escaped(self.text)
+
 
 @dataclass(frozen=True)
 class Bullets:
@@ -33,6 +41,10 @@ class Bullets:
 
     lead: str
     items: Sequence[str]
+
+    def as_markdown(self) -> str:
+        """A line each."""
+        return f"{self.lead}\n\n" + "\n".join(f"- {escaped(text)}" for text in self.items)
 
 
 @dataclass(frozen=True)
@@ -43,12 +55,21 @@ class Illustration:
     caption: str
     is_captioned: bool = True
 
+    def as_markdown(self, ending: str) -> str:
+        """With its caption below; the ending is that of the file beside the page."""
+        shown = f"![{escaped(self.caption)}]({self.name}{ending})"
+        return f"{shown}\n\n*{self.caption}*" if self.is_captioned else shown
+
 
 @dataclass(frozen=True)
 class Code:
     """A line to type."""
 
     text: str
+
+    def as_markdown(self) -> str:
+        """For a shell."""
+        return f"```sh\n{self.text}\n```"
 
 
 Block: TypeAlias = Heading | Paragraph | Bullets | Illustration | Code | Grid
@@ -60,3 +81,11 @@ class Document:
 
     title: str
     blocks: tuple[Block, ...]
+
+    def as_markdown(self, ending: str) -> str:
+        """The text of `report.md`; the ending is that of the picture files beside it."""
+        parts = (
+            block.as_markdown(ending) if isinstance(block, Illustration) else block.as_markdown()
+            for block in self.blocks
+        )  # fmt: skip
+        return "\n\n".join([f"# {escaped(self.title)}", *parts]) + "\n"

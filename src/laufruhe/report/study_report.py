@@ -11,7 +11,6 @@ import xarray as xr
 from laufruhe.report import files, tables
 from laufruhe.report.document import Block, Bullets, Document, Heading, Illustration, Paragraph
 from laufruhe.report.grid import Grid
-from laufruhe.report.markdown import rendered
 from laufruhe.report.sheet import Sheet
 from laufruhe.report.strict_json import strict
 from laufruhe.report.web_page import as_html
@@ -67,7 +66,7 @@ def write_study(
         tables.write_book(sheets, folder / files.BOOK)
     document = study_document(study, datasets, seconds, command)
     pictures = {name: picture() for name, picture in drawn.items()}
-    files.write(folder / files.REPORT, rendered(document, ending))
+    files.write(folder / files.REPORT, document.as_markdown(ending))
     files.write(folder / files.PAGE, as_html(document, pictures))
 
 

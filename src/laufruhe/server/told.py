@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
 from laufruhe.present.numbers import figure, price_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
+from laufruhe.report.strict_json import finite
 from laufruhe.solvers.conclusion import decision_values
 from laufruhe.solvers.result import LimitValue
 
@@ -17,17 +17,9 @@ from laufruhe.solvers.result import LimitValue
 def as_text(found: dict[str, Any]) -> str:
     """As JSON; a model is JSON already, and what is no finite number is null."""
     told = {key: entry for key, entry in found.items() if key not in ("model", "engine")}
-    text = json.dumps(_finite(told), allow_nan=False)
+    text = json.dumps(finite(told), allow_nan=False)
     drawn = {"model": found.get("model"), "engine": json.dumps(found["engine"]) if "engine" in found else None}
     return "".join([text[:-1], *(f', "{key}": {entry}' for key, entry in drawn.items() if entry is not None), "}"])
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {key: _finite(entry) for key, entry in value.items()}
-    return [_finite(entry) for entry in value] if isinstance(value, list | tuple) else value
 
 
 def figures(value: float, problem: Problem) -> dict[str, Any]:

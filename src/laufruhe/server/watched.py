@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from laufruhe.errors import InputError, refused
 from laufruhe.files.complaints import key_path
+from laufruhe.files.nested import texts_in
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.server.answers import Source
 
@@ -87,16 +88,8 @@ class Watched:
 def _check_inside(tables: Mapping[str, Any], path: Path) -> None:
     """Refuse files that a problem names beyond its folder: a page reads nothing there."""
     folder = path.parent.resolve()
-    for where, name in _files_in(tables, ()):
-        if not (folder / name).resolve().is_relative_to(folder):
+    for where, name in texts_in(tables):
+        is_file = where[-1] == "file" or name.lower().endswith(".csv")
+        if is_file and not (folder / name).resolve().is_relative_to(folder):
             rule, remedy = "is outside the folder of the problem, and a page reads nothing there", "copy it beside it"
             raise refused(key_path(where), f'"{name}"', rule, remedy, path)
-
-
-def _files_in(node: Any, at: tuple[str | int, ...]) -> Iterator[tuple[tuple[str | int, ...], str]]:
-    pairs = node.items() if isinstance(node, Mapping) else enumerate(node) if isinstance(node, list) else ()
-    for key, entry in pairs:
-        if isinstance(entry, str) and (key == "file" or entry.lower().endswith(".csv")):
-            yield (*at, key), entry
-        else:
-            yield from _files_in(entry, (*at, key))
