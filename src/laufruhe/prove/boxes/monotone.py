@@ -1,7 +1,7 @@
 """Least sum of numbers that go one way with each open number, some of them limited (T9).
 
-On a box such a number is least at one corner. Boxes whose least sum is not under the design found, or on which a
-limit is broken everywhere, are dropped; the sides of the others are cut where that shows, and they are halved: the
+On a box such a number is least at one corner. Boxes whose least sum is not under that of a design known, or on which
+a limit is broken everywhere, are dropped; the sides of the others are cut where that shows, and they are halved: the
 least sum on what is left bounds every design allowed.
 """
 
@@ -15,13 +15,11 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.roots import parted
-from laufruhe.prove.best_first import Box, Division, Parts, Waiting, halves, widest
+from laufruhe.prove.best_first import Box, Divided, Halving, halves, widest
 
 MOST_BOXES = 4000
-# halvings of a side that is cut, and of a line through a box on the way to a design
-CUTS, HALVINGS = 10, 30
-# of the gap that counts as proven, what is left for roundings
-NEARLY = 0.5
+# halvings of a side that is cut
+CUTS = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,10 +63,6 @@ class OneWayProblem:
         """That the sum is not under on a box."""
         return sum(weight * term.least(lower, upper) for weight, term in self.terms)
 
-    def keeps(self, x: Array) -> bool:
-        """Whether all limits hold."""
-        return all(number.value(x) <= maximum for maximum, number in self.limits)
-
     @property
     def goes_one_way(self) -> bool:
         """Whether the whole sum does."""
@@ -81,66 +75,31 @@ class OneWayProblem:
         return replace(self, limits=(*self.limits, (best, OneWay(self.value, self.terms[0][1].ways))))
 
 
-@dataclass(frozen=True, eq=False)
-class Divided:
-    """What dividing the bounds has shown.
-
-    Attributes
-    ----------
-    x
-        The best design found; None where no design keeps the limits.
-    bound
-        No design allowed has a smaller sum.
-    boxes
-        That were looked at.
-    complete
-        Whether nothing is left that could be better than the tolerance tells apart.
-    """
-
-    x: Array | None
-    bound: float
-    boxes: int
-    complete: bool
-
-
-class _OneWayBoxes(Division[Box]):
-    """Boxes of what is open, and the best design found in them."""
+class _OneWayBoxes(Halving):
+    """Boxes of what is open, each cut."""
 
     what = "boxes"
 
-    def __init__(self, problem: OneWayProblem, tolerance: float) -> None:
-        self._problem, self._tolerance = problem, tolerance
-        self.best: Array | None = None
+    def __init__(self, problem: OneWayProblem, value: float, room: float) -> None:
+        super().__init__(value, room)
+        self._problem = problem.under(self.enough)
 
-    def look(self, part: Box) -> None:
-        """Designs on lines through a box."""
-        for x in _designs(self._problem, part.lower, part.upper):
-            if self._problem.value(x) < self.value:
-                self.value, self.best = self._problem.value(x), x
-
-    def is_done(self, one: Waiting[Box]) -> bool:
-        """Whether nothing in it is better by what the tolerance tells apart."""
-        return one.bound >= self.value - NEARLY * self._tolerance * abs(self.value)
-
-    def box(self, problem: OneWayProblem, lower: Array, upper: Array) -> tuple[float, Box] | None:
+    def bounded(self, lower: Array, upper: Array) -> tuple[float, Box] | None:
         """A box without what breaks limits, and its least sum."""
-        kept = _cut(problem, lower, upper)
+        kept = _cut(self._problem, lower, upper)
         if kept is None:
             return None
         return self._problem.least(*kept), Box(*kept, widest(*kept, self._problem.upper - self._problem.lower))
 
-    def parts(self, taken: Sequence[Waiting[Box]]) -> Parts[Box]:
+    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
         """Halves by the middle of the side that is longest beside its bounds."""
-        for half in halves(taken[0].part):
-            found = self.box(self._problem.under(self.value), *half)
-            yield found if found is not None and found[0] < self.value else None
+        return [self.bounded(*half) for box in boxes for half in halves(box)]
 
 
-def divided(problem: OneWayProblem, tolerance: float, most: int = MOST_BOXES) -> Divided:
-    """The best design to a relative tolerance, and the bound that shows it (T9)."""
-    boxes = _OneWayBoxes(problem, tolerance)
-    bound = boxes.divide(boxes.box(problem, problem.lower, problem.upper), most)
-    return Divided(boxes.best, min(bound, boxes.value), boxes.seen, boxes.complete)
+def divided(problem: OneWayProblem, value: float, room: float, most: int = MOST_BOXES) -> Divided:
+    """Halve boxes, the least first, until none may hold a design that is `room` better than `value` (T9)."""
+    boxes = _OneWayBoxes(problem, value, room)
+    return boxes.run(boxes.bounded(problem.lower, problem.upper), most)
 
 
 def _with(x: Array, k: int, value: float) -> Array:
@@ -172,31 +131,3 @@ def _last(broken: Callable[[float], bool], start: float, end: float) -> float:
     if start == end or not broken(start):
         return start
     return parted(broken, start, end, CUTS)[0]
-
-
-def _designs(problem: OneWayProblem, lower: Array, upper: Array) -> Sequence[Array]:
-    """Designs of a box that keep the limits: on lines along the last open number the ends of what is allowed."""
-    found = []
-    for share in (0.0, 0.5, 1.0):
-        at = lower + share * (upper - lower) if share < 1.0 else upper
-        line = lower[-1], upper[-1]
-        first = _edge(_kept(problem, at, -1.0), *line)
-        last = _edge(_kept(problem, at, 1.0), *line[::-1])
-        if first is not None and last is not None and first <= last:
-            found += [_with(at, -1, value) for value in (first, 0.5 * (first + last), last)]
-    return [x for x in found if problem.keeps(x)]
-
-
-def _kept(problem: OneWayProblem, x: Array, way: float) -> Callable[[float], bool]:
-    """Whether the limits that go one way with the last open number hold where it stands."""
-    told = [(most, number) for most, number in problem.limits if number.ways[-1] == way]
-    return lambda at: all(number.value(_with(x, -1, at)) <= most for most, number in told)
-
-
-def _edge(holds: Callable[[float], bool], start: float, end: float) -> float | None:
-    """The place nearest to the start at which what holds from somewhere on to the end holds, by halving."""
-    if holds(start):
-        return start
-    if not holds(end):
-        return None
-    return parted(lambda x: not holds(x), start, end, HALVINGS)[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,16 +15,21 @@ from laufruhe.problem.decision import Numbers, moved_numbers
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
+from laufruhe.prove.best_first import Divided
 from laufruhe.prove.boxes.monotone import OneWay, OneWayProblem, divided
 from laufruhe.prove.certificate import Reach
-from laufruhe.solvers.conclusion import concluded, judged, none_within
+from laufruhe.solvers.conclusion import concluded, none_within
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, shown
+from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, proven, searched, shown
 
 WIDTH = "flywheel.width"
 # boxes close in fast where the sum goes one way: at so small a share of the tolerance limits hold the design
 SHARPER = 1e-3
+# relative room that local programs leave inside limits, less than boxes tell apart
+INSIDE = 1e-9
+# boxes that tell whether limits can be kept together
+FEW_BOXES = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,30 +120,37 @@ class _WheelProgram(LocalProgram):
     def numbers(self, shares: Array) -> Array:
         """The objective, then the relative room under each limit."""
         x = np.array(self.values(shares))
-        return np.array([self.asked.value(x), *(1.0 - number.value(x) / most for most, number in self.asked.limits)])
+        return np.array(
+            [self.asked.value(x), *(1.0 - number.value(x) / most - INSIDE for most, number in self.asked.limits)]
+        )
 
 
 def solve_flywheel(problem: Problem) -> Result:
     """The best flywheel, proven; or the limits that no flywheel within its bounds keeps."""
     started = time.perf_counter()
-    initial, boxes = evaluate(problem), _Coordinates.of(problem, weighs=True)
+    initial, boxes, whole = evaluate(problem), *(_Coordinates.of(problem, weighs) for weighs in (True, False))
     asked = boxes.asked(initial, problem.limits)
-    found = divided(asked, (SHARPER if asked.goes_one_way else 1.0) * problem.tolerance)
-    timing = {"solve": time.perf_counter() - started}
-    if found.x is None:
-        return none_within(problem, initial, _conflict(problem, initial, boxes), timing)
-    design, whole = judged(problem, boxes.decided(found.x).tolist()), _Coordinates.of(problem, weighs=False)
     program = _WheelProgram(problem, *whole.bounds, whole.asked(initial, problem.limits))
-    unfinished = "" if found.complete else ", some of them not finished"
-    method = f"monotone quantities, bounded on {found.boxes} boxes of the flywheel's numbers{unfinished}"
-    proof = shown(program, design, found.bound, Reach.WHOLE, method)
-    return concluded(design, initial, proof, timing)
+    best = searched(program, [program.shares(problem.start), *looks(problem)], problem.search.starts)
+
+    def bounded(value: float, room: float) -> Divided:
+        found = divided(asked, value, (SHARPER if asked.goes_one_way else 1.0) * room)
+        return replace(found, places=tuple(boxes.decided(x) for x in found.places))
+
+    found = proven(program, best, bounded)
+    timing = {"solve": time.perf_counter() - started}
+    if found.excludes_all:
+        return none_within(problem, initial, _conflict(problem, initial, boxes), timing)
+    method = f"monotone quantities, bounded on {found.divided.boxes} boxes of the flywheel's numbers"
+    proof = shown(program, found.design, found.bound, Reach.WHOLE, method)
+    return concluded(found.design, initial, proof, timing)
 
 
 def _conflict(problem: Problem, initial: Evaluation, boxes: _Coordinates) -> tuple[str, ...]:
-    """Limits that no flywheel keeps together: nothing is minimised, so the first design found ends it."""
+    """Limits that no flywheel keeps together, as far as a few boxes tell."""
 
     def excluded(kept: Sequence[Limit]) -> bool:
-        return divided(replace(boxes.asked(initial, kept), terms=()), problem.tolerance).x is None
+        asked = replace(boxes.asked(initial, kept), terms=())
+        return divided(asked, math.inf, 0.0, FEW_BOXES).bound == math.inf
 
     return smallest_conflict(problem.limits, excluded)
