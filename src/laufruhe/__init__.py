@@ -101,14 +101,19 @@ def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint]
     ModelError
         If the engine cannot be evaluated, or has no operating point.
     """
-    from laufruhe.machine import Engine, OperatingPoint
+    from laufruhe.machine import Engine
+    from laufruhe.solvers import state
+
+    return state(_of_engine(design, points) if isinstance(design, Engine) else _problem(design))
+
+
+def _of_engine(design: Engine, points: Sequence[OperatingPoint]) -> Problem:
+    """The problem of an engine that stands in none: forces on its mounts, or on its block where it has none."""
+    from laufruhe.machine import OperatingPoint
     from laufruhe.problem import channels
     from laufruhe.problem.measure import Measure, Term
     from laufruhe.problem.problem import Problem
-    from laufruhe.solvers import state
 
-    if not isinstance(design, Engine):
-        return state(_problem(design))
     listed: Sequence[object] = points
     strange = next((point for point in listed if not isinstance(point, OperatingPoint)), None)
     if strange is not None:
@@ -117,7 +122,7 @@ def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint]
         raise ModelError(f"'{design.name}' has no operating point; give points")
     channel = channels.MOUNT_FORCE if design.mounts else channels.SHAKING_FORCE
     wanted = (Term(Measure(channel)),)
-    return state(Problem(design.name, design.name, design, tuple(points), objective=wanted))
+    return Problem(design.name, design.name, design, tuple(points), objective=wanted)
 
 
 def study(source: Source, jobs: int = 1) -> dict[str, xr.Dataset]:

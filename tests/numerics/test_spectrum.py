@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 from fractions import Fraction
 
 import numpy as np
@@ -10,7 +11,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from laufruhe.numerics.spectrum import Spectrum, common_base, orders_equal, spectrum_of
+from laufruhe.numerics.composed import Mapped, Summed, held
+from laufruhe.numerics.spectrum import Spectrum, bent_spectrum, common_base, orders_equal, spectrum_of
 
 BASES = st.sampled_from([Fraction(1), Fraction(1, 2), Fraction(2), Fraction(3, 2), Fraction(1, 3)])
 NUMBERS = st.complex_numbers(max_magnitude=10.0, allow_subnormal=False)
@@ -157,6 +159,38 @@ class TestSpectrumOf:
         np.testing.assert_allclose(values.mean(axis=0), s.coefficients[0].real, atol=1e-12)
         power = s.coefficients[0].real ** 2 + 0.5 * (np.abs(s.coefficients[1:]) ** 2).sum(axis=0)
         np.testing.assert_allclose((values**2).mean(axis=0), power, rtol=1e-12, atol=1e-12)
+
+
+def bent(highest: int) -> Spectrum:
+    """A signal with a kink and orders of its own."""
+    rng = np.random.default_rng(4)
+    smooth = rng.normal(size=(highest + 1, 2)) + 1j * rng.normal(size=(highest + 1, 2))
+    smooth[0] = 3.0
+    smooth[1::2] = 0.0
+    kink = bent_spectrum(
+        lambda x: np.abs(np.sin(x))[:, None] * [1.0, -2.0], 96, Fraction(1, 2), np.array([0.0, math.pi])
+    )
+    assert kink.corners is not None
+    return Spectrum(Fraction(1, 2), smooth) + kink
+
+
+@pytest.mark.parametrize("highest", [4, 30])
+@pytest.mark.parametrize("own", [np.zeros((1, 2)), np.array([[0.0, 1.0], [0.0, 0.0], [2.0 - 1.0j, 0.5j]])])
+def test_signals_made_of_others_are_those_that_their_coefficients_tell(highest: int, own: np.ndarray) -> None:
+    turned = np.array([[1.0, 0.5], [-0.3, 0.2], [0.0, 4.0]])
+    summed = Summed(held(bent(highest)), Spectrum(Fraction(1, 2), own.astype(complex)))
+    mapped = Mapped(summed, lambda values: values @ turned.T)
+    for made in (summed, mapped, pickle.loads(pickle.dumps(mapped))):
+        plain = Spectrum(made.base, made.coefficients, made.corners)
+        assert made.repeats() <= plain.repeats()
+        for _ in range(2):
+            for one, other in ((made, plain), (made.series, plain.series), (made + made, plain + plain)):
+                np.testing.assert_allclose(one.sample(48), other.sample(48), atol=1e-12)
+                np.testing.assert_allclose(one.values(ANGLES), other.values(ANGLES), atol=1e-12)
+                once = one.over(one.repeats())
+                np.testing.assert_allclose(once.sample(24), other.over(one.repeats()).sample(24), atol=1e-12)
+    with pytest.raises(ValueError, match="read-only"):
+        summed.held.sample(48)[0] = 1.0
 
 
 def test_orders_are_told_apart_to_a_thousandth() -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import cvxpy as cp
 import numpy as np
 import pytest
+from scipy.sparse import coo_array, csc_array
 
 import laufruhe
 from laufruhe import load
@@ -23,6 +24,7 @@ from laufruhe.prove.certificate import Proof, lower_bound
 from laufruhe.solvers import Status, solve
 from laufruhe.solvers.cones import conic
 from laufruhe.solvers.cones.conic import TIGHT, solve_cones
+from laufruhe.solvers.cones.rows import Sparse
 from problem_files import PROBLEMS, loaded
 
 NAMES = ("tractor-single", "tractor-two", "tractor-four-lanchester", "tractor-four-lanchester-and-moment",
@@ -240,3 +242,19 @@ def test_what_is_balanced_but_for_rounding(throws: list[float], asked: str, uppe
     assert result.certificate is not None
     assert result.certificate.kind is Proof.GLOBAL
     assert result.objective.value <= result.objective.initial
+
+
+@pytest.mark.parametrize("shape", [(7, 5), (1, 3), (4, 0)])
+def test_a_sparse_matrix_is_that_of_scipy(shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(8)
+    count = 40 * shape[1]
+    rows, columns = rng.integers(0, shape[0], count), rng.integers(0, max(shape[1], 1), count)
+    values = rng.integers(-2, 3, count).astype(float)
+    for some in (slice(0, 0), slice(0, 3), slice(None)):
+        own = Sparse.of(rows[some], columns[some], values[some], shape)
+        theirs = csc_array((own.data, own.indices, own.indptr), shape=shape)
+        np.testing.assert_array_equal(
+            theirs.toarray(), coo_array((values[some], (rows[some], columns[some])), shape).toarray()
+        )
+        assert theirs.has_canonical_format
+        assert own.nnz == len(own.data)

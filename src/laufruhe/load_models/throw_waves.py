@@ -241,7 +241,7 @@ class ThrowWaves:
             # of what bends at an angle so many orders are listed that those beyond are next to nothing
             signal = one if one.corners is None else one.extended(_LISTED)
             out = ~orders_equal(signal.orders, kept)
-            rest = replace(signal, coefficients=np.where(out[:, None, None], signal.coefficients, 0.0))
+            rest = signal.holding(np.where(out[:, None, None], signal.coefficients, 0.0))
             if measure.norm.is_euclidean or measure.norm.averages:
                 # neither is more than the root mean square, nor rows of averages more than their lengths
                 most = np.sqrt(mean_square(rest))

@@ -6,9 +6,9 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property, reduce
+from functools import cached_property, lru_cache, reduce
 from math import gcd, lcm
-from typing import Any, Self
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +18,9 @@ from laufruhe.numerics.turns import Turn, phasors
 
 MOST_CORNERS = 24
 """Of one function that are taken out in closed form."""
+T = TypeVar("T")
+FEW = 9
+"""Coefficients of a signal that is sampled wave by wave."""
 MAX_ORDER_DENOMINATOR = 1000
 PER_ORDER = 1000
 """Orders are told apart to a thousandth of crank speed."""
@@ -65,40 +68,53 @@ class Spectrum:
         return math.tau / float(self.base)
 
     @cached_property
-    def smooth(self) -> Self:
+    def smooth(self) -> Spectrum:
         """The signal without its corners: no order beyond its coefficients."""
         if self.corners is None:
             return self
-        return type(self)(
+        return Spectrum(
             self.base, self.coefficients - self.corners.coefficients(len(self.coefficients), float(self.base))
         )
 
-    def later(self, turn: Turn, angle: float) -> Self:
+    def later(self, turn: Turn, angle: float) -> Spectrum:
         """The signal later by an angle [rad], which is also given as a share of its period."""
         turns = phasors([-turn], np.arange(len(self.coefficients)))
         moved = self.coefficients * turns.reshape(-1, *(1,) * (self.coefficients.ndim - 1))
         corners = None if self.corners is None else self.corners.moved(angle).folded(self.period, 1)
-        return type(self)(self.base, moved, corners)
+        return Spectrum(self.base, moved, corners)
 
     @property
-    def series(self) -> Self:
+    def series(self) -> Spectrum:
         """Its orders alone: of averages the better, for samples of what bends are off by the square of their step."""
-        return type(self)(self.base, self.coefficients)
+        return self if self.corners is None else Spectrum(self.base, self.coefficients)
 
     @property
     def bends(self) -> NDArray[np.float64]:
         """Angles at which its slope jumps, shape (k,) [rad]."""
         return np.zeros(0) if self.corners is None else self.corners.bending
 
-    def each(self, linear: Callable[[NDArray[Any]], NDArray[Any]]) -> Self:
+    @property
+    def parts(self) -> tuple[Spectrum, ...]:
+        """Signals that it is the sum of."""
+        return (self,)
+
+    def once(self, what: str, asked: Any, made: Callable[[Spectrum], T]) -> T:  # noqa: ARG002
+        """What is made of it; a signal that many others have a part in keeps what was asked for last, by its name."""
+        return made(self)
+
+    def holding(self, coefficients: NDArray[np.complex128]) -> Spectrum:
+        """The signal with other coefficients."""
+        return Spectrum(self.base, coefficients, self.corners)
+
+    def each(self, linear: Callable[[NDArray[Any]], NDArray[Any]]) -> Spectrum:
         """Through a real linear map of its values, given as a function of arrays (n, ...)."""
         corners = None if self.corners is None else self.corners.each(linear)
-        return type(self)(self.base, linear(self.coefficients), corners)
+        return Spectrum(self.base, linear(self.coefficients), corners)
 
-    def averaged(self, step: float) -> Self:
+    def averaged(self, step: float) -> Spectrum:
         """Averages under a triangle that falls to zero at an angle to either side: sinc^2 times each order (P7)."""
         share = np.sinc(self.orders * step / math.tau) ** 2
-        return type(self)(self.base, self.coefficients * share.reshape(-1, *(1,) * (self.coefficients.ndim - 1)))
+        return Spectrum(self.base, self.coefficients * share.reshape(-1, *(1,) * (self.coefficients.ndim - 1)))
 
     @property
     def orders(self) -> NDArray[np.float64]:
@@ -110,10 +126,10 @@ class Spectrum:
         found = np.flatnonzero(orders_equal(self.orders, order))
         return np.asarray(self.coefficients[found].sum(axis=0))
 
-    def only(self, orders: ArrayLike) -> Self:
+    def only(self, orders: ArrayLike) -> Spectrum:
         """The signal with every other order at zero."""
         counted = orders_equal(self.orders, orders).reshape(-1, *(1,) * (self.coefficients.ndim - 1))
-        return type(self)(self.base, np.where(counted, self.coefficients, 0.0))
+        return Spectrum(self.base, np.where(counted, self.coefficients, 0.0))
 
     def sample(self, samples: int) -> NDArray[np.float64]:
         """Values at `samples` equal steps over one period 2 pi / b, shape (samples, ...).
@@ -124,6 +140,11 @@ class Spectrum:
         if self.corners is not None:
             angles = self.period * np.arange(samples) / samples
             return self.smooth.sample(samples) + self.corners.values(angles, self.period)
+        if len(self.coefficients) <= FEW:
+            # a product with few waves takes less time than a transform
+            flat = np.ascontiguousarray(self.coefficients).reshape(len(self.coefficients), -1)
+            found = _waves(len(flat), samples) @ np.concatenate([flat.real, flat.imag])
+            return np.asarray(found.reshape(samples, *self.coefficients.shape[1:]))
         if len(self.coefficients) <= samples // 2 + 1:
             # no order is over half the number of samples, so none is folded
             half = np.asarray(0.5 * self.coefficients, dtype=complex)
@@ -148,25 +169,25 @@ class Spectrum:
         return found if self.corners is None else found + self.corners.values(angles, self.period)
 
     @property
-    def integral(self) -> Self:
+    def integral(self) -> Spectrum:
         """The integral over crank angle of all but the mean, itself without a mean."""
         whole = np.zeros_like(self.coefficients)
         whole[1:] = (self.coefficients[1:].T / (1j * self.orders[1:])).T
-        return type(self)(self.base, whole, None if self.corners is None else self.corners.moved(0.0, 1))
+        return Spectrum(self.base, whole, None if self.corners is None else self.corners.moved(0.0, 1))
 
     @property
-    def derivative(self) -> Self:
+    def derivative(self) -> Spectrum:
         """By the angle; where it jumps, the sum of its orders alone has one."""
         steep = (self.coefficients.T * (1j * self.orders)).T
         if self.corners is None or self.corners.jumps[:, 0].any():
-            return type(self)(self.base, steep)
-        return type(self)(self.base, steep, self.corners.derivative)
+            return Spectrum(self.base, steep)
+        return Spectrum(self.base, steep, self.corners.derivative)
 
-    def extended(self, count: int) -> Self:
+    def extended(self, count: int) -> Spectrum:
         """With so many coefficients or more."""
-        return self + type(self)(self.base, np.zeros((count, *self.coefficients.shape[1:]), dtype=complex))
+        return self + Spectrum(self.base, np.zeros((count, *self.coefficients.shape[1:]), dtype=complex))
 
-    def rebased(self, base: Fraction) -> Self:
+    def rebased(self, base: Fraction) -> Spectrum:
         """The same signal counted in a finer lowest order."""
         factor = self.base / base
         if factor.denominator != 1:
@@ -177,35 +198,37 @@ class Spectrum:
         spread = np.zeros(((len(self.coefficients) - 1) * step + 1, *self.coefficients.shape[1:]), dtype=complex)
         spread[::step] = self.coefficients
         corners = None if self.corners is None else self.corners.repeated(self.period, step)
-        return type(self)(base, spread, corners)
+        return Spectrum(base, spread, corners)
+
+    @cached_property
+    def step(self) -> int:
+        """Greatest common divisor of what its coefficients stand at, zero where none but the mean is."""
+        used: Any = self.coefficients.reshape(len(self.coefficients), -1).any(axis=1)
+        return int(np.gcd.reduce(used.nonzero()[0]))
 
     def repeats(self, also: tuple[Fraction, ...] = ()) -> Fraction:
         """Lowest order of its own shortest period, which holds some further orders too."""
-        # a product tells in half the time which orders hold anything
-        sizes = np.abs(np.ascontiguousarray(self.coefficients).view(float)).reshape(len(self.coefficients), -1)
-        used = np.flatnonzero(sizes @ np.ones(sizes.shape[1]))
-        orders = [order for order in also if order > 0]
-        if step := int(np.gcd.reduce(used)):
+        orders, step = [order for order in also if order > 0], self.step
+        if step:
             orders.append(step * self.base)
         return common_base(orders or [Fraction(1)])
 
-    def over(self, base: Fraction) -> Self:
+    def over(self, base: Fraction) -> Spectrum:
         """The same signal over another period of its own, that of the lowest order `base`."""
         if base == self.base:
             return self
-        ratio = base / self.base
-        fine, step = self, ratio.numerator
-        if ratio.denominator > 1:
-            fine = self.rebased(_common(base, self.base))
+        fine, step = self, times(base, self.base)
+        if not step:
+            fine, step = self.rebased(_common(base, self.base)), (base / self.base).numerator
         corners = None if fine.corners is None else fine.corners.folded(fine.period / step, step)
-        return type(self)(base, fine.coefficients[::step], corners)
+        return Spectrum(base, fine.coefficients[::step], corners)
 
-    def kept(self, highest: float) -> Self:
+    def kept(self, highest: float) -> Spectrum:
         """The signal without the orders above `highest`; its corners are gone where any is left out."""
         count = int(np.sum(_thousandths(self.orders) <= _thousandths(highest)))
-        return self if count == len(self.coefficients) else type(self)(self.base, self.coefficients[:count])
+        return self if count == len(self.coefficients) else Spectrum(self.base, self.coefficients[:count])
 
-    def __add__(self, other: Self) -> Self:
+    def __add__(self, other: Spectrum) -> Spectrum:
         a, b = self, other
         if a.base != b.base:
             base = _common(a.base, b.base)
@@ -218,7 +241,15 @@ class Spectrum:
             further = b.corners.coefficients(len(total), float(b.base))
             total[len(b.coefficients) :] += further[len(b.coefficients) :]
         total[: len(b.coefficients)] += b.coefficients
-        return type(self)(a.base, total, joined([a.corners, b.corners]))
+        return Spectrum(a.base, total, joined([a.corners, b.corners]))
+
+
+@lru_cache(maxsize=32)
+def _waves(count: int, samples: int) -> NDArray[np.float64]:
+    """cos j phi and -sin j phi at equal steps over a period, shape (samples, 2 count)."""
+    turns = np.outer(np.arange(samples), np.arange(count)) % samples
+    waves = np.exp(2j * math.pi * np.arange(samples) / samples)[turns]
+    return np.concatenate([waves.real, -waves.imag], axis=1)
 
 
 def _transformed(half: NDArray[np.complex128], samples: int) -> NDArray[np.float64]:
@@ -233,6 +264,12 @@ def _transformed(half: NDArray[np.complex128], samples: int) -> NDArray[np.float
 def _common(a: Fraction, b: Fraction) -> Fraction:
     """Greatest common divisor of two orders."""
     return Fraction(gcd(a.numerator, b.numerator), lcm(a.denominator, b.denominator))
+
+
+def times(order: Fraction, base: Fraction) -> int:
+    """How many times a lowest order another one is; zero where that is no whole number."""
+    whole, rest = divmod(order.numerator * base.denominator, order.denominator * base.numerator)
+    return 0 if rest else whole
 
 
 def common_base(orders: Sequence[Fraction]) -> Fraction:

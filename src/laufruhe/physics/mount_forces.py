@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import UncarriedLoadError
 from laufruhe.machine import Mount
 from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.composed import Mapped
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.rigid_body import point_motion
@@ -50,16 +51,21 @@ class RigidMounting:
             If the wrench drives a direction that no mount carries.
         """
         self.check_carried(wrench)
-        return wrench.each(self._carried)
+        return Mapped(wrench, self._carried)
 
     def _carried(self, loads: NDArray[Any]) -> NDArray[Any]:
         """Forces of real or complex loads (n, 6), shape (n, mounts, 3)."""
         if np.iscomplexobj(loads):
             # of real numbers alone the product takes half the time
             forces = (np.ascontiguousarray(loads).view(float) @ self._parts).view(complex)
-        else:
-            forces = loads @ self.maps.reshape(-1, 6).T
-        return np.asarray(forces.reshape(-1, len(self.maps), 3))
+            return np.asarray(forces.reshape(-1, len(self.maps), 3))
+        # in memory mount by mount, as norms take their rows
+        return np.asarray((loads @ self._each).swapaxes(0, 1))
+
+    @cached_property
+    def _each(self) -> NDArray[np.float64]:
+        """The map to each mount, shape (mounts, 6, 3)."""
+        return np.ascontiguousarray(self.maps.swapaxes(1, 2))
 
     @cached_property
     def _parts(self) -> NDArray[np.float64]:
@@ -73,15 +79,9 @@ class RigidMounting:
 
     def check_carried(self, wrench: Spectrum) -> None:
         """Refuse a wrench that some direction lets through."""
-        if not len(self.free):
+        if not len(self.free) or all(part.once("carried", self, self._is_carried) for part in wrench.parts):
             return
-        # most wrenches have next to nothing along what is free: squares of real and imaginary parts tell
-        loads = np.ascontiguousarray(wrench.coefficients)
-        parts = loads.view(float)
-        along = (parts @ self._leak).ravel()
-        whole = float(np.vdot(parts, parts)) * (UNCARRIED_SHARE / max(self.arm, 1.0)) ** 2 / max(parts.size, 1)
-        if self._leak.shape[1] * float(along @ along) <= whole < math.inf:
-            return
+        loads = wrench.coefficients
         scaled = loads / _scales(self.arm)
         size = float(np.abs(scaled).max(initial=0.0))
         uncarried = np.abs((scaled @ self.free.T) @ self.free)
@@ -91,6 +91,16 @@ class RigidMounting:
                 f"order {float(wrench.orders[order]):g} drives the engine along {WRENCH[component]}, which no mount "
                 "carries; give a mount stiffness in that direction or a second place"
             )
+
+    def _is_carried(self, part: Spectrum) -> bool:
+        """Whether a part of a wrench has next to nothing along what is free, as most have."""
+        parts = np.ascontiguousarray(part.coefficients).view(float)
+        # squares of real and imaginary parts tell
+        along = (parts @ self._leak).ravel()
+        if not along.any():
+            return True
+        whole = float(np.vdot(parts, parts)) * (UNCARRIED_SHARE / max(self.arm, 1.0)) ** 2 / max(parts.size, 1)
+        return bool(self._leak.shape[1] * float(along @ along) <= whole < math.inf)
 
 
 def rigid_mounting(mounts: Sequence[Mount]) -> RigidMounting:

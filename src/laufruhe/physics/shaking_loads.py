@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank
+from laufruhe.numerics.composed import Summed, held
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.numerics.turns import cancelling_sums
 from laufruhe.physics.crank_torque import crank_torque
@@ -42,7 +43,7 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
         return uneven_loads(engine, point, fidelity)
     gas = fidelity.gas_of(point)
     moving = _slider_crank_loads(engine.cycle, engine.slider_cranks, point.speed, gas, fidelity)
-    total = moving + rotating_loads(engine, point.speed)
+    total = Summed(moving, rotating_loads(engine, point.speed))
     return total + added_geared_loads(engine, point, fidelity) if engine.geared else total
 
 
@@ -55,9 +56,7 @@ def _slider_crank_loads(
     total = reciprocating_loads(engine, speed, fidelity) + rod_inertia_loads(engine, speed, fidelity)
     if gas is not None:
         total = total + gas_loads(engine, gas, fidelity)
-    kept = fidelity.kept(total)
-    kept.coefficients.setflags(write=False)
-    return kept
+    return held(fidelity.kept(total))
 
 
 def forget() -> None:

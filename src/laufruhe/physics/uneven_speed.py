@@ -155,7 +155,7 @@ def gas_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spe
 def _alternating_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
     """Torque of the gas less that of the load, which takes the mean of it (F2)."""
     torque = gas_torque(engine, point, fidelity)
-    return replace(torque, coefficients=np.concatenate([[0.0], torque.coefficients[1:]]))
+    return torque.holding(np.concatenate([[0.0], torque.coefficients[1:]]))
 
 
 def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Array]:

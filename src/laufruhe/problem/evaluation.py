@@ -14,7 +14,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, lengths
-from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.numerics.spectrum import Spectrum, common_base, times
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.metrics import CycleMeasures, cycle_measures
 from laufruhe.physics.mounting import mounting_of, travel_of
@@ -94,9 +94,11 @@ class Evaluation:
         if isinstance(measure.channel, NumberChannel):
             return measure.channel.values(measure, self)
         finer = 1 if measure.is_mass else measure.norm.refinement
-        with np.errstate(invalid="ignore" if self.resonance else "warn"):
+        if not self.resonance:
+            return (self._repeated_rows(measure, finer * self.samples).value,)
+        with np.errstate(invalid="ignore"):
             value = self._repeated_rows(measure, finer * self.samples).value
-        return (value if math.isfinite(value) else math.inf,) if self.resonance else (value,)
+        return (value if math.isfinite(value) else math.inf,)
 
     def value(self, measure: Measure) -> float:
         """A measure of this design [SI]; a maximum is sought between the samples too. Infinite on a resonance."""
@@ -224,7 +226,7 @@ def _measured(evaluation: Evaluation, signal: Spectrum) -> list[CycleMeasures]:
 def _one_period(base: Fraction, signals: Sequence[Spectrum], samples: int) -> tuple[list[Spectrum], int]:
     """Signals over the period in which all repeat, and the samples of a cycle that fall into one."""
     once = common_base([signal.repeats() for signal in signals])
-    periods = once / base
-    if periods.denominator != 1 or samples % int(periods):
+    periods = times(once, base)
+    if not periods or samples % periods:
         return over(base, signals), samples
-    return [signal.over(once) for signal in signals], samples // int(periods)
+    return [signal.over(once) for signal in signals], samples // periods

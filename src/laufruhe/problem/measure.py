@@ -264,14 +264,16 @@ def load_rows(
     blocks, weights = [], []
     bends = bends_of(measure, signals, engine) if bends is None else bends
     for signal, share, own in zip(signals, measure.shares(points), bends, strict=True):
-        counted = selected(measure, signal, engine)
-        # an engine may lack what is named: then it has no load there
-        if share == 0.0 or not counted.coefficients.shape[1]:
+        if share == 0.0:
             continue
+        counted = selected(measure, signal, engine)
         if measure.norm.refinement == 1:
             values = counted.series.sample(samples)
         else:
             values = np.concatenate([counted.sample(samples), counted.values(own)])
+        # an engine may lack what is named: then it has no load there
+        if not values.shape[1]:
+            continue
         rows = values.swapaxes(0, 1).reshape(-1, values.shape[-1])
         blocks.append(rows)
         weights.append(np.full(len(rows), share / len(rows)))

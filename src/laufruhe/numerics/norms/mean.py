@@ -60,7 +60,7 @@ class Mean(Norm):
     def dual_feasible(self, grid: Grid, z: Array) -> Array:
         """Rows that are too long are cut."""
         size, weights = lengths(z), grid.weights
-        shrink = np.where(size > weights, weights / np.where(size > 0.0, size, 1.0), 1.0)
+        shrink = np.divide(weights, size, out=np.ones(len(size)), where=size > weights)
         return np.asarray(z * shrink[:, None])
 
     def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -127,7 +126,7 @@ def _signals(rows: Array, steps: int) -> Array:
 
 
 def _swing(signal: Spectrum) -> float:
-    alternating = replace(signal, coefficients=np.concatenate([0.0 * signal.coefficients[:1], signal.coefficients[1:]]))
+    alternating = signal.holding(np.concatenate([0.0 * signal.coefficients[:1], signal.coefficients[1:]]))
     return 2.0 * float(amplitudes(alternating).max(initial=0.0))
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -100,7 +100,7 @@ def _earlier(signal: Spectrum, lead: float) -> Spectrum:
 
 def _most(torque: Spectrum) -> float:
     """No less than the torque about its mean at any angle."""
-    own = replace(torque, coefficients=np.concatenate([[0.0], torque.coefficients[1:]]))
+    own = torque.holding(np.concatenate([[0.0], torque.coefficients[1:]]))
     steps = max(8 * len(own.coefficients), 64)
     values = np.concatenate([own.sample(steps), own.values(own.bends)])
     bent = curvature(own.each(lambda each: each[:, None, None]))[0]

@@ -13,7 +13,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import left
 from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import Multipliers
-from laufruhe.solvers.cones.rows import Block, Rows
+from laufruhe.solvers.cones.rows import Block, Rows, Sparse
 
 LEAST_SHARE = 1e-7
 """Under which a sum is no part of the largest."""
@@ -110,16 +110,17 @@ def _cost(problem: AffineProblem, blocks: Sequence[Block], rows: Rows) -> Array:
 def told(rows: Rows, cost: Array, wanted: Mapping[str, Any], quadratic: Array | None = None) -> Any:
     """What the solver says of a program with these settings, and a quadratic part of the cost."""
     import clarabel
-    from scipy.sparse import csc_array
 
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     for name, value in wanted.items():
         setattr(settings, name, value)
     settings.time_limit = max(left(), SHORTEST)
-    bent = csc_array((rows.columns, rows.columns)) if quadratic is None else csc_array(quadratic)
+    bent = np.zeros((0, 0)) if quadratic is None else quadratic
+    at, across = np.nonzero(bent)
+    squares = Sparse.of(at, across, bent[at, across], (rows.columns, rows.columns))
     right = np.concatenate(rows.right)
-    return clarabel.DefaultSolver(bent, cost, rows.matrix(), right, rows.cones, settings).solve()
+    return clarabel.DefaultSolver(squares, cost, rows.matrix(), right, rows.cones, settings).solve()
 
 
 def answered(problem: AffineProblem, blocks: list[Block], starts: list[int], found: Any) -> ConicSolution:

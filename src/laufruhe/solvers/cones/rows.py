@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,41 @@ class Block:
         return np.asarray(self.heads.stop + signal[:, None] * d + np.arange(d))
 
 
+@dataclass(frozen=True, eq=False)
+class Sparse:
+    """A matrix column by column, as Clarabel takes it: what SciPy calls so takes a tenth of a second to import.
+
+    Attributes
+    ----------
+    data, indices, indptr, shape
+        As in `scipy.sparse.csc_array`; each place once, row after row.
+    """
+
+    data: Array
+    indices: NDArray[np.int64]
+    indptr: NDArray[np.int64]
+    shape: tuple[int, int]
+    has_canonical_format: ClassVar[bool] = True
+
+    @classmethod
+    def of(cls, rows: NDArray[np.int64], columns: NDArray[np.int64], values: Array, shape: tuple[int, int]) -> Sparse:
+        """Of its entries, in any order; those of one place are added up."""
+        used = values != 0.0
+        keys = (columns * shape[0] + rows)[used]
+        order = np.argsort(keys, kind="stable")
+        keys, data = keys[order], values[used][order]
+        first = np.flatnonzero(np.diff(keys, prepend=-1))
+        if len(first) < len(keys):
+            keys, data = keys[first], np.add.reduceat(data, first)
+        starts = np.searchsorted(keys, shape[0] * np.arange(shape[1] + 1))
+        return cls(data, keys % max(shape[0], 1), starts, shape)
+
+    @property
+    def nnz(self) -> int:
+        """Number of entries."""
+        return len(self.data)
+
+
 class Rows:
     """A x + s = b, s in a product of cones: blocks of rows as they are added."""
 
@@ -64,10 +99,7 @@ class Rows:
         self.right.append(right)
         self.count += len(right)
 
-    def matrix(self) -> Any:
-        """A, sparse."""
-        from scipy.sparse import csc_array
-
+    def matrix(self) -> Sparse:
+        """A."""
         rows, columns, values = (np.concatenate([entry[k] for entry in self.entries]) for k in range(3))
-        used = values != 0.0
-        return csc_array((values[used], (rows[used], columns[used])), shape=(self.count, self.columns))
+        return Sparse.of(rows, columns, values, (self.count, self.columns))
