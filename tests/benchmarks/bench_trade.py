@@ -10,7 +10,6 @@ import re
 from pages import PAGES, publish
 
 from laufruhe.cli.fidelity import traded
-from laufruhe.files.reader import load
 from problem_files import READY
 
 FOLDER = PAGES.parent / "trade"
@@ -18,8 +17,7 @@ FOLDER = PAGES.parent / "trade"
 
 def main() -> None:
     """Measure, and keep the table alone."""
-    # nothing is traded for a flywheel
-    traded([path for path in READY if not load(path).flywheel_decisions], FOLDER, print)
+    traded(READY, FOLDER, print)
     # the pages of single problems are not kept
     text = re.sub(r"\[([\w-]+)\]\(\1\.md\)", r"`\1`", (FOLDER / "README.md").read_text(encoding="utf-8"))
     publish(PAGES / "trade.md", text)

@@ -16,7 +16,7 @@ from fidelity.scenes import finer, random_elastic_problem, random_problem
 from lanes import first_fast
 from laufruhe.errors import InputError, ModelError, UncarriedLoadError
 from laufruhe.fidelity.automatic import ladder
-from laufruhe.fidelity.error_bounds import error_bound, reference
+from laufruhe.fidelity.error_bounds import Scale, error_bound, reference
 from laufruhe.files.reader import load
 from laufruhe.load_models.uneven_model import Symbols, UnevenModel
 from laufruhe.physics.fidelity import Fidelity
@@ -124,6 +124,6 @@ def test_from_a_file(tmp_path: Path) -> None:
 
 
 def test_a_trade_tries_it_where_there_is_gas() -> None:
-    rungs = dict(ladder(_scene(random_problem, 3)))
+    rungs = dict(ladder(Scale.of(_scene(random_problem, 3))))
     assert rungs["exact, gas to order 12, 720 steps"].fidelity.gas_orders == 12
-    assert not any("gas to order" in name for name, _ in ladder(random_problem(random.Random(1), gas=False)))
+    assert not any("gas to order" in name for name, _ in ladder(Scale.of(random_problem(random.Random(1), gas=False))))

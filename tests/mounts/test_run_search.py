@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 import laufruhe
 from laufruhe.errors import LaufruheError
 from laufruhe.fidelity.automatic import ladder
+from laufruhe.fidelity.error_bounds import Scale
 from laufruhe.files.reader import load, load_tables, tables_of
 from laufruhe.load_models.run_peaks import RunPeaks
 from laufruhe.machine import Engine
@@ -289,8 +290,8 @@ def test_points_gas_fluid_load_cases_and_a_weight_stand_beside_a_run() -> None:
 def test_fidelities_of_a_run_up_have_its_loads() -> None:
     """Without operating points there is no run."""
     asked = {"objective": {"minimise": "run-up travel"}, "mounts": mounts()}
-    assert all(own.points for _, own in ladder(limited(**asked)))
-    assert any(not own.points for _, own in ladder(limited(objective={"minimise": "static sag"})))
+    assert all(own.points for _, own in ladder(Scale.of(limited(**asked))))
+    assert any(not own.points for _, own in ladder(Scale.of(limited(objective={"minimise": "static sag"}))))
 
 
 @pytest.mark.slow

@@ -31,6 +31,7 @@ def _trade(errors: list[float]) -> Trade:
             1e-3,
             1e5,
             1e-3 if k % 3 else math.nan,
+            0.0,
         )
         for k, error in enumerate(errors)
     )

@@ -16,14 +16,14 @@ from laufruhe.fidelity.automatic import Choice, choose
 from laufruhe.fidelity.mount_needs import needs
 from laufruhe.files.reader import load, load_tables, tables_of
 from laufruhe.load_models.batch import prepare
-from laufruhe.numerics.workers import each, given
+from laufruhe.numerics.workers import count_of, each, executor_for, given
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report import explain, files
 from laufruhe.report import trade as report
 from laufruhe.report.web_page import as_html
-from laufruhe.studies.trade import Trade, seconds, trade
+from laufruhe.studies.trade import Trade, seconds, trade, traded_part
 
 
 def explained(path: Path, tolerance: float) -> tuple[str, Callable[[], str]]:
@@ -62,12 +62,12 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     from laufruhe.plots.style import as_svg, save
     from laufruhe.plots.trade import figure, has_picture
 
-    problems = [_with_objective(path) for path in paths]
-    for path, problem in zip(paths, problems, strict=True):
-        if problem.flywheel_decisions:
-            # a cheap model makes one that breaks its limits, and what that costs no error of the objective tells
-            rule = "is open, and no cheap model is traded for a flywheel that keeps its limits"
-            raise refused("flywheel", "", rule, "fix it", path)
+    read = [(path, _with_objective(path)) for path in paths]
+    of_wheels = [(path, problem.name) for path, problem in read if problem.flywheel_decisions]
+    if len(of_wheels) == len(read):
+        rule = "is open, and no cheap model is traded for a flywheel that keeps its limits"
+        raise refused("flywheel", "", rule, "fix it", of_wheels[0][0])
+    paths, problems = zip(*((path, problem) for path, problem in read if not problem.flywheel_decisions), strict=True)
     found: dict[int, Trade] = {}
     for k, one in _measured(paths, problems, say):
         problem, path, found[k] = problems[k], paths[k], one
@@ -83,8 +83,8 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
             files.write(stage / page, document.as_markdown(".png"))
             files.write(stage / shown, as_html(document, pictures))
     trades = [found[k] for k in range(len(problems))]
-    index = report.index(trades)
-    if len(trades) > 1:
+    index = report.index(trades, [name for _, name in of_wheels])
+    if len(read) > 1:
         with files.staged(files.Set(folder, "--out", "trade", ["README.md"], adds=True)) as stage:
             files.write(stage / "README.md", index)
     return index + f"Results: {folder}\n", lambda: _together(trades)
@@ -98,16 +98,18 @@ def _together(trades: Sequence[Trade]) -> str:
 def _measured(
     paths: Sequence[Path], problems: Sequence[Problem], say: Callable[[str], None]
 ) -> Iterator[tuple[int, Trade]]:
-    """Each problem measured, here alone, or by workers that the work was given to, as they come."""
-    executor = given()
-    if executor is None:
-        for k, problem in enumerate(problems):
-            yield k, trade(problem, lambda text, name=problem.name: say(f"{name}: {text}"))  # type: ignore[misc]
+    """One problem measured here, several side by side, as they come."""
+    if len(problems) == 1 and given() is None:
+        yield 0, trade(problems[0], lambda text: say(f"{problems[0].name}: {text}"))
         return
-    with closing(each(_measured_there, [(path, tables_of(path)) for path in paths], executor)) as answers:
+    pieces = [(path, tables_of(path)) for path in paths]
+    with (
+        executor_for(min(len(pieces), count_of())) as executor,
+        closing(each(_measured_there, pieces, executor)) as answers,
+    ):
         for k, one in answers:
             say(f"{problems[k].name} is measured")
-            yield k, replace(one, problem=problems[k])
+            yield k, replace(one, problem=traded_part(problems[k]))
 
 
 def _measured_there(piece: tuple[Path, dict[str, Any]]) -> Trade:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale, reference, signals
+from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale, signals
 from laufruhe.fidelity.knob import LeftOut
 from laufruhe.fidelity.knobs import KNOBS
 from laufruhe.machine import Engine
@@ -57,7 +57,7 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
     Choice whose estimate is under the tolerance wherever the reference itself is; of
     an objective that is zero, everything that is not zero is kept.
     """
-    return chosen_by(Scale(problem, reference(problem, engine)), tolerance)
+    return chosen_by(Scale.of(problem, engine), tolerance)
 
 
 def chosen_by(scale: Scale, tolerance: float) -> Choice:
@@ -88,9 +88,9 @@ def automatic(problem: Problem, tolerance: float, scale: Scale | None = None) ->
     return problem.at(chosen.fidelity)
 
 
-def ladder(problem: Problem) -> list[tuple[str, Problem]]:
+def ladder(scale: Scale) -> list[tuple[str, Problem]]:
     """Every fidelity that a trade sets side by side, those that differ on this problem (F13)."""
-    scale = Scale(problem, reference(problem))
+    problem = scale.problem
     rungs = [(name, problem.at(fidelity)) for knob in KNOBS for name, fidelity in knob.rungs(scale)]
     if not problem.load_terms and not any(term.measure.channel.is_checked for term in problem.objective):
         return [("mounts alone, no loads", replace(problem, points=())), *rungs]

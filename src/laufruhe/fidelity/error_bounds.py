@@ -86,6 +86,11 @@ class Scale:
         self.value = _loads(problem, best)
         self._known: dict[tuple[str, Fidelity], float] = {}
 
+    @classmethod
+    def of(cls, problem: Problem, engine: Engine | None = None) -> Scale:
+        """Of the design as given, or of another."""
+        return cls(problem, reference(problem, engine))
+
     def evaluation(self, fidelity: Fidelity) -> Evaluation:
         """The same design at another fidelity."""
         return evaluate(replace(self.problem, fidelity=fidelity), self.best.engine)

@@ -48,9 +48,9 @@ def figure(found: Trade) -> Figure:
     front = _front(rows)
     joined = sorted((times[k], errors[k]) for k, row in enumerate(rows) if row in front and row.error >= LEAST_ERROR)
     axes.plot([time for time, _ in joined], [error for _, error in joined], color=FAINT, lw=1.1, zorder=2)
-    decides = np.array([not math.isnan(row.regret) for row in rows])
+    decides = np.array([row.decides and not math.isnan(row.regret) for row in rows])
     axes.scatter(times[~decides], errors[~decides], s=55, zorder=3, facecolors="white", edgecolors=INK, linewidths=0.8)
-    regrets = [max(row.regret, LEAST_REGRET) for row in rows if not math.isnan(row.regret)]
+    regrets = [max(row.regret, LEAST_REGRET) for row, one in zip(rows, decides, strict=True) if one]
     dots = axes.scatter(
         times[decides], errors[decides], c=regrets, cmap="viridis_r", norm=LogNorm(LEAST_REGRET, 1.0), s=55, zorder=3,
         edgecolors=INK, linewidths=0.5,
@@ -66,7 +66,7 @@ def figure(found: Trade) -> Figure:
     _name(axes, rows, times, errors)
     if regrets:
         _colour_bar(drawn, dots)
-    hollow = "" if decides.all() else " Hollow: nothing decided."
+    hollow = "" if decides.all() else " Hollow: no design, or one beyond a limit."
     heading(
         drawn.figure, "Speed against accuracy", "Every fidelity: time of one evaluation against its error.", [],
         f"Joined: beaten by none in both. Regrets under {_power(LEAST_REGRET)} are drawn as that.{hollow} "

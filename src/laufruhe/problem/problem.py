@@ -34,11 +34,14 @@ class Search:
         The most points that a search starts from, and the seed of those drawn at random.
     boxes
         That bounds of stiffness may be divided into for a proof; as is worth it when None.
+    proves
+        Whether what is found is to be proven.
     """
 
     starts: int = 16
     seed: int = 0
     boxes: int | None = None
+    proves: bool = True
 
 
 class Origin(Protocol):
@@ -157,12 +160,9 @@ class Problem:
         """What the problem is about and what of it is open, in one line."""
         engine = self.engine
         parts = [
-            self.name,
-            f"{len(engine.cylinders)} cylinder(s), {engine.cycle}",
-            f"{len(engine.mounts)} mount(s)",
-            f"{len(self.points)} operating point(s)",
-            f"{len(self.limits)} constraint(s)",
-        ]
+            self.name, f"{len(engine.cylinders)} cylinder(s), {engine.cycle}", f"{len(engine.mounts)} mount(s)",
+            f"{len(self.points)} operating point(s)", f"{len(self.limits)} constraint(s)",
+        ]  # fmt: skip
         names = list(self.phasing.open_names) if self.phasing is not None else []
         names += [decision.name + (" and angle" if decision.set.width > 1 else "") for decision in self.decisions]
         names += [f"the {lot.kind} of every cylinder" for lot in self.assembly.lots] if self.assembly else []

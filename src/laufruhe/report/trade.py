@@ -12,15 +12,15 @@ from laufruhe.present.numbers import DASH
 from laufruhe.report.document import Block, Code, Document, Illustration, Paragraph
 from laufruhe.report.grid import Grid, piped
 from laufruhe.report.strict_json import strict
-from laufruhe.studies.trade import REFERENCE_NAME, Row, Trade, is_local
+from laufruhe.studies.trade import KEEPS, REFERENCE_NAME, Row, Trade, is_local, is_open
 
 ALIKE = 1.3
-MOVED = " Throws leave their even steps here, and such optima are local: regret may be negative."
 LOCAL = (
-    " Mounts are decided here: every fidelity searches from the design as given alone, and finds an optimum nearby. "
-    "Choices about modes and time would change with the mounts, so no design is decided with them. "
-    "A small regret may be negative."
+    " What is open here has many optima. Every fidelity begins at the design of the reference, or at the stars that it "
+    "ranks first, and finds an optimum nearby: that is its solve, which a search from nothing takes several times as "
+    "long for."
 )
+OF_MOUNTS = " Choices about modes and time would change with the mounts that are open: no design is decided with them."
 HEAD = (
     "fidelity", "error", "error estimate", "another design", "gradient", "solve", "first design", "memory",
     "regret",
@@ -29,12 +29,13 @@ COLUMNS = (
     "**Another design**: objective of a further design of a prepared problem. **Gradient**: with its derivatives by "
     "all decisions. **Solve**: optimum at this fidelity's own angles, with all preparation. **First design**: "
     "objective with all preparation. **Regret**: by how much the exact objective of the design found exceeds that of "
-    "the best design."
+    "the best design known; of a design that by the exact model is beyond a limit, by how much it is."
 )
 INDEX = (
     "problem", "value within 0.1 %", "per design", "decision within 0.1 %", "per solve", "error of two-order",
-    "of no gas", "of auto 0.001", "regret of two-order", "of auto 0.001", "uneven speed",
+    "of no gas", "of auto 0.001", "regret of two-order", "of auto 0.001", "uneven speed", "why a dash",
 )  # fmt: skip
+OPEN_FLYWHEEL = "the flywheel is open, and a cheap model makes one that breaks its limits"
 
 
 def trade_document(found: Trade, picture: str | None, command: str) -> Document:
@@ -54,9 +55,9 @@ def trade_document(found: Trade, picture: str | None, command: str) -> Document:
     ]
     if not found.whole:
         blocks.append(Paragraph("Stopped at the time limit: fidelities beyond the last row were not measured."))
-    moved = MOVED if problem.phasing and problem.phasing.continuous else ""
-    blocks.append(Paragraph(COLUMNS + (LOCAL if is_local(problem) else moved), marked=True))
-    blocks.extend(Paragraph(line) for line in _beyond(found))
+    mounts = OF_MOUNTS if problem.mount_decisions and problem.load_terms else ""
+    blocks.append(Paragraph(COLUMNS + (LOCAL if is_local(problem) else "") + mounts, marked=True))
+    blocks.extend(Paragraph(line) for line in (*found.left_out, *_beyond(found)))
     return Document(f"Speed against accuracy: {problem.title}", (*blocks, Code(command)))
 
 
@@ -93,7 +94,7 @@ def choices(found: Trade) -> tuple[Row, Row | None]:
     """The cheapest fidelity whose number, and the cheapest whose decision, is good to a thousandth."""
     good = [row for row in found.rows if row.error <= 1e-3]
     number = _quick(good, lambda row: row.evaluation) if good else found.rows[-1]
-    deciding = [row for row in found.rows if not math.isnan(row.regret) and row.regret <= 1e-3]
+    deciding = [row for row in found.rows if row.decides and row.regret <= 1e-3]
     return number, _quick(deciding, lambda row: row.solve) if deciding else None
 
 
@@ -114,8 +115,9 @@ def as_json(found: Trade) -> str:
     })  # fmt: skip
 
 
-def index(trades: Sequence[Trade]) -> str:
-    """One line for every problem, and what they have in common."""
+def index(trades: Sequence[Trade], refused: Sequence[str] = ()) -> str:
+    """One line for every problem, and what they have in common; those for whose open flywheel nothing is traded."""
+    rows = [*map(_index_row, trades), *([name, *[DASH] * (len(INDEX) - 2), OPEN_FLYWHEEL] for name in refused)]
     lines = [
         "# Speed against accuracy",
         "",
@@ -132,13 +134,15 @@ def index(trades: Sequence[Trade]) -> str:
         "- Regret may be far below the error, because an optimum is flat, or far above it, because a shaft that "
         "balances the wrong load leaves the right one. Read both columns.",
         "",
-        piped(INDEX, [_index_row(found) for found in trades], (0, 1, 3)),
+        piped(INDEX, sorted(rows), (0, 1, 3, len(INDEX) - 1)),
         "",
-        "A dash: the problem has no such part, leaves nothing open, has an optimum of zero, or asks for a property of "
-        "the mounts that depends on no load. With open mounts or single open throws, optima are local: regret then "
-        "depends on the search as well as on the fidelity, and may be negative.",
-        "",
-        "*Uneven speed*: change of the objective with a flywheel that leaves 2 % of irregularity.",
+        "*Per design, per solve*: time of the objective of one more design, and of an optimum, at the fidelity named. "
+        "*Regret*: by how much the exact objective of the design that a fidelity decides exceeds that of the best "
+        "design known; *beyond a limit*: by how much that design exceeds a limit by the exact model, so that it is no "
+        "decision. Unbalances alone have one optimum, which each fidelity finds at its own angles. All else is "
+        "searched, at each fidelity from the design of the reference: what proves an optimum is left out, of the "
+        "reference too, for the share by which another design is worse needs no proof. *Uneven speed*: change of the "
+        "objective with a flywheel that leaves 2 % of irregularity.",
     ]
     return "\n".join(lines) + "\n"
 
@@ -149,7 +153,22 @@ def _index_row(found: Trade) -> list[str]:
     deciding = (f"`{decided.name}`", _time(decided.solve)) if decided else (DASH, DASH)
     name, uneven = found.problem.name, DASH if found.flywheel is None else f"{100.0 * found.flywheel[1]:+.2f} %"
     return [f"[{name}]({name}.md)", f"`{number.name}`", _time(number.evaluation), *deciding, _error(two), _error(gas),
-            _error(auto), _regret(two), _regret(auto), uneven]  # fmt: skip
+            _error(auto), _regret(two), _regret(auto), uneven, _why_dashes(found)]  # fmt: skip
+
+
+def _why_dashes(found: Trade) -> str:
+    """Why a number of the index is missing."""
+    problem, (_, decided) = found.problem, choices(found)
+    told = {
+        "nothing is open": not is_open(problem),
+        "no design is found within the limits": is_open(problem) and math.isnan(found.optimum),
+        "the optimum is zero": found.optimum == 0.0,
+        "no fidelity decides as well": decided is None and found.optimum > 0.0,
+        "what is minimised feels no load": not problem.load_terms,
+        "there is no gas": _named(found, NO_GAS) is None,
+        "a load inside is asked at even speed alone": bool(problem.load_terms) and found.flywheel is None,
+    }
+    return "; ".join(why for why, holds in told.items() if holds)
 
 
 def _named(found: Trade, name: str) -> Row | None:
@@ -160,12 +179,15 @@ def _cost(trades: Sequence[Trade], name: str, what: str) -> str:
     """What a fidelity costs of the number and of the design, at worst and in the middle."""
     rows = [row for found in trades if found.problem.load_terms and (row := _named(found, name)) is not None]
     errors = sorted(row.error for row in rows)
-    regrets = sorted(max(row.regret, 0.0) for row in rows if not math.isnan(row.regret))
+    regrets = sorted(row.regret for row in rows if row.decides and not math.isnan(row.regret))
+    broken = sum(row.excess > KEEPS for row in rows)
     if not errors:
         return f"{what} nothing that these problems show."
     text = f"{what} up to {_percent(errors[-1])} of the number{_middle(errors)}"
     if regrets:
         text += f"; of the design up to {_percent(regrets[-1])}{_middle(regrets)}"
+    if broken:
+        text += f", and {broken} design{'s that break' if broken > 1 else ' that breaks'} a limit"
     return text + "."
 
 
@@ -199,6 +221,8 @@ def _error(row: Row | None) -> str:
 
 
 def _regret(row: Row | None) -> str:
+    if row is not None and row.excess > KEEPS:
+        return f"{_percent(row.excess)} beyond a limit"
     if row is None or math.isnan(row.regret):
         return DASH
     # the cone solver's own digits

@@ -286,8 +286,20 @@ def angle_name(decision: Decision) -> str:
 
 def unbalances_of(problem: Problem, result: Result) -> list[complex]:
     """Complex decisions from the sizes and angles of a result."""
+    return [complex(value) for value in values_of(replace(problem, decisions=problem.unbalances), result)]
+
+
+def values_of(problem: Problem, result: Result) -> list[Value]:
+    """Of every decision, from the sizes and angles of a result; as given where it tells none."""
     found = {decision.name: decision.value for decision in result.decisions}
-    return [cmath.rect(found[d.name], found.get(angle_name(d), d.set.angles[0])) for d in problem.unbalances]
+
+    def value(decision: Decision) -> Value:
+        size = found.get(decision.name)
+        if size is None or not decision.is_affine:
+            return decision.start if size is None else size
+        return cmath.rect(size, found.get(angle_name(decision), decision.set.angles[0]))
+
+    return [value(decision) for decision in problem.decisions]
 
 
 def decided(

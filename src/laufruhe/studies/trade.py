@@ -6,6 +6,7 @@ import math
 import time
 import tracemalloc
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,29 +16,28 @@ from laufruhe.fidelity.automatic import ladder
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale, reference
 from laufruhe.fidelity.mount_knobs import TIME_ORDERS, TIME_SAMPLES
 from laufruhe.load_models.affine import AffineModel, AffineNorm
-from laufruhe.load_models.run_look import asks_runs
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
+from laufruhe.numerics.workers import HERE, working_on
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import forget, shaking_loads
 from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
 from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers import solve
-from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.result import Status
+from laufruhe.solvers.conclusion import FEASIBLE
+from laufruhe.solvers.nearby import by_cones, first_of, is_convex, next_to
+from laufruhe.solvers.result import Result
 
 REFERENCE_STEPS = 1440
 """Steps over the period at which the optimum beside which a regret is counted is solved."""
 REFERENCE_NAME = f"exact, every order, {REFERENCE_SAMPLES} steps"
-STARTS_OF_MOUNTS, STARS_ON_OPEN_MOUNTS, STARS_OF_OPEN_THROWS = 3, 2, 2
-"""Each of them takes a search, at every fidelity."""
-_LEAST_TIME, _MOST_REPEATS = 0.02, 50
+KEEPS = 1e-3
+"""Share by which a design may be beyond a limit at the reference and count as a decision."""
+_LEAST_TIME, _LONG, _MOST_REPEATS = 0.02, 0.1, 50
 
 
 @dataclass(frozen=True)
@@ -50,12 +50,14 @@ class Row:
         Of the objective of the design as given, and what it is said not to exceed; relative to the reference.
     evaluation, gradient, solve, fresh
         Seconds; another design with the scene prepared (from nothing where that cannot
-        be prepared), its gradient with it, an optimum, and an evaluation from nothing. NaN
+        be prepared), its gradient with it, an optimum (of a processor), and an evaluation from nothing. NaN
         where nothing is open, or this fidelity cannot decide it.
     memory
         Largest of an evaluation from nothing [byte].
     regret
-        Reference objective of this fidelity's optimum over the reference optimum, less one; NaN as above.
+        Reference objective of this fidelity's optimum over that of the best design known, less one; NaN as above.
+    excess
+        Largest share by which that optimum is beyond a limit at the reference; NaN as above.
     """
 
     name: str
@@ -67,6 +69,12 @@ class Row:
     fresh: float
     memory: int
     regret: float
+    excess: float
+
+    @property
+    def decides(self) -> bool:
+        """Whether it has found a design that keeps the limits."""
+        return self.excess <= KEEPS
 
 
 @dataclass(frozen=True)
@@ -92,12 +100,14 @@ class Trade:
     Attributes
     ----------
     value, optimum
-        Reference objective of the design as given, and of the reference optimum [SI]; NaN where nothing is open.
+        Reference objective of the design as given, and of the best design known [SI]; NaN where nothing is open.
     flywheel
         Crank inertia at which the constant speed was priced [kg m2], and the relative
         change of the objective that the uneven speed makes; None where no load is asked.
     time_domain
         None where mounts are rigid.
+    left_out
+        What the file asks beyond a trade, in words.
     whole
         Whether time was enough for all fidelities.
     """
@@ -108,6 +118,7 @@ class Trade:
     optimum: float
     flywheel: tuple[float, float] | None
     time_domain: TimeDomain | None
+    left_out: tuple[str, ...] = ()
     whole: bool = True
 
 
@@ -115,24 +126,16 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     """Measure every fidelity, by the first of several objectives; `ModelError` where the problem has none."""
     if not problem.objective:
         raise ModelError("a trade needs an objective; add [objective]")
-    if problem.ranks:
-        problem = problem.changed(ranks=())
-    best = reference(problem)
-    truth = objective_value(problem, best)
-    least = math.nan
-    if is_open(problem):
-        say("solving the reference")
-        engine = optimum(problem.at(Fidelity(samples=REFERENCE_STEPS)), REFERENCE_STEPS)
-        least = math.nan if engine is None else objective_value(problem, reference(problem, engine))
-        # what cancels has no share by which another design is worse
-        least = 0.0 if engine is not None and least <= nothing_of(problem, engine) else least
-    scale = Scale(problem, best)
+    left_out, problem = _left_out(problem), traded_part(problem)
+    scale = Scale.of(problem)
+    say("solving the reference")
+    decided = _Decided(scale)
     rows, whole, known = [], False, dict[tuple[Fidelity, int], Row]()
-    for name, own in ladder(problem):
+    for name, own in ladder(scale):
         say(name)
         # several tolerances may come to the same physics
         physics = replace(own.fidelity, tolerance=None), len(own.points)
-        row = replace(known[physics], name=name) if physics in known else _row(name, own, scale, truth, least)
+        row = replace(known[physics], name=name) if physics in known else _row(name, own, scale, decided)
         known[physics] = row
         if passed():
             # what a limit may have cut short is no measurement
@@ -145,7 +148,24 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     say("uneven crank speed")
     even_only = any(measure.is_inside for measure in problem.measures)
     flywheel = _price_of_constant_speed(problem) if problem.load_terms and not even_only else None
-    return Trade(problem, tuple(rows), truth, least, flywheel, _price_of_time(problem), whole)
+    return Trade(
+        problem, tuple(decided.regretted(row) for row in rows), decided.given, decided.least, flywheel,
+        _price_of_time(problem), left_out, whole,
+    )  # fmt: skip
+
+
+def traded_part(problem: Problem) -> Problem:
+    """What of a problem a trade takes: the drawing, by the first of several objectives."""
+    return problem.changed(ranks=(), over=None, assembly=None)
+
+
+def _left_out(problem: Problem) -> tuple[str, ...]:
+    told = {
+        f"Of {len(problem.ranks)} objectives in order the first is traded.": len(problem.ranks) > 1,
+        "Traded is the drawing: errors of built engines are left out.": problem.over is not None,
+        "Traded is the engine as given: no parts are chosen.": problem.assembly is not None,
+    }
+    return tuple(line for line, holds in told.items() if holds)
 
 
 def is_open(problem: Problem) -> bool:
@@ -154,51 +174,73 @@ def is_open(problem: Problem) -> bool:
 
 
 def is_local(problem: Problem) -> bool:
-    """Whether its optimum is one of many: mounts decided for loads, searched from the design as given alone."""
-    return bool(problem.mount_decisions and problem.load_terms)
+    """Whether its optimum may be one of many, and is searched for."""
+    return is_open(problem) and not is_convex(problem)
 
 
-def optimum(problem: Problem, samples: int | None = None) -> Engine | None:
-    """The best engine at a fidelity; None where it decides nothing, or finds no design within the limits (F14).
+class _Decided:
+    """What the reference decides, and each fidelity from there (F14).
 
-    Unbalances alone are decided at `samples` steps over the period of the loads, without
-    refinement. Open stars and mounts are solved as `solve` does, of the latter a few starts, of
-    both together the stars that rank first. Boxes that prove no more than a design are left out.
+    Attributes
+    ----------
+    given
+        Reference objective of the design as given.
+    least
+        Reference objective of the best design known that keeps the limits; zero of what cancels, NaN where none is.
     """
-    try:
-        plain = problem.phasing is None and not asks_runs(problem)
-        if plain and len(problem.unbalances) == len(problem.decisions):
-            model = AffineModel(problem)
-            x = solve_cones(model.at(samples or model.full_samples)).x
-            return None if x is None else problem.design([domain.complex_value(x) for domain in model.domains])
-        boxes = problem.search.boxes if any(d.kind is Kind.PLACE for d in problem.decisions) else 0
-        starts = min(problem.search.starts, STARTS_OF_MOUNTS)
-        one = replace(problem, search=replace(problem.search, starts=starts, boxes=boxes))
-        if one.phasing is not None and one.mount_decisions:
-            one = replace(one, phasing=replace(one.phasing, best=STARS_ON_OPEN_MOUNTS))
-        elif one.phasing is not None and one.phasing.continuous:
-            few = min(one.phasing.best, STARS_OF_OPEN_THROWS)
-            one = replace(one, phasing=replace(one.phasing, best=few, thorough=False))
-        result = solve(one)
-    except (SolverError, ModelError):
-        # cheap physics may leave nothing that solves: it is no choice for deciding then
+
+    def __init__(self, scale: Scale) -> None:
+        self._problem = problem = scale.problem
+        self.given, self.least = objective_value(problem, scale.best), math.nan
+        self._known: Result | None = None
+        at = problem.at(Fidelity(samples=REFERENCE_STEPS))
+        engine = None
+        with suppress(SolverError, ModelError):
+            if is_open(problem) and is_convex(problem):
+                engine = by_cones(at, REFERENCE_STEPS)
+            elif is_open(problem):
+                self._known = first_of(at)
+                engine = None if self._known is None else self._known.final.engine
+        if engine is not None:
+            self.of(engine)
+
+    def of(self, engine: Engine) -> tuple[float, float]:
+        """Reference objective of a design, and by what share it is beyond a limit."""
+        problem = self._problem
+        final = reference(problem, engine)
+        value, excess = objective_value(problem, final), final.excess(problem.limits)
+        if excess <= FEASIBLE and not self.least <= value:
+            # what cancels has no share by which another design is worse
+            self.least = 0.0 if value <= nothing_of(problem, engine) else value
+        return value, excess
+
+    def by(self, own: Problem) -> Engine | None:
+        """The design that a fidelity decides; None where it finds none within the limits."""
+        # choices about modes of open mounts would change with them, and time decides nothing
+        own = own.at(replace(own.fidelity, tolerance=None))
+        with working_on(HERE), suppress(SolverError, ModelError):
+            if is_convex(own):
+                return by_cones(own)
+            return None if self._known is None else next_to(own, self._known)
         return None
-    return result.final.engine if result.status in (Status.OPTIMAL, Status.FEASIBLE) else None
+
+    def regretted(self, row: Row) -> Row:
+        """A row with the regret of the objective that it has found."""
+        return replace(row, regret=row.regret / self.least - 1.0 if self.least > 0.0 else math.nan)
 
 
-def _row(name: str, own: Problem, scale: Scale, truth: float, least: float) -> Row:
-    evaluation = evaluate(own)
+def _row(name: str, own: Problem, scale: Scale, decided: _Decided) -> Row:
+    """What is measured of a fidelity; of its design the objective itself, until the best of all is known."""
+    evaluation, truth = evaluate(own), decided.given
     value = objective_value(own, evaluation)
     prepared, gradient = _prepared_times(own)
-    solve_time, regret = math.nan, math.nan
+    solve_time = found = excess = math.nan
     if is_open(own) and own.fidelity.mounts != "time":
-        started = time.perf_counter()
-        engine = optimum(own)
+        started = time.process_time()
+        engine = decided.by(own)
         if engine is not None:
-            solve_time = time.perf_counter() - started
-            whole = replace(own, points=tuple(loads.point for loads in scale.best.loads))
-            found = objective_value(whole, reference(whole, engine))
-            regret = found / least - 1.0 if least > 0.0 else math.nan
+            solve_time = time.process_time() - started
+            found, excess = decided.of(engine)
     fresh = seconds(lambda: _from_nothing(own))
     return Row(
         name=name,
@@ -210,7 +252,8 @@ def _row(name: str, own: Problem, scale: Scale, truth: float, least: float) -> R
         solve=solve_time,
         fresh=fresh,
         memory=_memory(lambda: _from_nothing(own)),
-        regret=regret,
+        regret=found,
+        excess=excess,
     )
 
 
@@ -281,9 +324,8 @@ def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:
 
 def seconds(work: Callable[[], object]) -> float:
     """Least time of one call, of as many as fit into a moment."""
-    work()
     times: list[float] = []
-    while len(times) < 3 or (sum(times) < _LEAST_TIME and len(times) < _MOST_REPEATS):
+    while sum(times) < _LONG and (len(times) <= 3 or (sum(times) < _LEAST_TIME and len(times) <= _MOST_REPEATS)):
         started = time.perf_counter()
         work()
         times.append(time.perf_counter() - started)

@@ -37,7 +37,7 @@ def solve_run_cones(
     steps = _Steps(problem, limits, terms, rows)
     if not steps.found():
         names = [limit.name for limit in steps.problem.load_limits]
-        return none_within(problem, evaluate(problem), conflict_of(steps.affine, names), {})
+        return none_within(problem, evaluate(problem), conflict_of(steps.affine(), names), {})
     for _ in in_time(range(_AGAIN)):
         result = decide(steps.problem)
         x = vector_of(domains_of(problem.decisions), unbalances_of(problem, result)) if result.decisions else None
@@ -47,6 +47,9 @@ def solve_run_cones(
             again = problem.at(found)
             more = RunRows.of(again, [*rows.constants])
             return solve_run_cones(again, limits, terms, more or rows, decide)
+        if x is not None and result.status is Status.FEASIBLE:
+            # the design as given may stand in the place of one that breaks steps which are not known yet
+            x = solve_cones(steps.affine(result.final.samples)).x
         if x is None or result.status is Status.INFEASIBLE or steps.has_all(x):
             break
         steps.add(x)
@@ -67,11 +70,10 @@ class _Steps:
         kept = (x for x in self._whole.limits if not x.measure.channel.is_checked or x.measure in known)
         return replace(self._whole, known_rows=known, limits=tuple(kept))
 
-    @property
-    def affine(self) -> AffineProblem:
-        """At few angles."""
+    def affine(self, samples: int = _COARSE) -> AffineProblem:
+        """At so many angles at most, few by default."""
         model = AffineModel(self.problem)
-        return model.at(min(_COARSE, model.full_samples))
+        return model.at(min(samples, model.full_samples))
 
     def add(self, x: Array) -> None:
         """Those that a design brings near the limits, and its largest."""
@@ -99,7 +101,7 @@ class _Steps:
         for _ in in_time(range(_ROUNDS)):
             self.add(x)
             tell("steps of the run-up", sum(map(len, self._places.values())))
-            solution = solve_cones(self.affine)
+            solution = solve_cones(self.affine())
             if solution.x is None:
                 return False
             x = solution.x

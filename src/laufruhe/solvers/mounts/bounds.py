@@ -14,7 +14,7 @@ from laufruhe.prove.best_first import NEARLY, Divided
 from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.prove.mounts.subdivision import divided_bound, divides
 from laufruhe.prove.springs.proof import spring_bound
-from laufruhe.solvers.conclusion import KEPT, unbalances_of
+from laufruhe.solvers.conclusion import KEPT, values_of
 from laufruhe.solvers.mounts.search import MountSearch
 from laufruhe.solvers.result import Result
 
@@ -31,7 +31,7 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
         `bounded_under`.
     """
     divided = Divided(0.0, 0)
-    if search.moves is not None or (among and not divides(problem)):
+    if search.moves is not None or not problem.search.proves or (among and not divides(problem)):
         return divided
     for _ in in_time(range(MOST_DIVISIONS)):
         found = search.chosen
@@ -64,12 +64,9 @@ def bounded_under(result: Result, value: float, enough: float = math.inf) -> Res
     problem, certificate = result.problem, result.certificate
     if certificate is None or result.objective is None or divides(problem) or problem.phasing is not None:
         return result
-    mounts = {decision.name: decision.value for decision in result.decisions}
-    own = iter(unbalances_of(problem, result))
-    near = [next(own) if d.is_affine else mounts[d.name] for d in problem.decisions]
     nothing = nothing_of(problem, result.final.engine)
     room = max(room_of(value, problem.tolerance, nothing), (value - min(enough, value)) / NEARLY)
-    found = spring_bound(problem, value, room, near)
+    found = spring_bound(problem, value, room, values_of(problem, result))
     if found.bound <= certificate.lower_bound:
         return result
     text = f"{certificate.method}; bounds of mounts looked at in {found.boxes} box{'es' if found.boxes > 1 else ''}"

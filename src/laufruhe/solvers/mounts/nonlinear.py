@@ -188,7 +188,7 @@ def _result(
     nothing = nothing_of(problem, design.evaluation.engine)
     bound = divided.bound
     # throws that move are not in the bound
-    if search.moves is None and gap_of(design.value, bound, nothing) > problem.tolerance:
+    if search.moves is None and problem.search.proves and gap_of(design.value, bound, nothing) > problem.tolerance:
         bound = max(bound, mounts_bound(problem, () if among else design.values))
     shown = Shown(
         bound=bound,

@@ -7,6 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
+from laufruhe.load_models.run_look import COARSER
 from laufruhe.machine.mount import every_spring
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.nothing import nothing_of
@@ -35,9 +36,12 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     stopped = any(spring.stop_stiffness > 0.0 for _, spring in every_spring(problem.engine.mounts))
     starts = min(problem.search.starts, STOPPED_STARTS if stopped else STARTS)
     few = replace(problem, search=replace(problem.search, starts=starts))
-    search = MountSearch(few, initial, first=None if relaxed is None else place_of(problem, relaxed), beside=True)
+    # from one start nothing is gained by looking roughly first
+    alone = starts == 1
+    first = None if relaxed is None or alone else place_of(problem, relaxed)
+    search = MountSearch(few, initial, first=first, beside=True, coarser=1 if alone else COARSER)
     search.run()
-    if not stopped and search.best is not None and search.best.design.excess <= NEAR:
+    if not stopped and not alone and search.best is not None and search.best.design.excess <= NEAR:
         search.refined()
     timing = {"solve": time.perf_counter() - started}
     found = search.chosen

@@ -83,6 +83,8 @@ class MountSearch:
         Throws that may leave the star of the problem.
     first
         Mounts and columns to start from before all others, in place of those given or `beside` them.
+    coarser
+        Times as long as those of the last word steps of run-ups are.
 
     Attributes
     ----------
@@ -94,9 +96,9 @@ class MountSearch:
 
     def __init__(
         self, problem: Problem, initial: Evaluation, workers: int | None = None, moves: ThrowMoves | None = None,
-        first: tuple[list[float], Array] | None = None, beside: bool = False,
+        first: tuple[list[float], Array] | None = None, beside: bool = False, coarser: int = COARSER,
     ) -> None:  # fmt: skip
-        self.problem, self.moves, self._workers, self._coarser = problem, moves, workers, COARSER
+        self.problem, self.moves, self._workers, self._coarser = problem, moves, workers, coarser
         tell("starts of the mounts")
         self._points, self._size = start_points(problem)
         self._points = self._points if first is None else [first, *self._points[0 if beside else 1 :]]

@@ -60,7 +60,8 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
 
     The design as given, then points spread over all bounds: stiffness by ratio,
     unbalances in their sets. The size is the least of all that were looked at, so that no
-    start on a flank of a resonance hides what is small beside it; never zero.
+    start on a flank of a resonance hides what is small beside it; never zero. Where one start is
+    asked for, the design as given is.
     """
     domains, balanced, search = domains_of(problem.unbalances), _balanced(problem), problem.search
     decisions = problem.mount_decisions
@@ -70,20 +71,23 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     given = np.array([d.start_number for d in decisions])
     low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
     wide = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
+    best = columns_of(domains, [d.start for d in problem.unbalances] if balanced is None else balanced)
+    initial = evaluate_start(problem)
+    # on a resonance a search has nowhere to go
+    found = [] if initial.resonance else [(given.tolist(), best)]
+    wanted = starts - len(found)
+    if not wanted:
+        return found, objective_value(problem, initial) or 1.0
     spread = spread_starts(
         np.concatenate([low_log, -wide]),
         np.concatenate([high_log, wide]),
         POOL * (starts + 1) * (RUN_POOL if asks_runs(problem) else 1),
         search.seed,
     )
-    best = columns_of(domains, [d.start for d in problem.unbalances] if balanced is None else balanced)
-    initial = evaluate_start(problem)
-    # on a resonance a search has nowhere to go
-    found = [] if initial.resonance else [(given.tolist(), best)]
     spread[:, : len(low)] = np.where(ratio, np.exp(np.where(ratio, spread[:, : len(low)], 0.0)), spread[:, : len(low)])
     spread[:, : len(low)] = np.clip(spread[:, : len(low)], low, high)
     with limited(LOOKING * left()):
-        rows, size = _promising(problem, initial, spread, len(low), starts - len(found))
+        rows, size = _promising(problem, initial, spread, len(low), wanted)
     for k, row in enumerate(rows):
         mounts = row[: len(low)]
         own = row[len(low) :].copy()

@@ -102,7 +102,7 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
         why = f"no feasible design was found in phasing.time_limit = {phasing.time_limit:g} s; raise it"
         return no_star(problem, why, Status.FAILED)
     result = _best_of(problem, phasing, answer)
-    if answer.complete:
+    if answer.complete and problem.search.proves:
         result = _with_more_angles(problem, families, result)
     return _uneven(problem, phasing, result) if phasing.continuous else result
 

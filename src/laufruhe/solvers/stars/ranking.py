@@ -250,6 +250,18 @@ def ranked_star(
     )  # fmt: skip
 
 
+def candidates_of(phasing: Phasing, ranking: Sequence[RankedStar], orders: int = 1) -> list[Candidate]:
+    """The designs of a ranking, each star with the first few of its firing orders."""
+    return [
+        Candidate(
+            s.throws, fired.order, s.bank_angle, s.split_pin,
+            tuple(name for names in phasing.shafts.optional for name in names if name not in s.shafts),
+        )
+        for s in ranking
+        for fired in s.firing_orders[:orders]
+    ]  # fmt: skip
+
+
 def ranking_result(
     phasing: Phasing, best: Candidate, ranking: Sequence[RankedStar], designs: int, looked_at: int, method: str
 ) -> PhasingResult:

@@ -25,7 +25,7 @@ from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, OrderCriteri
 from laufruhe.problem.problem import Phasing
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.ranking import ends_of, none_of_given, ranked_orders
+from laufruhe.solvers.stars.ranking import candidates_of, ends_of, none_of_given, ranked_orders
 
 ORDERS_WITH_GAS = 2
 # cranks that are compared by order alone, and by the exact model
@@ -56,15 +56,8 @@ def starts_of(phasing: Phasing, even: Result | None, with_gas: bool = False) -> 
         Whether gas is felt: firing orders of one star then differ, and so does the star that
         turns the other way, which inertia alone cannot tell from it.
     """
-    optional = [name for names in phasing.shafts.optional for name in names]
     if even is not None and even.phasing is not None:
-        candidates = [
-            Candidate(
-                s.throws, firing.order, s.bank_angle, s.split_pin, tuple(n for n in optional if n not in s.shafts)
-            )
-            for s in even.phasing.ranking
-            for firing in s.firing_orders[: ORDERS_WITH_GAS if with_gas else 1]
-        ]
+        candidates = candidates_of(phasing, even.phasing.ranking, ORDERS_WITH_GAS if with_gas else 1)
     else:
         geometries = itertools.product(_ends(phasing.bank), _ends(phasing.split))
         if phasing.throw_bounds is not None:

@@ -147,8 +147,13 @@ def _none(problem: Problem, phasing: Phasing, searched: Searched | None) -> Resu
     return no_star(problem, f"no crank was found that keeps {names}{left}; relax them, or open more", Status.FAILED)
 
 
-def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> StarDesign | None:
-    """The local optimum that one star leads to; the star itself where nothing is better (S20)."""
+def local_optimum(
+    phasing: Phasing, start: Candidate, intervals: Intervals, beside: bool = True
+) -> StarDesign | None:  # fmt: skip
+    """The local optimum that one star, and points `beside` it, lead to; the star itself where nothing is better (S20).
+
+    What is an optimum of a problem that differs little is no saddle, and needs no points beside it.
+    """
     best = _evaluated(phasing, start, 0.0, moved=False)
     if best is not None and not _is_kept(best):
         best = None
@@ -167,7 +172,7 @@ def local_optimum(phasing: Phasing, start: Candidate, intervals: Intervals) -> S
     for _ in range(_ATTEMPTS):
         smooth = SmoothProgram(problem, _size(problem, best), margin, moves, slack=SOFT_LIMIT, softest=SOFTEST)
         least = math.inf
-        starts = _points(smooth, best)
+        starts = _points(smooth, best)[: None if beside else 1]
         for optimum in solve_nonlinear(smooth.program, starts, workers=1, max_seconds=30.0, enough=try_all):
             if not optimum.usable:
                 continue

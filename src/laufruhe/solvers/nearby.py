@@ -1,0 +1,151 @@
+"""A problem that differs little from one that is solved, decided from the designs that are known of that (F14).
+
+Nothing is proven of what is found, so nothing is divided for a proof either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+from laufruhe.errors import ModelError, SolverError
+from laufruhe.load_models.affine import AffineModel
+from laufruhe.load_models.run_look import asks_runs
+from laufruhe.load_models.throw_moves import ThrowMoves
+from laufruhe.machine import Engine
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.problem import Phasing, Problem, Search
+from laufruhe.solvers import kinds_of, solve
+from laufruhe.solvers.conclusion import given_design, values_of
+from laufruhe.solvers.cones.conic import solve_cones
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.stars.ranking import candidates_of
+
+STARTS, STARS, STARS_THAT_MOVE = 3, 3, 2
+"""Of a first search where mounts are open, and stars that are ranked; fewer of them where mounts or throws move too."""
+LIKE = 0.1
+"""Share by which what is minimised of a design known may differ where searches from it are enough."""
+STEPS = 96
+"""Over the cycle, by which stars that stand on even steps are ranked."""
+
+
+def is_convex(problem: Problem) -> bool:
+    """Whether unbalances alone are open, and loads alone are asked about."""
+    return problem.phasing is None and len(problem.unbalances) == len(problem.decisions) and not asks_runs(problem)
+
+
+def by_cones(problem: Problem, samples: int | None = None) -> Engine | None:
+    """The best unbalances at some steps over the period of the loads, all by default, without refinement."""
+    model = AffineModel(problem)
+    x = solve_cones(model.at(samples or model.full_samples)).x
+    return None if x is None else problem.design([domain.complex_value(x) for domain in model.domains])
+
+
+def first_of(problem: Problem) -> Result | None:
+    """A search as `solve` has it, with a few starts, and without boxes that prove no more than a design."""
+    phasing = problem.phasing
+    if phasing is not None:
+        moves = phasing.continuous or bool(problem.mount_decisions)
+        few = min(phasing.best, STARS_THAT_MOVE if moves else STARS)
+        problem = replace(problem, phasing=replace(phasing, best=few, thorough=False))
+    result = solve(replace(problem, search=_unproven(problem, STARTS)))
+    return result if result.status in (Status.OPTIMAL, Status.FEASIBLE) else None
+
+
+def next_to(problem: Problem, known: Result) -> Engine | None:
+    """The best engine that searches from known designs find; None where none of them ends within the limits.
+
+    Parameters
+    ----------
+    known
+        Of a problem with the same decisions: where numbers are sought from, and the stars that are compared.
+    """
+    phasing = problem.phasing
+    if phasing is not None and not (phasing.continuous or problem.mount_decisions):
+        # the best of many stars may be far from the best known
+        return _of_stars(problem, first_of(problem.at(_coarse(problem.fidelity))) or known)
+    engines = [_from(problem, known) if phasing is None else _of_stars(problem, known)]
+    if not _is_like(problem, known):
+        with suppress(SolverError, ModelError):
+            engines.append(_engine(first_of(problem)))
+    return _best(problem, engines)
+
+
+def _is_like(problem: Problem, known: Result) -> bool:
+    """Whether the design known is worth about the same here; else the best may be anywhere."""
+    value = objective_value(problem, evaluate(problem, known.final.engine))
+    return known.objective is not None and abs(value - known.objective.value) <= LIKE * known.objective.value
+
+
+def _best(problem: Problem, engines: Sequence[Engine | None]) -> Engine | None:
+    """Of several, where there are any."""
+    designs = [given_design(problem, evaluate(problem, engine)) for engine in engines if engine is not None]
+    best = min((design for design in designs if design is not None), key=lambda design: design.rank, default=None)
+    return None if best is None else best.evaluation.engine
+
+
+def _of_stars(problem: Problem, known: Result) -> Engine | None:
+    """The best of the stars that rank first, with throws that move from it where these may."""
+    phasing = problem.phasing
+    if phasing is None or known.phasing is None:
+        return None
+    stars: dict[Engine, Candidate] = {}
+    for candidate in candidates_of(phasing, known.phasing.ranking)[:STARS]:
+        star = replace(phasing.realise(candidate), phasing=None)
+        engine = _from(star, known) if star.decisions else star.engine
+        if engine is not None:
+            stars[engine] = candidate
+    best = _best(problem, [*stars])
+    if best is None or not phasing.continuous:
+        return best
+    return _moved(phasing, stars[best], known) or best
+
+
+def _coarse(fidelity: Fidelity) -> Fidelity:
+    """The same physics at steps that are enough to tell stars apart."""
+    return replace(fidelity, samples=min(fidelity.samples, STEPS), gas_samples=fidelity.gas_steps)
+
+
+def _moved(phasing: Phasing, star: Candidate, known: Result) -> Engine | None:
+    """The best engine with throws that move from a star."""
+    problem = replace(phasing.realise(star), phasing=None)
+    if problem.mount_decisions:
+        from laufruhe.solvers.mounts.nonlinear import solve_moved
+
+        moves = ThrowMoves(phasing, phasing.layout_of(star), star, phasing.intervals)
+        return _engine(solve_moved(_begun(problem, known), moves, None)[0])
+    from laufruhe.solvers.throws.uneven import local_optimum
+
+    found = local_optimum(phasing, star, phasing.intervals, beside=False)
+    return None if found is None else _engine(found.result)
+
+
+def _from(problem: Problem, known: Result) -> Engine | None:
+    """The best numbers: of a convex problem from anywhere, else from those known."""
+    return by_cones(problem) if is_convex(problem) else _engine(solve(_begun(problem, known)))
+
+
+def _begun(problem: Problem, known: Result) -> Problem:
+    """The problem as it would stand with known values, to be searched from there alone."""
+    values = values_of(problem, known)
+    numbers = problem.numbers(values)
+    decisions = tuple(replace(d, start=value) for d, value in zip(problem.decisions, values, strict=True))
+    return replace(
+        problem, engine=numbers.engine(problem.engine), decisions=decisions, search=_unproven(problem, 1),
+        mount_numbers=tuple(tuple(row) for row in numbers.mounts) or problem.mount_numbers,
+    )  # fmt: skip
+
+
+def _unproven(problem: Problem, starts: int) -> Search:
+    """With so many starts at most, and boxes where these find a design alone."""
+    boxes = problem.search.boxes if Kind.PLACE in kinds_of(problem) else 0
+    return replace(problem.search, starts=min(problem.search.starts, starts), boxes=boxes, proves=False)
+
+
+def _engine(result: Result | None) -> Engine | None:
+    met = result is not None and result.status in (Status.OPTIMAL, Status.FEASIBLE)
+    return result.final.engine if result is not None and met else None

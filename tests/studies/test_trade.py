@@ -1,0 +1,109 @@
+"""What a trade says of a fidelity's decision: how much worse it is, whether it keeps the limits, and what is left."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import laufruhe
+from cli import scenes
+from laufruhe.cli.fidelity import traded
+from laufruhe.fidelity.error_bounds import reference
+from laufruhe.files.reader import load
+from laufruhe.machine import Engine
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.report.trade import choices, index, trade_document
+from laufruhe.solvers.conclusion import values_of
+from laufruhe.solvers.nearby import first_of, next_to
+from laufruhe.solvers.result import Status
+from laufruhe.studies.trade import Row, Trade
+from problem_files import PROBLEMS
+
+
+def _worth(problem: Problem, engine: Engine | None) -> float:
+    assert engine is not None
+    return objective_value(problem, reference(problem, engine))
+
+
+def _row(name: str, solve: float, regret: float, excess: float) -> Row:
+    return Row(name, 1e-6, 1e-5, 1e-5, 2e-5, solve, 1e-3, 100_000, regret, excess)
+
+
+def _trade(*rows: Row) -> Trade:
+    problem = scenes.problem_of(scenes.TIGHT)
+    return Trade(problem, rows, 2.0, 1.0, None, None)
+
+
+def test_a_design_beyond_a_limit_is_no_decision() -> None:
+    """However much better it looks by the objective alone."""
+    quick, sound = _row("quick", 1e-3, -0.2, 0.12), _row("sound", 1.0, 1e-6, 2e-7)
+    assert choices(_trade(quick, sound))[1] == sound
+    assert choices(_trade(quick))[1] is None
+    page = str(trade_document(_trade(quick, sound), None, "trade"))
+    assert "12 % beyond a limit" in page
+    assert "-2.0e-01" not in page
+    assert "no fidelity decides as well" in index([_trade(quick)])
+
+
+@pytest.mark.slow
+def test_a_cheap_model_may_take_another_star() -> None:
+    """One that the reference ranks far behind: what a fidelity decides is what a whole search of it decides."""
+    problem, cheap = load(PROBLEMS / "inline-five-torsion.toml"), Fidelity(samples=96, orders=4, gas_samples=1440)
+    known = first_of(problem.at(Fidelity()))
+    assert known is not None
+    whole = laufruhe.solve(problem.at(cheap))
+    found = _worth(problem, next_to(problem.at(cheap), known))
+    assert found == pytest.approx(_worth(problem, whole.final.engine), rel=1e-6)
+    assert found > 1.1 * _worth(problem, known.final.engine)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["powertrain-joined-springs", "inline-five-damper"])
+def test_nothing_is_lost_by_searching_nearby(name: str) -> None:
+    """By its own measure a fidelity that is about right finds a design no worse than a search from nothing does."""
+    problem, cheap = load(PROBLEMS / f"{name}.toml"), Fidelity(samples=360, orders=8, gas_samples=1440)
+    known, own = first_of(problem.at(Fidelity())), problem.at(cheap)
+    assert known is not None
+    anew, near = first_of(own), next_to(own, known)
+    assert anew is not None
+    assert near is not None
+    values = [objective_value(own, evaluate(own, engine)) for engine in (near, anew.final.engine)]
+    assert values[0] <= values[1] * (1.0 + 1e-5)
+
+
+@pytest.mark.slow
+def test_limits_of_a_run_up_are_decided_by_from_a_good_start_too() -> None:
+    """A design as given that keeps them is not taken for the best because a better one breaks a step or two."""
+    problem = load(PROBLEMS / "soft-single-run-up.toml").at(Fidelity(samples=720, mounts="rigid"))
+    whole = laufruhe.solve(problem)
+    start = laufruhe.solve(problem.at(Fidelity(samples=720)))
+    assert start.objective is not None
+    values = values_of(problem, start)
+    decisions = tuple(replace(d, start=value) for d, value in zip(problem.decisions, values, strict=True))
+    again = laufruhe.solve(replace(problem, engine=start.final.engine, decisions=decisions))
+    assert whole.objective is not None
+    assert again.objective is not None
+    assert again.objective.value == pytest.approx(whole.objective.value, rel=1e-5)
+    assert again.status is Status.OPTIMAL
+
+
+@pytest.mark.slow
+def test_an_index_lists_what_nothing_is_traded_for(tmp_path: Path) -> None:
+    paths = [PROBLEMS / f"{name}.toml" for name in ("waterworks-steam-pump", "boxer-four")]
+    text, _ = traded(paths, tmp_path / "trade", lambda _: None)
+    lines = text.splitlines()
+    pump, boxer = (next(line for line in lines if path.stem in line) for path in paths)
+    assert "nothing is open" in boxer
+    assert "the flywheel is open" in pump
+    assert {entry.name for entry in (tmp_path / "trade").glob("*.md")} == {"README.md", "boxer-four.md"}
+
+
+def test_what_a_file_asks_beyond_a_trade_is_told() -> None:
+    first = ("Of 2 objectives in order the first is traded.",)
+    found = replace(_trade(_row("one", 1.0, 0.0, math.nan)), left_out=first)
+    assert first[0] in str(trade_document(found, None, "trade"))
