@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import ast
 import json
+import sys
 from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from laufruhe.files.hover import alternatives, kind
-
 DOCS = Path(__file__).parents[1]
+sys.path.append(str(DOCS.parent / "tests"))
+
+from schemas import alternatives, kind  # noqa: E402
+
 HEAD = "| key | type | meaning | example |\n| --- | --- | --- | --- |\n"
 KEYS = """\
 # All keys

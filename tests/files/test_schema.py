@@ -6,7 +6,6 @@ import copy
 import json
 import re
 import tomllib
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +13,10 @@ import jsonschema
 import pytest
 
 from laufruhe import units
-from laufruhe.files.problem_file import schema
 from laufruhe.files.reader import load
 from laufruhe.files.ready import schema_file
-from laufruhe.studies.reader import study_schema
 from problem_files import PROBLEMS, READY
+from schemas import WORDS, schema, study_schema
 
 LANCHESTER = next(path for path in READY if path.stem == "tractor-four-lanchester")
 STUDIES = [path for path in sorted(PROBLEMS.glob("*.toml")) if path not in READY]
@@ -123,7 +121,7 @@ def test_words_of_keys_are_of_keys_that_there_are() -> None:
         for name, table in {tables["title"]: tables, **tables["definitions"]}.items():
             told = table.get("properties", {})
             keys |= {*told, *(f"{name.rpartition('__')[2]}.{key}" for key in told)}
-    words = tomllib.loads((files("laufruhe.files") / "hover.toml").read_text(encoding="utf-8"))
+    words = tomllib.loads(WORDS.read_text(encoding="utf-8"))
     assert not {*words["words"], *words["examples"]} - keys
 
 

@@ -10,11 +10,9 @@ from importlib.resources import files
 from typing import Any
 
 from laufruhe.files.complaints import Refused, nearest
-from laufruhe.machine.layouts import LAYOUTS
 
 KEY = "catalogue"
 """Of [engine]; `engine = "name"` says the same."""
-_TOLD = "Engine of the catalogue (laufruhe engines) that supplies every key which this table does not give."
 # of each two one is given: whoever gives one means it
 _EITHER = (("rod_ratio", "rod_length"), ("rod", "rod_inertia_deficit"))
 _PHASES = ("throws", "firing_order")
@@ -104,19 +102,3 @@ def with_catalogue(tables: dict[str, Any]) -> dict[str, Any]:
 def shown(value: Any) -> str:
     """A value as a sentence has it."""
     return "-".join(map(str, value)) if isinstance(value, list) else str(value)
-
-
-def with_catalogue_key(schema: dict[str, Any]) -> None:
-    """[engine] in a schema: a table, in which an engine of the catalogue may stand for the rest, or its name.
-
-    One schema for both, so that an editor marks the key that is wrong and not the whole table.
-    """
-    required, names = schema.pop("required"), list(engines())
-    schema["type"], schema["pattern"] = ["object", "string"], f"^({'|'.join(names)})$"
-    schema["properties"] = {KEY: {"enum": names, "description": _TOLD}, **schema["properties"]}
-    pistons = {"required": [*required, "stroke", "reciprocating_mass"]}
-    without = {
-        "required": required,
-        "properties": {"layout": {"enum": [k for k, v in LAYOUTS.items() if not v.has_pistons]}},
-    }
-    schema["anyOf"] = [{"type": "string"}, {"required": [KEY]}, pistons, without]

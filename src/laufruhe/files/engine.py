@@ -6,11 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
-from laufruhe.files.catalogue import with_catalogue_key
 from laufruhe.files.complaints import Refused, blamed_on, nearest, none_of, one_of
 from laufruhe.files.engine_keys import BigEndTable, RodTable, ShaftTable, SliderCrankTable, with_owned_keys
 from laufruhe.files.fields import CylinderNumber, Open, Table
@@ -35,8 +34,6 @@ _INHERITED = {"stroke", "bore", "offset", "reciprocating_mass", "rod_inertia_def
 @with_owned_keys
 class EngineTable(Table):
     """What the engine is."""
-
-    model_config = ConfigDict(json_schema_extra=with_catalogue_key)
 
     layout: str
     drive: str

@@ -1,11 +1,10 @@
-"""A whole problem file, and its JSON schema that ships with the package (docs/reference/problem-files.md)."""
+"""A whole problem file (docs/reference/problem-files.md)."""
 
 from __future__ import annotations
 
-import json
-from typing import Annotated, Any
+from typing import Annotated
 
-from pydantic import BaseModel, Field
+from pydantic import Field
 
 from laufruhe.files import fields as f
 from laufruhe.files.asked import ConstraintTable, ObjectiveTable
@@ -18,7 +17,6 @@ from laufruhe.files.flywheel import FlywheelTable
 from laufruhe.files.friction import FrictionTable
 from laufruhe.files.gas import GasTable
 from laufruhe.files.geared import GearedInertiaTable
-from laufruhe.files.hover import explained
 from laufruhe.files.load_cases import LoadCaseTable
 from laufruhe.files.mounts import BlockTable, MountsTable
 from laufruhe.files.operating_points import OperatingPointTable
@@ -83,16 +81,3 @@ class ProblemFile(Table):
         """What stands here that needs a single objective only."""
         given = [key for key in ("assembly", "robust") if getattr(self, key) is not None]
         return [*given, *(["fidelity.kinematics"] if self.fidelity.kinematics == "auto" else [])]
-
-
-def schema() -> str:
-    """The schema as the models have it now."""
-    return schema_text(ProblemFile)
-
-
-def schema_text(model: type[BaseModel]) -> str:
-    """The schema of a file in the draft that editors support."""
-    found = model.model_json_schema(ref_template="#/definitions/{model}")
-    whole: dict[str, Any] = {"$schema": "http://json-schema.org/draft-07/schema#", **found}
-    whole["definitions"] = whole.pop("$defs")
-    return json.dumps(explained(whole), indent=2, ensure_ascii=False) + "\n"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,8 +14,6 @@ from laufruhe.errors import Complaint, InputError, refused
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.fields import Table
-from laufruhe.files.hover import HOVER
-from laufruhe.files.problem_file import schema_text
 from laufruhe.files.reader import given
 from laufruhe.files.study_tables import MOST_POINTS, joined
 from laufruhe.studies.kinds import KINDS
@@ -104,28 +101,3 @@ def _check_quantities(part: Part, path: Path, where: str) -> None:
         except Refused as error:
             found = error.complaint
             raise InputError(str(path), (replace(found, where=f"{where}.{key}.{found.where}"),)) from None
-
-
-def study_schema() -> str:
-    """The schema of study files, for editors: what a part leaves out may stand in [study.common]."""
-    found = json.loads(schema_text(StudyFile))
-    holder = found["definitions"]["StudyTable"]["properties"]["parts"]
-    kinds = {kind: ref.rsplit("/", 1)[1] for kind, ref in holder["items"]["discriminator"]["mapping"].items()}
-    keys: dict[str, Any] = {}
-    for name in kinds.values():
-        found["definitions"][name].pop("required", None)
-        told = found["definitions"][name]["properties"]
-        keys |= {key: {word: one[word] for word in HOVER} for key, one in told.items()}
-    # a condition for each kind: an editor then marks the key that is wrong, and not the whole part
-    holder["items"] = {
-        "type": "object",
-        "properties": {**keys, "kind": {**keys["kind"], "enum": list(kinds)}},
-        "allOf": [
-            {
-                "if": {"properties": {"kind": {"const": kind}}, "required": ["kind"]},
-                "then": {"$ref": f"#/definitions/{name}"},
-            }
-            for kind, name in kinds.items()
-        ],
-    }
-    return json.dumps(found, indent=2, ensure_ascii=False) + "\n"

@@ -1,6 +1,7 @@
-"""What editors say of every key of a schema: its meaning, its kind with the unit, and an example.
+"""The JSON schemas that ship with the package, made of the models: `python tests/schemas.py` writes them.
 
-What a field says of itself comes first. Keys that mean the same wherever they stand have their words in `hover.toml`.
+Every key has its meaning, its kind with the unit, and an example. What a field says of itself comes first. Keys that
+mean the same wherever they stand have their words in `hover.toml`.
 """
 
 from __future__ import annotations
@@ -9,8 +10,19 @@ import json
 import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 from typing import Any
+
+from pydantic import BaseModel
+
+from laufruhe.files import problem_file, ready
+from laufruhe.files.catalogue import KEY, engines
+from laufruhe.files.problem_file import ProblemFile
+from laufruhe.machine.layouts import LAYOUTS
+from laufruhe.studies.reader import StudyFile
+
+WORDS = Path(__file__).with_name("hover.toml")
+FOLDER = Path(problem_file.__file__).parent
 
 _PLAIN = {
     "integer": "whole number",
@@ -20,6 +32,7 @@ _PLAIN = {
     "object": "table",
 }
 _NUMBERS: Mapping[str, Any] = {"integer": 1, "number": 1.0, "string": "text", "boolean": True}
+TOLD = "Engine of the catalogue (laufruhe engines) that supplies every key which this table does not give."
 HOVER = ("description", "examples", "x-taplo")
 """What of a key an editor shows."""
 # a table within tables within a table is told by where it stands itself
@@ -28,7 +41,7 @@ _DEPTH = 4
 
 @cache
 def _told() -> dict[str, dict[str, Any]]:
-    return tomllib.loads((files("laufruhe.files") / "hover.toml").read_text(encoding="utf-8"))
+    return tomllib.loads(WORDS.read_text(encoding="utf-8"))
 
 
 def explained(schema: dict[str, Any]) -> dict[str, Any]:
@@ -129,3 +142,69 @@ def _of(schema: Mapping[str, Any], one: Mapping[str, Any], depth: int) -> Any:
         inner = {key: (one["properties"][key], f"{one.get('title', '')}.{key}") for key in wanted}
         return {key: _example(schema, entry, path, depth - 1) for key, (entry, path) in inner.items()}
     return _NUMBERS.get(str(one.get("type")), {})
+
+
+def schema() -> str:
+    """The schema of problem files as the models have it now."""
+    return _text(_schema(ProblemFile))
+
+
+def _schema(model: type[BaseModel]) -> dict[str, Any]:
+    """In the draft that editors support."""
+    found = model.model_json_schema(ref_template="#/definitions/{model}")
+    whole: dict[str, Any] = {"$schema": "http://json-schema.org/draft-07/schema#", **found}
+    whole["definitions"] = whole.pop("$defs")
+    if "EngineTable" in whole["definitions"]:
+        _with_catalogue_key(whole["definitions"]["EngineTable"])
+        whole["definitions"]["EngineTable"] = dict(sorted(whole["definitions"]["EngineTable"].items()))
+    return explained(whole)
+
+
+def _text(schema: dict[str, Any]) -> str:
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+
+
+def _with_catalogue_key(schema: dict[str, Any]) -> None:
+    """[engine] in a schema: a table, in which an engine of the catalogue may stand for the rest, or its name.
+
+    One schema for both, so that an editor marks the key that is wrong and not the whole table.
+    """
+    required, names = schema.pop("required"), list(engines())
+    schema["type"], schema["pattern"] = ["object", "string"], f"^({'|'.join(names)})$"
+    schema["properties"] = {KEY: {"description": TOLD, "enum": names}, **schema["properties"]}
+    pistons = {"required": [*required, "stroke", "reciprocating_mass"]}
+    without = {
+        "properties": {"layout": {"enum": [k for k, v in LAYOUTS.items() if not v.has_pistons]}},
+        "required": required,
+    }
+    schema["anyOf"] = [{"type": "string"}, {"required": [KEY]}, pistons, without]
+
+
+def study_schema() -> str:
+    """The schema of study files, for editors: what a part leaves out may stand in [study.common]."""
+    found = _schema(StudyFile)
+    holder = found["definitions"]["StudyTable"]["properties"]["parts"]
+    kinds = {kind: ref.rsplit("/", 1)[1] for kind, ref in holder["items"]["discriminator"]["mapping"].items()}
+    keys: dict[str, Any] = {}
+    for name in kinds.values():
+        found["definitions"][name].pop("required", None)
+        told = found["definitions"][name]["properties"]
+        keys |= {key: {word: one[word] for word in HOVER} for key, one in told.items()}
+    # a condition for each kind: an editor then marks the key that is wrong, and not the whole part
+    holder["items"] = {
+        "type": "object",
+        "properties": {**keys, "kind": {**keys["kind"], "enum": list(kinds)}},
+        "allOf": [
+            {
+                "if": {"properties": {"kind": {"const": kind}}, "required": ["kind"]},
+                "then": {"$ref": f"#/definitions/{name}"},
+            }
+            for kind, name in kinds.items()
+        ],
+    }
+    return _text(found)
+
+
+if __name__ == "__main__":
+    for name, text in zip(ready.SCHEMAS, (schema(), study_schema()), strict=True):
+        (FOLDER / name).write_text(text, encoding="utf-8")
