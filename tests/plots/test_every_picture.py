@@ -15,10 +15,11 @@ from cli import scenes
 from lanes import first_fast
 from laufruhe.plots import figures, style
 from laufruhe.plots.results import firings, torque, twist_modes
-from laufruhe.plots.words import FAINT, INK, READ, contrast, grouped, ink_on, legible, rows_of, spread, typeset, wrapped
+from laufruhe.plots.words import FAINT, INK, READ, contrast, grouped, ink_on, legible, spread, typeset, wrapped
 from laufruhe.present.pictures import PICTURES
 from laufruhe.solvers import Result
 from laufruhe.studies import picture
+from laufruhe.studies.picture import rows_of
 from picture_faults import faults_of
 from problem_files import FOUR, MOUNTS, changed, shaft
 
@@ -131,6 +132,6 @@ def test_words_are_set_as_print_sets_them() -> None:
     assert typeset("throw [deg]") == "throw [°]"
     assert grouped("−12500.5") == "−12\u2009500.5"
     assert grouped("2500") == "2500"
-    assert [rows_of(count, 6) for count in (0, 1, 6, 7, 8, 13)] == [1, 1, 6, 4, 4, 5]
+    assert [rows_of(count, 6)[1] for count in (0, 1, 6, 7, 8, 13)] == [1, 1, 6, 4, 4, 5]
     assert " ".join(wrapped("one two three four", 0.6)) == "one two three four"
     assert len(wrapped("one two three four", 0.6)) > 1

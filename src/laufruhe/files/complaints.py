@@ -194,12 +194,12 @@ def measured(text: str, unit: str, where: str, given: str | None = None) -> floa
 
 
 @contextmanager
-def blamed_on(where: str) -> Iterator[None]:
-    """A machine that cannot exist is the fault of this key."""
+def blamed_on(where: str, value: str = "") -> Iterator[None]:
+    """A machine that cannot exist is the fault of this key, at which a value stands."""
     try:
         yield
     except ModelError as error:
-        found = Complaint.of(error, where, remedy="correct it")
+        found = Complaint.of(error, where, value, remedy="correct it")
         raise Refused(found.where, found.value or None, found.rule, found.remedy) from None
 
 

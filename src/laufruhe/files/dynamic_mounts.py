@@ -8,9 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from laufruhe.errors import ModelError
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, measured
+from laufruhe.files.complaints import Refused, blamed_on, measured
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Table
 from laufruhe.machine.dynamic import Dynamic, FluidTrack, MeasuredStiffness
@@ -71,10 +70,7 @@ def _measured(table: DynamicStiffnessTable, folder: Path, where: str) -> Measure
             raise Refused(f"{where}.file", table.file, rule, "give it from 0 to 180, or set columns")
         value = amount * np.exp(1j * math.radians(other)) if by_angle else complex(amount, other)
         values.append(complex(unit * value))
-    try:
+    with blamed_on(f"{where}.file", table.file):
         return MeasuredStiffness(
             _AXES.index(table.axis), tuple(math.tau * hertz * row[0] for row in rows), tuple(values)
         )
-    except ModelError as error:
-        rule, _, remedy = str(error).partition("; ")
-        raise Refused(f"{where}.file", table.file, rule, remedy) from None

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from laufruhe import units
-from laufruhe.errors import ModelError
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, measured, one_of
+from laufruhe.files.complaints import Refused, blamed_on, measured, one_of
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Table
 from laufruhe.machine import Cycle
@@ -105,14 +104,11 @@ class Brake:
     def _friction(self, speed: float, where: str) -> Friction:
         if self.table.fmep is not None:
             return Friction(self.table.fmep, self.table.deviation or 0.0)
-        try:
-            own = self._at(speed)
+        own = self._at(speed)
+        with blamed_on("friction.file", self.table.file or ""):
             if self.table.kind == "motoring":
                 return motoring_friction([row[0] for row in own], [row[1] for row in own], speed)
             if len(own) < FEWEST:
                 rule = f"has {len(own)} points at {units.shown(speed, 'rad/s')} of {where}, and a line takes {FEWEST}"
                 raise Refused("friction.file", self.table.file, rule, "measure more loads at that speed")
             return willans_friction([row[1] for row in own], [row[2] for row in own])
-        except ModelError as error:
-            rule, _, remedy = str(error).partition("; ")
-            raise Refused("friction.file", self.table.file, rule, remedy) from None

@@ -149,11 +149,6 @@ def left_out(largest: float, most: float, unit: str) -> str:
     return "none: balanced" if largest <= NOTHING * most else f"at most {number(largest, 2)} {unit}"
 
 
-def rows_of(count: int, most: int) -> int:
-    """Side by side in as few rows as hold at most so many each, all about as long: 8 of at most 6 are 4 and 4."""
-    return math.ceil(count / math.ceil(count / most)) if count else 1
-
-
 def apart(texts: Sequence[Text], room: float = 1.15) -> None:
     """Words that would cover each other moved up and down, as little as may be."""
     left = [(text, text.get_window_extent()) for text in texts]

@@ -10,6 +10,7 @@ from laufruhe.machine import Chambers
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
+from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torsion import has_torsion
 from laufruhe.problem.channels import CRANK_PIN_FORCE, FRICTION_POWER, MAIN_BEARING_FORCE, MOUNT_FORCE, LoadChannel
 from laufruhe.problem.channels.torsional import SHAFT_STRESS, SHAFT_TORQUE
@@ -175,3 +176,10 @@ def as_crank_turns(design: Evaluation, steps: int) -> ComplexArray:
 def objective_unit(result: Result) -> str:
     """SI unit of what was minimised; empty where nothing was."""
     return result.objective.unit if result.objective else ""
+
+
+def asks_torque(result: Result) -> bool:
+    """Whether a flywheel is told, or the inside of the crankcase is asked for."""
+    problem = result.problem
+    asked = any(measure.is_inside for measure in problem.measures)
+    return asked or turning_inertia(result.final.engine, problem.fidelity) is not None

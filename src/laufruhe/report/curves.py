@@ -15,9 +15,8 @@ from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torque import torque_parts
 from laufruhe.physics.torsion import chain_of
 from laufruhe.present.chambers import indicator_of, points_with_chambers, rotor_chambers, rotors_of
-from laufruhe.present.measures import has_loads, has_ranking, objective_unit, ranking_of
+from laufruhe.present.measures import asks_torque, has_loads, has_ranking, objective_unit, ranking_of
 from laufruhe.present.numbers import RPM
-from laufruhe.present.torque import asks_torque
 from laufruhe.present.torsion import facts_of, is_twisted, speed_range, speeds_between, torque_over_speed
 from laufruhe.problem.curves import STEPS
 from laufruhe.report.part_curves import PART_CURVES

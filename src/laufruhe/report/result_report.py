@@ -9,7 +9,7 @@ from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Il
 from laufruhe.report.sections import tables_of
 from laufruhe.report.sections.reach import sentences
 from laufruhe.report.versions import versions
-from laufruhe.report.wording import accuracy, explained, fired, headline, why_star
+from laufruhe.report.wording import explained, fidelity_of, fired, headline, why_star
 from laufruhe.solvers.result import Result
 
 
@@ -42,19 +42,8 @@ def _blocks(result: Result, pictures: Sequence[str], command: str) -> Iterator[B
     yield Heading("Proof")
     yield Paragraph(explained(result))
     yield Heading("Fidelity")
-    yield Paragraph(_fidelity(result))
+    yield Paragraph(fidelity_of(result))
     yield Heading("Reproduce")
     yield Code(" ".join(command.split()))
     made = ", ".join(f"{name} {version}" for name, version in versions().items())
     yield Paragraph(f"Made with {made}.", marked=True)
-
-
-def _fidelity(result: Result) -> str:
-    f = result.problem.fidelity
-    text = f"{f.summary.capitalize()}, {result.final.samples} steps over the working cycle."
-    if result.objective is None:
-        return text
-    error = accuracy(result)
-    if f.tolerance is not None:
-        return f"{text} Chosen for an error of {f.tolerance:g}; {error}."
-    return f"{text} {error[:1].upper()}{error[1:]}, of the physics that is kept."

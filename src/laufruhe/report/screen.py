@@ -13,7 +13,7 @@ from rich.text import Text
 from laufruhe.report.grid import Grid
 from laufruhe.report.sections import tables_of
 from laufruhe.report.sections.reach import sentences
-from laufruhe.report.wording import accuracy, explained, fired, headline, why_star
+from laufruhe.report.wording import explained, fidelity_of, fired, headline, why_star
 from laufruhe.solvers.result import Result, Status
 
 PIPE_WIDTH = 110
@@ -39,15 +39,9 @@ def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
         if grid.note:
             console.print(Text(grid.note, style="dim"))
     console.print()
-    console.print(Text(_fidelity(result), style="dim"))
+    console.print(Text(fidelity_of(result), style="dim"))
     if folder is not None:
         console.print(Text(f"Results: {folder}", overflow="fold"))
-
-
-def _fidelity(result: Result) -> str:
-    fidelity = result.problem.fidelity
-    text = f"Fidelity: {fidelity.summary}, {result.final.samples} steps a cycle"
-    return text if result.objective is None else f"{text}; {accuracy(result)}"
 
 
 def _table(grid: Grid) -> Table:

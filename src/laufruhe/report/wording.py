@@ -43,9 +43,15 @@ def headline(result: Result) -> str:
     return f"{sentence}{change}, {_proven(result.certificate)}."
 
 
-def accuracy(result: Result) -> str:
-    """How far the objective may be off, in half a sentence."""
-    return f"error of the objective at most {100.0 * result.error_estimate:.1g} %"
+def fidelity_of(result: Result) -> str:
+    """Which physics was computed, and how far the objective may be off."""
+    f = result.problem.fidelity
+    text = f"{f.summary.capitalize()}, {result.final.samples} steps over the working cycle."
+    if result.objective is None:
+        return text
+    chosen = "" if f.tolerance is None else f" Chosen for an error of {f.tolerance:g}."
+    kept = ", of the physics that is kept" if f.tolerance is None else ""
+    return f"{text}{chosen} Error of the objective at most {100.0 * result.error_estimate:.1g} %{kept}."
 
 
 def fired(result: Result) -> str:

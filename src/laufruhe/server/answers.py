@@ -260,13 +260,13 @@ def front(source: Source, asked: Asked, across: str, k: int) -> str:
         if most is None:
             return {"done": True}
         point = own.at(most)
-        if point is None:
+        if point.conflict:
             return {"skipped": True}
         problem, unit = own.problem, own.across.unit
         (shown_unit, factor), (of_unit, of_factor) = readable(unit), readable(problem.objective_unit or "")
         axes = {"across": [shown_unit, factor], "value": [of_unit, of_factor]}
-        shown = told.optimum(problem, point.followed.values, point.value, point.bound, point.followed.gap, "")
-        return {**shown, "across": point.across, "axes": axes, "acrossText": figure(point.across, unit)}
+        shown = told.optimum(problem, point.values, point.value, point.bound, point.gap, "")
+        return {**shown, "across": point.standing[-1], "axes": axes, "acrossText": figure(point.standing[-1], unit)}
 
     return _said(found, source)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from laufruhe.errors import ModelError
 from laufruhe.files.complaints import Refused
@@ -19,22 +19,6 @@ _USUAL = ("maximum mount force", "mean mount force", "rms shaking force", "rms r
           "balancer mass", "maximum main-bearing force")  # fmt: skip
 _NARROW = 1e-3
 """Of the whole range: ends that are nearer have nothing between them."""
-
-
-@dataclass(frozen=True)
-class Point:
-    """One design of the front [SI].
-
-    Attributes
-    ----------
-    across, value, bound
-        The other measure, the objective, and what no design with as little of the other goes under.
-    """
-
-    across: float
-    value: float
-    bound: float
-    followed: Followed
 
 
 def partners(problem: Problem) -> dict[str, Measure]:
@@ -74,12 +58,9 @@ class Front:
         free = self._follower.at((*self._others, self._limit))
         return least.value, max(free.standing[-1], least.value)
 
-    def at(self, most: float) -> Point | None:
-        """The least objective with no more of the other than this; None where there is no such design."""
-        found = self._follower.at((*self._others, replace(self._limit, maximum=most)))
-        if found.conflict:
-            return None
-        return Point(found.standing[-1], found.value, found.bound, found)
+    def at(self, most: float) -> Followed:
+        """The least objective with no more of the other than this, where the last limit stands; a conflict else."""
+        return self._follower.at((*self._others, replace(self._limit, maximum=most)))
 
 
 def places(low: float, high: float, count: int = POINTS) -> Iterator[float]:

@@ -27,12 +27,16 @@ class KeptPoints(AbstractContextManager["KeptPoints"]):
 
     def __init__(self, path: Path, wanted: Collection[str]) -> None:
         self.path = path
-        self.records: Record = {}
+        self._records: Record = {}
         self.seconds: dict[str, float] = {}
         self._stream: FileIO | None = None
         for mark, seconds, record in _sound(path):
             if mark in wanted:
-                self.records[mark], self.seconds[mark] = record, seconds
+                self._records[mark], self.seconds[mark] = record, seconds
+
+    def read(self, mark: str) -> Record:
+        """What was kept of a point."""
+        return dict(self._records[mark])
 
     def keep(self, mark: str, seconds: float, record: Record) -> None:
         """Write a record and what it took; it has left the process when this returns."""
@@ -44,7 +48,7 @@ class KeptPoints(AbstractContextManager["KeptPoints"]):
         while rest:
             # a full disk takes a part, and then complains
             rest = rest[self._stream.write(rest) :]
-        self.records[mark], self.seconds[mark] = record, seconds
+        self._records[mark], self.seconds[mark] = record, seconds
 
     def __exit__(self, *_: object) -> None:
         if self._stream is not None:

@@ -62,7 +62,6 @@ class Regions:
         self._wanted, self._chunk, self._columns = wanted, template.chunk, template.columns
         self._values, self._done = _laid_out(root, name, template)
         self.seconds: dict[str, float] = {}
-        self.records: Mapping[str, Record] = _Read(self)
         for mark, region in wanted.items():
             seconds = self._found(mark, region)
             if seconds is not None:
@@ -95,24 +94,6 @@ class Regions:
             # a damaged file ends in whatever its codec makes of it
             return None
         return float(_SECONDS.unpack(told)[0]) if noted[:_SUM] == _checksum(mark, told, values) else None
-
-
-class _Read(Mapping[str, Record]):
-    """Records that are read when they are asked for: all at once may be more than memory holds."""
-
-    def __init__(self, store: Regions) -> None:
-        self._store = store
-
-    def __getitem__(self, mark: str) -> Record:
-        if mark not in self._store.seconds:
-            raise KeyError(mark)
-        return self._store.read(mark)
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._store.seconds)
-
-    def __len__(self) -> int:
-        return len(self._store.seconds)
 
 
 def _checksum(mark: str, seconds: bytes, values: NDArray[np.float64]) -> bytes:

@@ -25,12 +25,11 @@ class Store(Protocol):
     """What is kept of points, by their fingerprints: lines of a file for any records, regions for many draws."""
 
     @property
-    def records(self) -> Mapping[str, Record]:
-        """As they were kept."""
-
-    @property
     def seconds(self) -> Mapping[str, float]:
         """What each took."""
+
+    def read(self, mark: str) -> Record:
+        """As it was kept: all of them at once may be more than memory holds."""
 
     def keep(self, mark: str, seconds: float, record: Record) -> None:
         """Write a record; it has left the process when this returns."""
@@ -68,7 +67,7 @@ class Records(Sequence[Record]):
 
     def __getitem__(self, k: Any) -> Any:
         mark = self._marks[k]
-        return self._stores[mark].records[mark]
+        return self._stores[mark].read(mark)
 
     def __len__(self) -> int:
         return len(self._marks)

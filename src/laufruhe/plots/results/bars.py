@@ -13,11 +13,12 @@ from matplotlib.patches import Patch
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.plots.style import Series, headed, page, series_of, styled, thin
-from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, ink_on, rows_of
+from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, ink_on
 from laufruhe.present.measures import hardest_point, has_mount_forces
 from laufruhe.present.numbers import number
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.solvers.result import Result
+from laufruhe.studies.picture import rows_of
 
 MOST_POINTS, MOST_GROUPS = 4, 7
 GROUP, WIDTH = 1.22, 0.42
@@ -31,8 +32,7 @@ def figure(result: Result) -> Figure:
     several = range(len(result.problem.points))
     shown = list(several) if len(several) <= MOST_POINTS else [hardest_point(result)]
     names = [*result.initial.mount_names, "all mounts"]
-    side = rows_of(len(names), MOST_GROUPS)
-    parts = [range(first, min(first + side, len(names))) for first in range(0, len(names), side)]
+    parts, side = rows_of(len(names), MOST_GROUPS)
     rows = [(k, part) for k in shown for part in parts]
     high = 3.2 if len(rows) == 1 else 2.1
     drawn = page(len(rows), 1, (max(GROUP * (side + 0.3), 4.2), high), lead=0.12 if len(shown) > 1 else 0.0)

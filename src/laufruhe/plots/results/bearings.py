@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from laufruhe.physics.bearing_wear import wear_of
 from laufruhe.plots.style import ORANGE, Series, entry_of_dots, headed, page, point_name, series_of, styled, thin
-from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_ticks, rows_of
+from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_ticks
 from laufruhe.present.measures import BEARINGS, as_crank_turns, bearing_paths, has_bearings, load_designs
 from laufruhe.solvers.result import Result
+from laufruhe.studies.picture import rows_of
 
 MOST_BEARINGS, MOST_COLUMNS, PANEL, STEPS = 6, 4, 1.95, 180
 # of a panel: where the ring of wear begins, how thick it is at most, and what the paths fill
@@ -36,8 +37,8 @@ def figure(result: Result) -> Figure:
     largest = thin(float(np.abs(plane[:, chosen]).max()) for plane in planes)
     factor, unit = in_thousands(largest, "N")
     turned = as_crank_turns(result.final, len(planes[0]))
-    side = rows_of(len(chosen), MOST_COLUMNS)
-    chunks = [chosen[first : first + side] for first in range(0, len(chosen), side)]
+    rows, side = rows_of(len(chosen), MOST_COLUMNS)
+    chunks = [[chosen[k] for k in row] for row in rows]
     drawn = page(2 * len(chunks), side, (PANEL, PANEL), gap=0.55, lead=0.16, across=0.3)
     for r, (chunk, on_crank) in enumerate((chunk, on_crank) for chunk in chunks for on_crank in (False, True)):
         for column, axes in enumerate(drawn.panels[r * side : (r + 1) * side]):

@@ -16,12 +16,13 @@ from matplotlib.ticker import MultipleLocator
 from laufruhe.machine import Mount
 from laufruhe.numerics.arrays import Array
 from laufruhe.plots.style import Page, Series, entry_of_dots, headed, page, point_name, series_of, styled, thin
-from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_ticks, rows_of
+from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_ticks
 from laufruhe.present.measures import hardest_point, has_mount_forces
 from laufruhe.present.numbers import figure as words
 from laufruhe.present.numbers import trimmed
 from laufruhe.problem.evaluation import samples_of
 from laufruhe.solvers.result import Result
+from laufruhe.studies.picture import rows_of
 
 MOST_PANELS, MOST_COLUMNS = 12, 4
 POINTS = 1440
@@ -75,7 +76,7 @@ def figure(result: Result) -> Figure:
     k, series = hardest_point(result), series_of(result, loads=True)
     paths, steady = _moving([_closed(samples_of(one.design, k)) for one in series])
     mounts = result.problem.engine.mounts[:MOST_PANELS]
-    frame, columns = Frame.of(paths, len(mounts)), rows_of(len(mounts), MOST_COLUMNS)
+    frame, columns = Frame.of(paths, len(mounts)), rows_of(len(mounts), MOST_COLUMNS)[1]
     drawn = page(math.ceil(len(mounts) / columns), columns, (PANEL, PANEL), len(mounts), GAP, LEAD, 0.44)
     cycle = result.problem.engine.cycle
     quarters = (len(paths[0]) - 1) // (4 * cycle.turns)

@@ -17,9 +17,8 @@ from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torque import TorqueFacts, torque_facts, torque_parts
 from laufruhe.plots.style import GREEN, ORANGE, PALE, SKY, Series, entry, headed, page, series_of, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, in_thousands, round_ticks
-from laufruhe.present.measures import has_loads
+from laufruhe.present.measures import asks_torque, has_loads
 from laufruhe.present.numbers import RPM, number
-from laufruhe.present.torque import asks_torque
 from laufruhe.solvers.result import Result
 
 STEPS, MOST_ORDERS = 1440, 12

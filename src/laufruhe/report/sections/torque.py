@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from laufruhe.physics.torque import TorqueFacts, torque_facts
+from laufruhe.present.measures import asks_torque
 from laufruhe.present.numbers import DASH, number
-from laufruhe.present.torque import asks_torque
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
 
