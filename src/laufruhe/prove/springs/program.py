@@ -17,13 +17,12 @@ from laufruhe.prove.springs.modes import Shapes
 
 # what a solver leaves of a price of one for every square, so that what its multipliers leave over is convex
 ASIDE = 3e-7
-# of what narrows a box, how far multipliers may be off
-ROUGH = 3e-3
+# how far multipliers may be off, and from what is allowed; of what narrows a box
+FINE, ROUGH = (1e-5, 1e-7), (2e-2, 2e-5)
 # equations are solved once and not refined, more regular instead: bounds are as good in two thirds of the time
 _SETTINGS = {
     "verbose": False,
     "tol_gap_abs": 1e-6,
-    "tol_feas": 1e-7,
     "max_threads": 1,
     "direct_solve_method": "faer",
     "presolve_enable": False,
@@ -48,7 +47,7 @@ class Stated:
         self.rows: list[Any] = []
         self.right: list[Array] = []
         self.cones: list[Any] = []
-        self._solvers: dict[tuple[bool, float], Any] = {}
+        self._solvers: dict[tuple[bool, tuple[float, float]], Any] = {}
         blocks = [_entries(size) for cap in program.caps for size in cap.blocks]
         heads = len(program.prices)
         self.blocks = np.cumsum([heads, *blocks])
@@ -268,7 +267,7 @@ class Stated:
             [found.middle, *(each[0, 0, 1:] for each in found.shapes)]
         )
 
-    def answer(self, program: Program, scaled: bool, enough: float = 1e-5) -> Proposed:
+    def answer(self, program: Program, scaled: bool, enough: tuple[float, float] = FINE) -> Proposed:
         """As multipliers and moments of a program with the same conditions."""
         first, cost = self.first, self._cost(program)
         found = self._solved(cost, scaled, enough)
@@ -303,13 +302,14 @@ class Stated:
         middle = np.clip(x[first : first + program.numbers], -1.0, 1.0)
         return Proposed(multipliers, middle, moments, float(cost @ x), [self._found(x, k) for k in range(len(shaped))])
 
-    def _solved(self, cost: Array, scaled: bool, enough: float) -> Any:
+    def _solved(self, cost: Array, scaled: bool, enough: tuple[float, float]) -> Any:
         """By one solver for all that is minimised under the same conditions."""
         from scipy.sparse import csc_array, vstack
 
         solver = self._solvers.get((scaled, enough))
         if solver is None:
-            settings = {**_SETTINGS, "equilibrate_enable": scaled, "tol_gap_rel": enough}
+            off = dict(zip(("tol_gap_rel", "tol_feas"), enough, strict=True))
+            settings = {**_SETTINGS, **off, "equilibrate_enable": scaled}
             rows, right = csc_array(vstack(self.rows)), np.concatenate(self.right)
             solver = self._solvers[scaled, enough] = solver_of(cost, rows, right, self.cones, settings)
         else:
