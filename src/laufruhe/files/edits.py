@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
 from laufruhe import units
@@ -46,6 +46,21 @@ def fixed(tables: Mapping[str, Any], name: str, value: Any = None) -> dict[str, 
     # an angle is open with its size, or not at all
     if keys[-1] in _SIZES and _is_open(at(found, (*keys[:-1], "angle"))):
         return fixed(found, f"{name.rpartition('.')[0]}.angle")
+    return found
+
+
+PHASES = ("throws", "firing_order", "bank_angle", "split_pin_angle")
+"""Keys of [engine] that a crank star gives."""
+
+
+def with_star(tables: Mapping[str, Any], star: Mapping[str, Any], gone: Collection[str]) -> dict[str, Any]:
+    """A crank with its firing order and the angles of its banks, without some shafts; none of them open any more."""
+    given = {key: star[key] for key in PHASES if star.get(key) is not None}
+    found = {**tables, "engine": {**tables["engine"], **given}}
+    found.pop("phasing", None)
+    if "balancer_shafts" in tables:
+        kept = [shaft for shaft in tables["balancer_shafts"] if shaft.get("name") not in gone]
+        found["balancer_shafts"] = [{k: v for k, v in shaft.items() if k != "optional"} for shaft in kept]
     return found
 
 

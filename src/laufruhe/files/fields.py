@@ -22,6 +22,8 @@ from pydantic_core import PydanticCustomError, core_schema
 
 from laufruhe import units
 from laufruhe.machine.crank_names import CRANKS
+from laufruhe.problem.decision import Decision, Drive
+from laufruhe.problem.sets import Interval
 
 # SI; squares and products of what lies between stay finite, and off zero.
 SMALLEST, LARGEST = 1e-40, 1e12
@@ -59,6 +61,10 @@ class Open:
     def is_open(self) -> bool:
         """Whether the bounds leave anything to decide."""
         return self.lower < self.upper
+
+    def decisions(self, name: str, unit: str, *drives: Drive) -> list[Decision]:
+        """What is to be decided of it: the number itself, or nothing."""
+        return [Decision(name, unit, Interval(*self.bounds), self.start, drives)] if self.is_open else []
 
 
 @dataclass(frozen=True)

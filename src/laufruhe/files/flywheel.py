@@ -14,7 +14,6 @@ from laufruhe.files.fields import Open, Table
 from laufruhe.machine import Arms, Engine, Flywheel, Rim
 from laufruhe.physics.reduced_inertia import inertia_of_discs
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
-from laufruhe.problem.sets import Interval
 
 
 class ArmsTable(Table):
@@ -77,12 +76,11 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
 
 
 def _decided(numbers: dict[str, tuple[str, Open]], first: int) -> list[Decision]:
-    found = []
-    for k, (key, (unit, given)) in enumerate(numbers.items()):
-        if given.is_open:
-            drive = NumberDrive(Kind.FLYWHEEL, first + k)
-            found.append(Decision(f"flywheel.{key}", unit, Interval(*given.bounds), given.start, (drive,)))
-    return found
+    return [
+        decision
+        for k, (key, (unit, given)) in enumerate(numbers.items(), first)
+        for decision in given.decisions(f"flywheel.{key}", unit, NumberDrive(Kind.FLYWHEEL, k))
+    ]
 
 
 def _rim(table: RimTable) -> Rim:

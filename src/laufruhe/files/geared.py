@@ -10,7 +10,6 @@ from laufruhe.files.complaints import Refused
 from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import GearedInertia
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
-from laufruhe.problem.sets import Interval
 
 OpenShare: TypeAlias = Annotated[float | Open, f.Number("", least=0.0, most=1.0, openable=True)]
 _ROUNDING = 1e-12
@@ -26,13 +25,11 @@ class GearedInertiaTable(Table):
 
 def geared_of(tables: Sequence[GearedInertiaTable]) -> tuple[tuple[GearedInertia, ...], list[Decision]]:
     """The geared inertias, and the decisions about their shares."""
-    found, decisions = [], []
+    found, decisions = [], list[Decision]()
     for table in tables:
         share = Open.of(table.share)
         found.append(GearedInertia(table.name, table.ratio, share.start))
-        if share.is_open:
-            drive = NumberDrive(Kind.SHARE, table.name)
-            decisions.append(Decision(f"{table.name}.share", "", Interval(*share.bounds), share.start, (drive,)))
+        decisions += share.decisions(f"{table.name}.share", "", NumberDrive(Kind.SHARE, table.name))
     most = sum(Open.of(table.share).upper for table in tables)
     if most > 1.0 + _ROUNDING:
         rule = f"add up to {most:g}, and the inertia of all that turns is one"

@@ -7,7 +7,6 @@ from laufruhe.files.complaints import Refused
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fields import Open
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
-from laufruhe.problem.sets import Interval
 
 OPPOSED = "second crankshaft"
 
@@ -18,9 +17,9 @@ def leads_of(table: EngineTable) -> list[Decision]:
     leads = [(f"{shaft.name}.lead", shaft.name, shaft.lead) for shaft in table.shafts]
     leads += [("crank lead", OPPOSED, table.own("crank_lead"))]
     return [
-        Decision(name, "rad", Interval(*lead.bounds), lead.start, (NumberDrive(Kind.LEAD, shaft),))
+        decision
         for name, shaft, lead in leads
-        if isinstance(lead, Open) and lead.is_open
+        for decision in Open.of(lead).decisions(name, "rad", NumberDrive(Kind.LEAD, shaft))
     ]
 
 

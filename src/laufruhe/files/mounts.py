@@ -29,7 +29,6 @@ from laufruhe.problem.decision import (
     MountDrive,
     mount_of,
 )
-from laufruhe.problem.sets import Interval
 
 _AXES, _AT = ("x", "y", "z"), "position"
 _FIELDS = {
@@ -281,10 +280,8 @@ class _Numbers:
         unit, numbers = _FIELDS[key]
         for number, axis, value in zip(numbers, _AXES, map(Open.of, values), strict=False):
             self.rows[-1][number] = value.start
-            if value.is_open:
-                label = f"{name}.{key}" if len(numbers) == 1 else f"{name}.{key}.{axis}"
-                drive = MountDrive(len(self.rows) - 1, number, 1.0)
-                self.decisions.append(Decision(label, unit, Interval(*value.bounds), value.start, (drive,)))
+            label = f"{name}.{key}" if len(numbers) == 1 else f"{name}.{key}.{axis}"
+            self.decisions += value.decisions(label, unit, MountDrive(len(self.rows) - 1, number, 1.0))
 
     def sort(self, order: Sequence[int]) -> None:
         """Rows in another order: those of one place behind each other."""

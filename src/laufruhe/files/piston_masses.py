@@ -10,7 +10,6 @@ from laufruhe.files.fields import Open
 from laufruhe.files.rotors import CounterweightTable
 from laufruhe.machine import CRANKSHAFT, SliderCrank
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
-from laufruhe.problem.sets import Interval
 
 SECOND, RECIPROCATING = "second_reciprocating_mass", "reciprocating_mass"
 
@@ -20,29 +19,26 @@ def piston_masses(
 ) -> list[Decision]:
     """Decisions about masses of slider-cranks: of all that give none of their own, and of those open themselves."""
     second = getattr(table, SECOND)
-    found = []
+    found = list[Decision]()
     for key, mass in table.open_masses.items():
         own = [getattr(row, key, None) for row in table.slider_cranks] or [
             second if part.shaft != CRANKSHAFT and key == RECIPROCATING else None for part in parts
         ]
         names = [part.name for part, given in zip(parts, own, strict=True) if given is None]
-        found.append(_decision(key.replace("_", " "), mass, names, key))
+        found += _decisions(key.replace("_", " "), mass, names, key)
     if isinstance(second, Open):
         names = [part.name for part in parts if part.shaft != CRANKSHAFT]
-        found.append(_decision("second reciprocating mass", second, names))
+        found += _decisions("second reciprocating mass", second, names)
     for part, row in zip(parts, table.slider_cranks, strict=False):
         if isinstance(row.reciprocating_mass, Open):
-            name = f"reciprocating mass of {part.name}"
-            found.append(_decision(name, row.reciprocating_mass, [part.name]))
-    found = [decision for decision in found if decision.lower < decision.upper]
+            found += _decisions(f"reciprocating mass of {part.name}", row.reciprocating_mass, [part.name])
     for decision in found[:1]:
         check_factors(weights, f"counts the {decision.name}, which is open")
     return found
 
 
-def _decision(name: str, mass: Open, parts: Sequence[str], key: str = RECIPROCATING) -> Decision:
-    drives = tuple(NumberDrive(Kind.PISTON, (part, key)) for part in parts)
-    return Decision(name, "kg", Interval(*mass.bounds), mass.start, drives)
+def _decisions(name: str, mass: Open, parts: Sequence[str], key: str = RECIPROCATING) -> list[Decision]:
+    return mass.decisions(name, "kg", *(NumberDrive(Kind.PISTON, (part, key)) for part in parts))
 
 
 def check_factors(weights: Sequence[CounterweightTable], rule: str) -> None:

@@ -102,12 +102,10 @@ class RotorList:
 
     def move(self, name: str, rotors: Sequence[str], axis: int, place: float | Open | None) -> None:
         """Let the place of rotors along an axis be decided, if it is open; nothing follows of those of no size."""
-        if not isinstance(place, Open) or not place.is_open:
-            return
         sized = {rotor.name for rotor in self.rotors if rotor.unbalance != 0.0}
         sized |= {drive.rotor for decision in self.decisions for drive in decision.rotor_drives}
-        drives = tuple(PlaceDrive(rotor, axis) for rotor in rotors if rotor in sized)
-        self.decisions.append(Decision(name, "m", Interval(*place.bounds), place.start, drives))
+        drives = (PlaceDrive(rotor, axis) for rotor in rotors if rotor in sized)
+        self.decisions += Open.of(place).decisions(name, "m", *drives)
 
     def drive(self, rotor: str, source: str, gain: float, mirrored: bool) -> None:
         """Let a rotor follow whatever decides another one."""

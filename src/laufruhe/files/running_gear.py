@@ -20,7 +20,6 @@ from laufruhe.machine.layouts import Throw
 from laufruhe.machine.running_gear import BIG_END, ROD_LENGTH, STEEL, Moving, Size, on
 from laufruhe.numerics.turns import as_turn, cis
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
-from laufruhe.problem.sets import Interval
 
 
 class WebsTable(Table):
@@ -138,11 +137,9 @@ def size_decisions(
     table: RunningGearTable | None, engine: EngineTable, bearings: Sequence[MainBearingTable], built: Sequence[Bearing]
 ) -> list[Decision]:
     """The decisions about sizes that are open."""
-    found = []
+    found = list[Decision]()
     for name, size, value in _opened(table, engine, bearings, built):
-        if isinstance(value, Open) and value.is_open:
-            drive = NumberDrive(Kind.SIZE, size)
-            found.append(Decision(name, "m", Interval(*value.bounds), value.start, (drive,)))
+        found += Open.of(value).decisions(name, "m", NumberDrive(Kind.SIZE, size))
     if found and engine.rod is not None and isinstance(engine.rod_length, Open):
         raise Refused("engine.rod_length", None, "is open, and [engine.rod] is of one length", "fix it")
     if any(decision.name == "engine.rod_length" for decision in found):

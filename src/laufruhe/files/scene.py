@@ -41,17 +41,6 @@ PLACES = {
     "sections": "shaft section",
     "webs": "web",
 }
-_KEYS = (
-    "operating_points",
-    "orders",
-    *PLACES,
-    "direction_weights",
-    "load_cases",
-    "motions",
-    "frequency",
-    "wanted",
-    "of",
-)
 _ROUNDING = 1e-9
 
 
@@ -143,7 +132,7 @@ class Scene:
     def _check_keys(self, channel: Channel, table: QuantityTable, at: str) -> None:
         """Refuse keys that mean nothing for a channel, and names of what is not there."""
         of = getattr(table, "of", None)
-        for key in _KEYS:
+        for key in (*QuantityTable.model_fields, "of"):
             if getattr(table, key, None) == []:
                 raise Refused(f"{at}.{key}", [], "is empty", "leave it out to count all")
             if getattr(table, key, None) is not None and key not in channel.keys:

@@ -17,7 +17,6 @@ from laufruhe.machine.layouts import Throw
 from laufruhe.machine.torsion import STEEL, stiffness_of
 from laufruhe.physics.reduced_inertia import reduced_inertia
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
-from laufruhe.problem.sets import Interval
 
 T = TypeVar("T")
 
@@ -107,10 +106,8 @@ class _Opened:
     def number(self, value: float | Open, key: str, unit: str, name: str, parts: Sequence[str]) -> float:
         """The number that some parts have, or start from."""
         given = Open.of(value)
-        if given.is_open:
-            drives = tuple(NumberDrive(Kind.TORSION, (part, key)) for part in parts)
-            found = Decision(f"torsion.{name}.{key}", unit, Interval(*given.bounds), given.start, drives)
-            self.decisions.append(found)
+        drives = (NumberDrive(Kind.TORSION, (part, key)) for part in parts)
+        self.decisions += given.decisions(f"torsion.{name}.{key}", unit, *drives)
         return given.start
 
 

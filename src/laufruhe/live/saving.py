@@ -111,22 +111,16 @@ def _fixed(tables: dict[str, Any], result: Result, values: Mapping[str, Value]) 
 def _with_star(tables: dict[str, Any], result: Result) -> dict[str, Any]:
     """Throws, firing order and shafts of a star."""
     decided = {entry.name: entry.value for entry in result.decisions}
-    engine = dict(tables["engine"])
     throws = [math.degrees(decided[name]) for k in range(len(decided)) if (name := f"throw {k + 1}") in decided]
-    if throws and "throws" in engine:
-        engine["throws"] = throws
-    for key, name in (("bank_angle", "bank angle"), ("split_pin_angle", "split pin angle")):
+    star: dict[str, Any] = {"throws": throws} if throws and "throws" in tables["engine"] else {}
+    for name in ("bank angle", "split pin angle"):
         if name in decided:
-            engine[key] = math.degrees(decided[name])
+            star[name.replace(" ", "_")] = math.degrees(decided[name])
     parts = result.final.engine.cylinders
-    if throws or engine.get("firing_order") == "open":
-        engine["firing_order"] = [k + 1 for k in sorted(range(len(parts)), key=lambda k: parts[k].firing_angle)]
-    shafts = [
-        {key: value for key, value in shaft.items() if key != "optional"}
-        for shaft in tables.get("balancer_shafts", ())
-        if decided.get(f"{shaft.get('name')} built", 1.0)
-    ]
-    return {**tables, "engine": engine, **({"balancer_shafts": shafts} if shafts else {})}
+    if throws or tables["engine"].get("firing_order") == "open":
+        star["firing_order"] = [k + 1 for k in sorted(range(len(parts)), key=lambda k: parts[k].firing_angle)]
+    gone = [name.removesuffix(" built") for name, value in decided.items() if name.endswith(" built") and not value]
+    return edits.with_star(tables, star, gone)
 
 
 def _alike(one: Engine, other: Engine) -> bool:

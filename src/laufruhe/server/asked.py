@@ -14,7 +14,6 @@ Tables: TypeAlias = Mapping[str, Any]
 
 MOST_EDITS, LONGEST, MOST_ENTRIES = 300, 100, 96
 """Of one request; characters of a text; entries of a list."""
-_ANGLES = ("bank_angle", "split_pin_angle")
 
 
 @dataclass(frozen=True)
@@ -114,17 +113,7 @@ def _star(tables: Tables, _: str, value: Any) -> dict[str, Any]:
     """A crank with its firing order, the angles of its banks and its shafts; nothing of them is open any more."""
     if not isinstance(value, dict) or not isinstance(value.get("throws"), list):
         raise _strange("star", "has no throws")
-    engine = dict(tables["engine"])
-    for key in ("throws", "firing_order", *_ANGLES):
-        if value.get(key) is not None:
-            engine[key] = value[key]
-    gone = value.get("without") or []
-    found = {**tables, "engine": engine}
-    found.pop("phasing", None)
-    if "balancer_shafts" in tables:
-        kept = [shaft for shaft in tables["balancer_shafts"] if shaft.get("name") not in gone]
-        found["balancer_shafts"] = [{k: v for k, v in shaft.items() if k != "optional"} for shaft in kept]
-    return found
+    return edits.with_star(tables, value, value.get("without") or [])
 
 
 def _open_crank(tables: Tables, _: str, __: Any) -> dict[str, Any]:

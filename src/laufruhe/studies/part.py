@@ -94,7 +94,10 @@ class Part(Table):
         raise NotImplementedError
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """One piece of work as JSON can hold it; it depends on the settings and the point alone."""
+        """One piece of work as JSON can hold it; it depends on the settings and the point alone.
+
+        A `ModelError` is the fault of the point, and is told so.
+        """
         raise NotImplementedError
 
     def template(self, scenes: Scenes) -> Template | None:  # noqa: ARG002

@@ -134,7 +134,8 @@ def _over() -> SolverError:
 def _answer(k: int, task: Task, scenes: Scenes) -> Answer:
     started = time.perf_counter()
     part, point = task
-    record = part.answer(point, scenes)
+    with scenes.blamed(point):
+        record = part.answer(point, scenes)
     return Answer(k, record, time.perf_counter() - started)
 
 

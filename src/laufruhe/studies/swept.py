@@ -231,8 +231,7 @@ class SweptPart(Part):
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """The proven optimum of one scene, or its numbers as given where nothing is open."""
-        with scenes.blamed(point):
-            return solved(scenes.problem(point))
+        return solved(scenes.problem(point))
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """All that is kept of every scene, along its point."""

@@ -65,8 +65,7 @@ class BalancerSizing(SweptPart):
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """The proven optimum of one set of shafts."""
-        with scenes.blamed(point):
-            return solved(_counting(scenes.problem(point)))
+        return solved(_counting(scenes.problem(point)))
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """As of every sweep, with the shafts of every point."""

@@ -145,11 +145,10 @@ class Economics(Part):
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """The front of one engine."""
         problem = scenes.problem(point)
-        with scenes.blamed(point):
-            try:
-                points = front(problem, self.mass_limits)
-            except SolverError as error:
-                raise ModelError(f"{error}; leave more to its decisions, or name larger mass limits") from None
+        try:
+            points = front(problem, self.mass_limits)
+        except SolverError as error:
+            raise ModelError(f"{error}; leave more to its decisions, or name larger mass limits") from None
         of = {"objective": problem.objective_name, "unit": problem.objective_unit or ""}
         return {**of, "shafts": len(shafts_of(problem)), "cylinders": len(problem.engine.cylinders), "points": points}
 

@@ -117,11 +117,10 @@ class FreeForces(Part):
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """Free loads of one layout, and its shortest and longest firing interval [rad]."""
-        with scenes.blamed(point):
-            engine = scenes.problem(point).engine
-            loads = [asdict(free_load(engine, order, self.spacing)) for order in ORDERS]
-            intervals = engine.firing_intervals
-            return {"loads": loads, "intervals": [min(intervals), max(intervals)], "cylinders": len(engine.cylinders)}
+        engine = scenes.problem(point).engine
+        loads = [asdict(free_load(engine, order, self.spacing)) for order in ORDERS]
+        intervals = engine.firing_intervals
+        return {"loads": loads, "intervals": [min(intervals), max(intervals)], "cylinders": len(engine.cylinders)}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:  # noqa: ARG002
         """Layouts side by side; NaN where the literature has nothing."""

@@ -77,12 +77,11 @@ class LayoutComparison(SweptPart):
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """The proven optimum of one scene, and the same design in every further quantity."""
-        with scenes.blamed(point):
-            problem = scenes.problem(point)
-            further = {n: partial(_value, m) for n, m in self._measures(problem, point.case, scenes).items()}
-            if self.flywheel_for is not None:
-                further[_LEAST_FLYWHEEL] = partial(_least_flywheel, self.flywheel_for)
-            return solved(problem, further)
+        problem = scenes.problem(point)
+        further = {n: partial(_value, m) for n, m in self._measures(problem, point.case, scenes).items()}
+        if self.flywheel_for is not None:
+            further[_LEAST_FLYWHEEL] = partial(_least_flywheel, self.flywheel_for)
+        return solved(problem, further)
 
     def _check_cylinders(self, scenes: Scenes) -> None:
         """Layouts are compared from one cylinder: else size would pass for layout."""

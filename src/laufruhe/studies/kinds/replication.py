@@ -136,11 +136,10 @@ class Replication(Part):
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """Every quantity of one scene, at its optimum where something is open."""
         problem, case = scenes.problem(point), _case(point)
-        with scenes.blamed(point):
-            result = solve(problem)
-            if result.status in (Status.INFEASIBLE, Status.FAILED):
-                raise ModelError(f"no design meets all limits of '{case.name}'; loosen one")
-            return {name: asked(result, what).as_dict() for name, what in self.quantities.items()}
+        result = solve(problem)
+        if result.status in (Status.INFEASIBLE, Status.FAILED):
+            raise ModelError(f"no design meets all limits of '{case.name}'; loosen one")
+        return {name: asked(result, what).as_dict() for name, what in self.quantities.items()}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Quantities along the points, and every statement judged."""

@@ -121,11 +121,10 @@ class SpeedMap(Part):
         load, asked = self._load(problem, point.case, scenes), self._measures(problem, point.case, scenes)
         measures = list(asked)
         speeds = self.speeds.with_point(load)
-        with scenes.blamed(point):
-            designs = {
-                name: {**_mapped(problem, load, speeds, engine, measures, self.by_order), "proof": proof}
-                for name, engine, proof in self._engines(problem)
-            }
+        designs = {
+            name: {**_mapped(problem, load, speeds, engine, measures, self.by_order), "proof": proof}
+            for name, engine, proof in self._engines(problem)
+        }
         return {
             "speeds": speeds.tolist(),
             "measures": [[measure.name, measure.unit] for measure in measures],

@@ -216,8 +216,7 @@ class Tolerance(Part):
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """The spread of one engine."""
-        with scenes.blamed(point):
-            return spread(scenes.problem(point), self.tolerances, self.engines, self.seed)
+        return spread(scenes.problem(point), self.tolerances, self.engines, self.seed)
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Engines side by side, with what is claimed of them."""
