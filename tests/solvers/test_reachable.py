@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 import itertools
 import math
+import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,8 @@ import pytest
 
 import laufruhe
 from laufruhe.files.reader import load_tables
-from laufruhe.numerics.budget import limited
+from laufruhe.numerics.budget import at_least, left, limited, passed
+from laufruhe.numerics.progress import Step, listening
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit
@@ -263,6 +265,27 @@ def test_nothing_is_looked_at_when_time_is_over() -> None:
     assert [each.why for each in found.reached] == [LONG]
     assert all(math.isnan(each.value) for each in found.reached)
     assert "no time left" in sentences(found)[0]
+
+
+def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a_search() -> None:
+    problem, shares = problem_of([LIGHT, QUIET | {"max": "1.6 kN"}]), []
+
+    def slow(asked: Problem) -> Result:
+        shares.append(left())
+        while not passed():
+            time.sleep(0.01)
+        with at_least(60.0):
+            return replace(solve(asked), certificate=None)
+
+    steps: list[Step] = []
+    found = replace(solve(problem.changed(decisions=())), status=Status.INFEASIBLE, conflict=("light", "quiet"))
+    with limited(0.4), listening(steps.append):
+        found = with_reachable(found, problem, {Kind.UNBALANCE}, 1.0, slow)
+    assert [(each.ended, each.why) for each in found.reached] == [(True, "")] * 2
+    assert all("want of time" in text for text in sentences(found)[:2])
+    assert [share < 0.21 for share in shares[:2]] == [True, True]
+    told = [(step.done, step.whole) for step in steps if step.what == "what limits can reach"]
+    assert told == [(0, 2), (1, 2)]
 
 
 def test_what_nothing_open_changes_stays() -> None:

@@ -25,6 +25,16 @@ def limited(seconds: float | None) -> Iterator[None]:
         _until.reset(before)
 
 
+@contextmanager
+def at_least(seconds: float) -> Iterator[None]:
+    """Work within has so many seconds where less is left, or none: for what a result cannot do without."""
+    before = _until.set(max(_until.get(), time.monotonic() + seconds))
+    try:
+        yield
+    finally:
+        _until.reset(before)
+
+
 def left() -> float:
     """Seconds that are left, infinite where nothing limits them."""
     return _until.get() - time.monotonic()

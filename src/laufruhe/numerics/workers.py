@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import closing, contextmanager
 from contextvars import ContextVar
+from itertools import count, takewhile
 from typing import Generic, ParamSpec, TypeVar
 
 from laufruhe.errors import SolverError
@@ -105,7 +106,8 @@ def each(
     Parameters
     ----------
     patient
-        At the time limit (`laufruhe.numerics.budget`) wait for the pieces that were begun, which know of it.
+        At the time limit (`laufruhe.numerics.budget`) wait for the pieces that were begun, which know of it; there are
+        no answers of the others.
 
     Raises
     ------
@@ -122,11 +124,13 @@ def each(
                 asked.ask(*following)
             if not asked.pieces:
                 return
-            seconds = LONGEST_WAIT if patient else min(max(left(), 0.0), LONGEST_WAIT)
+            seconds = LONGEST_WAIT if patient and passed() else min(max(left(), 0.0), LONGEST_WAIT)
             for future in wait(asked.pieces, seconds, FIRST_COMPLETED).done:
                 yield from asked.answers(future)
             if passed() and asked.pieces and not patient:
                 raise TimeIsOver("the time limit is over")
+            if passed():
+                asked.leave()
     finally:
         for future in asked.pieces:
             future.cancel()
@@ -143,7 +147,8 @@ def in_turn(work: Callable[[T], A], pieces: Sequence[T], what: str) -> list[A]:
     began, found = time.process_time(), list[A]()
     for piece in in_time(pieces):
         rest = len(pieces) - len(found)
-        if found and count_of() > 1 and (time.process_time() - began) * (rest / len(found)) > WORTH_PROCESSES:
+        pays = (time.process_time() - began) * rest > WORTH_PROCESSES * len(found)
+        if found and pays and count_of() > 1 and left() > WORTH_PROCESSES:
             break
         tell(what, len(found), len(pieces))
         found.append(work(piece))
@@ -157,7 +162,8 @@ def in_turn(work: Callable[[T], A], pieces: Sequence[T], what: str) -> list[A]:
             for number, answer in answers:
                 later[number] = answer
                 tell(what, len(found) + len(later), len(pieces))
-        found += [later[number] for number in sorted(later)]
+        # where time was over, those before the first that nobody began
+        found += [later[number] for number in takewhile(later.__contains__, count())]
     return found
 
 
@@ -171,10 +177,14 @@ class _Asked(Generic[T, A]):
     def ask(self, number: int, piece: T, losses: int = 0) -> None:
         """Hand a piece out."""
         try:
-            future = self._executor.submit(worked, left(), self._work, piece)
+            future = self._executor.submit(worked, time.time() + left(), self._work, piece)
         except (RuntimeError, OSError) as error:
             raise _nobody(self._executor, error) from None
         self.pieces[future] = (number, piece, losses)
+
+    def leave(self) -> None:
+        """Leave out what nobody has begun."""
+        self.pieces = {future: piece for future, piece in self.pieces.items() if not future.cancel()}
 
     def answers(self, future: Future[A]) -> Iterator[tuple[int, A]]:
         """What has become of a piece; nothing where it was lost and is asked for again."""
@@ -189,9 +199,9 @@ class _Asked(Generic[T, A]):
             yield number, answer
 
 
-def worked(seconds: float, work: Callable[[T], A], piece: T) -> A:
-    """A piece, where it is done: there it starts no workers of its own."""
-    with limited(seconds), working_on(HERE):
+def worked(until: float, work: Callable[[T], A], piece: T) -> A:
+    """A piece, where it is done, until a time of day: there it starts no workers of its own."""
+    with limited(until - time.time()), working_on(HERE):
         return work(piece)
 
 

@@ -330,8 +330,8 @@ def _reached(result: Result) -> Record:
     """`reached` and `nearest` without a design: what each conflicting limit can reach, and what breaks limits least."""
     if result.status not in (Status.INFEASIBLE, Status.FAILED):
         return {}
-    names, near = "name side limit unit value", result.nearest
-    reached = [{**_of(one, f"{names} bound why"), "proof": str(one.proof), **_values(one)} for one in result.reached]
+    names, near, told = "name side limit unit value", result.nearest, "bound why ended"
+    reached = [{**_of(one, f"{names} {told}"), "proof": str(one.proof), **_values(one)} for one in result.reached]
     return {"reached": reached, "nearest": near and {**_of(near, f"{names} excess broken"), **_values(near)}}
 
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from laufruhe.errors import LaufruheError
 from laufruhe.numerics.budget import in_time, left, limited, passed
-from laufruhe.numerics.progress import tell
+from laufruhe.numerics.progress import tell, within
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit, Term
@@ -25,8 +25,8 @@ from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Nearest, ObjectiveValue, Reached, Result, Status
 
 Solve = Callable[[Problem], Result]
-LEAST_SECONDS, TIMES, MOST_SECONDS = 5.0, 1.5, 60.0
-"""Each limit may take so long, or so many times what it took to find that there is no design; and all together."""
+LEAST_SECONDS = 10.0
+"""All limits together may take so long, or as long as it took to find that there is no design."""
 HALVINGS, CLOSE = 10, 1e-3
 """Of the edges of a limit that has no least value to minimise, and the share of it at which they stop."""
 _DESIGNED = (Status.OPTIMAL, Status.FEASIBLE)
@@ -68,12 +68,12 @@ def with_reachable(found: Result, problem: Problem, kinds: Collection[Kind], too
         return found
     answers = []
     # a limit of time that was asked for counts alone
-    most = min(max(LEAST_SECONDS, TIMES * took) * len(asked), MOST_SECONDS)
-    seconds = None if math.isfinite(left()) else most
+    seconds = None if math.isfinite(left()) else max(LEAST_SECONDS, took)
     with limited(seconds):
-        for limit in asked:
-            tell(f"what '{limit.name}' can reach")
-            answers.append(_answer(limit, problem, kinds, found, solve))
+        for k, limit in enumerate(asked):
+            tell("what limits can reach", k, len(asked))
+            with within(f"what '{limit.name}' can reach"), limited(left() / (len(asked) - k)):
+                answers.append(_in_time(_answer(limit, problem, kinds, found, solve)))
         if len(found.conflict) > 1 and any(answer.is_none for answer in answers):
             found = _narrowed(found, problem, solve)
     designs = [answer.result for answer in answers if answer.result is not None]
@@ -126,6 +126,12 @@ def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], found: Resu
         if not answer.is_none:
             break
     return answer
+
+
+def _in_time(answer: _Answer) -> _Answer:
+    """With whether it was ended before its own end."""
+    told = answer.told
+    return replace(answer, told=replace(told, ended=passed() and not told.why and told.proof is not Proof.GLOBAL))
 
 
 def _asking(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, ...]) -> Problem:

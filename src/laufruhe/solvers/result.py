@@ -158,8 +158,8 @@ class Reached:
         Of the value.
     decisions
         Of that design.
-    why
-        Why no design is told.
+    why, ended
+        Why no design is told, and whether the search for one was ended for want of time.
     """
 
     name: str
@@ -171,6 +171,7 @@ class Reached:
     proof: Proof = Proof.NONE
     decisions: tuple[DecisionValue, ...] = ()
     why: str = ""
+    ended: bool = False
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,8 @@ def _sentence(found: Reached, held: str) -> str:
     }
     known = f"; no design is {beyond} than {bound}" if found.bound > 0.0 else ", and nothing is proven of it"
     said = words.get(proof, f"the {least} found of '{found.name}' is {value}, a local optimum{known}")
-    text = f"{held}{said}; {found.side} {with_unit(found.limit, found.unit)} is asked."
+    ended = " Its search ended for want of time; give more by a time limit." if found.ended else ""
+    text = f"{held}{said}; {found.side} {with_unit(found.limit, found.unit)} is asked.{ended}"
     return text[:1].upper() + text[1:]
 
 

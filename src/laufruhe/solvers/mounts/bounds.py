@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from laufruhe.numerics.budget import in_time, passed
+from laufruhe.numerics.budget import at_least, in_time, passed
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -19,6 +19,8 @@ from laufruhe.solvers.mounts.search import MountSearch
 from laufruhe.solvers.result import Result
 
 MOST_DIVISIONS = 3
+# seconds that a first bound has where time is over
+LEAST_SECONDS = 0.5
 
 
 def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
@@ -49,8 +51,9 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
 
 def _by_boxes(problem: Problem, value: float, room: float, near: Sequence[Value]) -> Divided:
     """By the forces of springs, a few boxes of which close many stiffnesses; by expansions what these leave open."""
-    few = spring_bound(problem, value, room, near)
-    if not divides(problem) or (few.boxes and few.bound >= value - room):
+    with at_least(LEAST_SECONDS):
+        few = spring_bound(problem, value, room, near)
+    if passed() or not divides(problem) or (few.boxes and few.bound >= value - room):
         return few
     many = divided_bound(problem, value, room)
     return Divided(max(few.bound, many.bound), few.boxes + many.boxes, many.places or few.places)

@@ -11,6 +11,7 @@ import numpy as np
 
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.budget import passed
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Limit, Measure, Term
@@ -111,7 +112,7 @@ def _mounts(design: Design) -> list[float]:
 def _rebalanced(design: Design) -> tuple[Design, float] | None:
     """Unbalances decided anew on the mounts found, with proof; None where that is not convex."""
     problem = design.problem
-    if not problem.unbalances or not problem.load_terms or problem.mount_terms:
+    if not problem.unbalances or not problem.load_terms or problem.mount_terms or passed():
         return None
     if any(limit.measure.unit == "" for limit in problem.mount_limits):
         # transmissibility depends on what excites
@@ -205,6 +206,7 @@ def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, 
     apart = distinct(optima, scale)
     text = f"IPOPT from {starts} start{'s' if starts > 1 else ''}, {usable} of which ended at "
     text += "one and the same optimum" if len(apart) == 1 else f"{len(apart)} different optima"
+    text = text if optima else "a design to start from"
     if len(apart) > 1 and apart[-1].value > WORTH_SAYING * apart[0].value > 0.0:
         text += f", up to {apart[-1].value / apart[0].value:.3g} times the best"
     if proven is not None:

@@ -41,7 +41,8 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     first = None if relaxed is None or alone else place_of(problem, relaxed)
     search = MountSearch(few, initial, first=first, beside=True, coarser=1 if alone else COARSER)
     search.run()
-    if not stopped and not alone and search.best is not None and search.best.design.excess <= NEAR:
+    searched = bool(search.optima) and not stopped and not alone
+    if searched and search.best is not None and search.best.design.excess <= NEAR:
         search.refined()
     timing = {"solve": time.perf_counter() - started}
     found = search.chosen

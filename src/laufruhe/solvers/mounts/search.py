@@ -112,7 +112,14 @@ class MountSearch:
         self.optima: tuple[LocalOptimum, ...] = ()
 
     def run(self) -> None:
-        """From all starts, and again in a smaller size where that of the starts hid what was found."""
+        """From all starts, and again in a smaller size where that of the starts hid what was found.
+
+        Where time is over already, the first start is the design if it is one.
+        """
+        start = self._started(*self._points[0]) if passed() and self.moves is None else None
+        if start is not None and start.excess <= SLACK:
+            self._keep(Found(start, self.joint))
+            return
         nothing = nothing_of(self.problem)
         self._under_what_is_felt(lambda: self._search(self._points))
         for _ in rounds(MOST_SIZES):
@@ -203,18 +210,21 @@ class MountSearch:
         if self.moves is not None:
             return set()
         limits = [x for x in self.problem.load_limits if not x.measure.is_mass and not x.measure.channel.is_checked]
-        domains = domains_of(self.problem.unbalances)
-        for mounts, columns in self._points[:LOOKED] if limits else ():
-            own, sizes = iter(mounts), iter(domain.complex_value(columns) for domain in domains)
-            values: list[Value] = [next(sizes) if d.is_affine else next(own) for d in self.problem.decisions]
-            design = judged_at(self.problem, values)
+        for place in self._points[:LOOKED] if limits else ():
+            design = self._started(*place)
             limits = [x for x in limits if design is not None and design.evaluation.standing(x).excess < -ROOM]
         return set(limits)
+
+    def _started(self, mounts: Sequence[float], columns: Array) -> Design | None:
+        """The design that a start is."""
+        own, sizes = iter(mounts), iter(d.complex_value(columns) for d in domains_of(self.problem.unbalances))
+        values: list[Value] = [next(sizes) if d.is_affine else next(own) for d in self.problem.decisions]
+        return judged_at(self.problem, values)
 
     def _under_what_is_felt(self, search: Callable[[], None]) -> None:
         """A search, and again under the limits that were left out where its best ends come near them."""
         search()
-        while self._felt and not passed():
+        while self._felt and not (passed() and self.best is not None and self.best.design.excess <= SLACK):
             self._left_out, self._felt, self.optima, self._near = self._left_out - self._felt, set(), (), []
             self.joint = self._program()
             search()
@@ -244,7 +254,6 @@ class MountSearch:
                 self._keep(found)
                 if FEASIBLE < design.excess <= NEAR:
                     self._near.append(found)
-
         self._felt = {limit for limit in self._left_out if any(self._feels(design, limit) for design in designs)}
 
     def _feels(self, design: Design, limit: Limit) -> bool:

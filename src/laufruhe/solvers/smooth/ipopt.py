@@ -18,7 +18,7 @@ from laufruhe.numerics.progress import tell, telling
 from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 
 # seconds that a start has where time is over
-SHORTEST = 0.5
+SHORTEST = 0.25
 # of a program whose numbers are differences of a model outside
 LOOSER = 1e-8
 # programs that are kept built
