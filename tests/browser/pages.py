@@ -102,9 +102,10 @@ def site() -> Path:
         for page in source.rglob("*.md"):
             if str(page.relative_to(source).with_suffix("")) not in (*SITE, "README"):
                 page.unlink()
-        # its first section has all that the others are set in
+        # its first equations have all that the others are set in
         equations = source / "theory" / "equations.md"
-        equations.write_text(equations.read_text(encoding="utf-8").partition("## L. ")[0], encoding="utf-8")
+        first, _, _ = equations.read_text(encoding="utf-8").partition("**Order coefficients")
+        equations.write_text(first, encoding="utf-8")
         extensions = "extensions=mathml,myst_nb,sphinx_copybutton"
         words = [sys.executable, "-m", "sphinx", "-Q", "-b", "html", "-D", extensions, source, folder / "site"]
         subprocess.run(words, check=True)

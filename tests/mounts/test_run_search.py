@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ import laufruhe
 from laufruhe.errors import LaufruheError
 from laufruhe.fidelity.automatic import ladder
 from laufruhe.fidelity.error_bounds import Scale
-from laufruhe.files.reader import load, load_tables, tables_of
+from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models.run_peaks import RunPeaks
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
@@ -59,8 +58,8 @@ def mounts(stop: dict[str, str] | None = None, **opened: Any) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def ready() -> tuple[Problem, Result]:
-    problem = load(READY)
-    problem = problem.changed(search=replace(problem.search, starts=2, boxes=8))
+    told = tables(run_up=tables_of(READY)["run_up"], search={"starts": 1, "boxes": 2})
+    problem = load_tables(told, Path("single.toml"))
     return problem, laufruhe.solve(problem)
 
 
@@ -118,10 +117,10 @@ def test_the_design_keeps_its_limits_when_scipy_integrates_it(ready: tuple[Probl
 
 @pytest.mark.slow
 def test_no_pair_of_stiffnesses_on_a_grid_is_better(ready: tuple[Problem, Result]) -> None:
-    """Of 900 pairs those that promise more, their run-ups followed: none keeps both limits, and near ones do."""
+    """Of 400 pairs those that promise more, their run-ups followed: none keeps both limits, and near ones do."""
     problem, result = ready
     initial = evaluate(problem, samples=180)
-    grid = np.exp(np.linspace(np.log(40e3), np.log(600e3), 30))
+    grid = np.exp(np.linspace(np.log(40e3), np.log(600e3), 20))
     best, looked = np.inf, 0
     for pair in np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2).tolist():
         design = remounted(initial, problem.design(pair))
@@ -130,7 +129,7 @@ def test_no_pair_of_stiffnesses_on_a_grid_is_better(ready: tuple[Problem, Result
             looked += 1
             if design.standing(problem.limits[1]).excess <= 0.0:
                 best = min(best, value)
-    assert looked > 40
+    assert looked > 15
     assert result.objective.value <= best * (1.0 + 1e-6) < np.inf
 
 
@@ -193,7 +192,7 @@ def test_a_stiffness_is_designed_for_beside_bump_stops() -> None:
     assert force.value <= force.limit * (1.0 + 1e-5)
     assert by_scipy(result.final.engine, problem)[0] == pytest.approx(force.value, rel=2e-3)
     initial = evaluate(problem)
-    for stiffness in np.linspace(60e3, 400e3, 120):
+    for stiffness in np.linspace(60e3, 400e3, 40):
         design = remounted(initial, problem.design([float(stiffness)]))
         if objective_value(problem, design) < result.objective.value * (1.0 - 2e-3):
             assert design.standing(problem.limits[0]).excess > 0.0
@@ -250,7 +249,7 @@ def test_weights_and_stiffness_together_are_no_worse_than_either() -> None:
         "120 N/mm",
         {"between": ["60 N/mm", "400 N/mm"], "start": "300 N/mm"},
     ]
-    asked = {"mounts": given, "objective": least, "search": {"starts": 2, "boxes": 4}}
+    asked = {"mounts": given, "objective": least, "search": {"starts": 1, "boxes": 1}}
     mounts_alone = laufruhe.solve(limited(("static sag", "5 mm"), **asked))
     both = laufruhe.solve(limited(("static sag", "5 mm"), counterweights=[weight], **asked))
     assert both.objective.value < mounts_alone.objective.value < mounts_alone.objective.initial
@@ -273,7 +272,7 @@ def test_points_gas_fluid_load_cases_and_a_weight_stand_beside_a_run() -> None:
     problem = limited(
         ("run-up travel", "11 mm"), ("static travel", "12 mm"), mounts=given, operating_points=points,
         gas={"model": "seiliger", "peak_pressure": "55 bar", "imep": "3 bar"}, counterweights=[weight],
-        load_cases=[{"name": "pot hole", "times_weight": [0, 0, -3]}], search={"starts": 1, "boxes": 4},
+        load_cases=[{"name": "pot hole", "times_weight": [0, 0, -3]}], search={"starts": 1, "boxes": 1},
     )  # fmt: skip
     result = laufruhe.solve(problem)
     assert result.certificate.kind is not Proof.NONE

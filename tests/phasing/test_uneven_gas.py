@@ -150,8 +150,9 @@ def test_one_open_throw_is_where_a_fine_grid_is_least(tmp_path, cycle):
     problem = engines.problem(tmp_path, count, cycle, engine, allowed, GAS + MOUNT_FORCE + few)
     result = solve(problem)
     phasing = problem.phasing
-    grid = {}
-    for degrees in range(low, high + 1, 2):
+    # all of it coarsely, and about what was found finely
+    grid, near = {}, 2 * round(0.5 * math.degrees(result.decisions[1].value))
+    for degrees in sorted({*range(low, high + 1, 10), *range(near - 10, near + 11, 2)}):
         middle = (math.radians(degrees),)
         tail = (math.radians(240.0),) if count == 3 else ()
         exact = replace(phasing.realise(Candidate((0.0, *middle, *tail), order)), phasing=None)

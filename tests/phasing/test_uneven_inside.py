@@ -183,7 +183,7 @@ def test_a_bank_that_is_open_beside_its_bearings() -> None:
     result = laufruhe.solve(problem)
     phasing, start = problem.phasing, starts_of(problem.phasing, None, True)[0]
     values = []
-    for bank in np.radians(np.linspace(60, 120, 31)):
+    for bank in np.radians(np.linspace(60, 120, 13)):
         throw = 0.5 * (bank - start.bank_angle) + start.throws[0]
         own = replace(phasing.realise(replace(start, bank_angle=float(bank), throws=(float(throw),))), phasing=None)
         values.append(objective_value(own, evaluate(own)))
@@ -275,7 +275,7 @@ def test_firing_orders_beside_a_spring_that_is_open() -> None:
     for order in ([1, 2, 3], [1, 3, 2]):
         fixed = problem_of({"firing_order": order}, "", **told)
         decision = fixed.mount_decisions[0]
-        for stiffness in np.linspace(decision.lower, decision.upper, 21):
+        for stiffness in np.linspace(decision.lower, decision.upper, 11):
             own = evaluate(fixed, fixed.design([float(stiffness)], [decision]))
             if own.excess(fixed.limits) <= 0.0:
                 values.append(objective_value(fixed, own))

@@ -27,7 +27,7 @@ def decoupled(opened: int, turned: bool = False) -> Problem:
     """So many springs of the powertrain open, bounce and roll each with half of a mode at least."""
     tables = powertrain("2", "4 Hz", opened)
     tables["constraints"].append(dict(DECOUPLED))
-    tables["search"] = {"boxes": 40, "starts": 4}
+    tables["search"] = {"boxes": 8, "starts": 4}
     if turned:
         tables["mounts"]["places"][1]["turned"] = [{"between": [-20, 20], "start": 3}, 0, 0]
     return load(tables)

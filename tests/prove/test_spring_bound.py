@@ -374,9 +374,9 @@ def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, mon
 
         return wrong
 
-    # of several orders every one is bounded by itself, so that few ways to be wrong are many
+    # of several orders every one is bounded by itself, so that one way to be wrong is many
     ways = (spoilt(2.0, 1e-3), spoilt(2.0, 0.0), spoilt(0.0, 0.0), spoilt(0.0, 1.0))
-    for wrong in ways[:: 3 if name == "means" else 1]:
+    for wrong in ways[: 1 if name == "means" else 4]:
         monkeypatch.setattr(box, "proposed", wrong)
         boxes._least = [0.0 * own for own in boxes._least]
         assert boxes.relaxed(low, high)[0] <= least
@@ -487,7 +487,7 @@ def test_no_local_search_finds_less_than_the_bound_of_six_springs() -> None:
     """Nelder and Mead on the exact model, from far and from beside the design."""
     from scipy.optimize import minimize
 
-    problem = replace(load(powertrain("2 4", "7 Hz", 6)), tolerance=1e-3)
+    problem = replace(load(powertrain("2 4", "7 Hz", 6) | {"search": {"starts": 1}}), tolerance=1e-3)
     result = solve(problem)
     assert result.certificate is not None
     bound, given = result.certificate.lower_bound, evaluate(problem)

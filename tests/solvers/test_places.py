@@ -309,7 +309,7 @@ def test_workers_change_no_bit(tmp_path: Path) -> None:
     whole = "angle = { between = [0, 360] }"
     text = HEIGHTS.read_text(encoding="utf-8")
     text = text.replace("angle = 180", whole).replace('"0.05 kg m"', '"0.02 kg m"')
-    text += "\n[search]\nboxes = 2\n[fidelity]\nsamples = 360\n"
+    text += "\n[search]\nboxes = 2\n[fidelity]\nsamples = 96\n"
     problem = _problem(tmp_path, text)
     with working_on(HERE):
         alone = laufruhe.solve(problem)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import replace
 from pathlib import Path
 
@@ -360,13 +361,12 @@ def test_length_and_diameter_of_a_rod_are_proven_against_a_scan_of_positions() -
     assert result.objective.value == pytest.approx(force, rel=1e-5)
     for limit, own in zip(result.limits, (buckling, stress), strict=True):
         assert limit.value == pytest.approx(own, rel=1e-4)
-    least = math.inf
+    least, widths = math.inf, np.linspace(0.008, 0.025, 120)
     for at in np.linspace(0.055, 0.3, 50):
-        for across in np.linspace(0.008, 0.025, 120):
-            found = _rod(at, across)
-            if found[1] <= 0.05 and found[2] <= 60e6:
-                least = min(least, found[0])
-                break
+        # a thicker rod is firmer
+        thin = bisect_left(widths, True, key=lambda across: all(np.less_equal(_rod(at, across)[1:], (0.05, 60e6))))
+        if thin < len(widths):
+            least = min(least, _rod(at, widths[thin])[0])
     assert result.certificate.lower_bound <= least
     assert result.objective.value <= least * (1.0 + 1e-4)
     assert least <= 1.02 * result.objective.value
@@ -378,7 +378,7 @@ def test_a_cut_off_that_moves_with_the_rod_is_left_out_of_the_bound() -> None:
     text = changed(text, 'stroke = "80 mm"', 'stroke = "80 mm"\nbore = "80 mm"').replace(
         "samples = 180", "samples = 90"
     )
-    gas = '[search]\nboxes = 25\n[gas]\nmodel = "seiliger"\npeak_pressure = "60 bar"\nimep = "6 bar"\n[running_gear]'
+    gas = '[search]\nboxes = 10\n[gas]\nmodel = "seiliger"\npeak_pressure = "60 bar"\nimep = "6 bar"\n[running_gear]'
     problem = laufruhe.load(changed(text, "[running_gear]", gas))
     result = laufruhe.solve(problem)
     assert result.certificate.kind is Proof.WITHIN_GAP
