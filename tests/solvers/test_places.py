@@ -265,7 +265,8 @@ def test_limits_on_distances_hold_and_are_proven(case: str, tmp_path: Path) -> N
     assert bound.final.excess(problem.limits) <= 1e-6
     assert bound.certificate.lower_bound >= free.certificate.lower_bound * (1.0 - 1e-6) if free.certificate else False
     assert bound.certificate.kind is Proof.GLOBAL
-    searched = _searched(problem, 5, bound.final.samples, 3, 1e4)
+    # the bound of a mean is that of the whole cycle (P7), which fewer angles may miss by more than is asked here
+    searched = _searched(problem, 5, 4 * bound.final.samples, 3, 1e4)
     assert bound.certificate.lower_bound <= searched * (1.0 + 1e-6)
     assert bound.objective.value <= searched * (1.0 + 2e-3)
 
