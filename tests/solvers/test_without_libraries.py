@@ -22,6 +22,22 @@ except SolverError as error:
 """
 
 
+QUICK = """
+import sys
+sys.modules |= dict.fromkeys(("casadi", "cvxpy", "matplotlib", "pandas", "pyscipopt", "scipy", "xarray"))
+import laufruhe
+print(laufruhe.solve(sys.argv[1]).status)
+"""
+
+
+@pytest.mark.slow
+def test_counterweights_and_shafts_are_decided_with_no_library_but_the_solver_of_cones() -> None:
+    """None of the others is imported: each would take longer than the design."""
+    path = str(PROBLEMS / "tractor-four-lanchester.toml")
+    found = subprocess.run([sys.executable, "-c", QUICK, path], check=True, capture_output=True, text=True)
+    assert found.stdout == "optimal\n"
+
+
 @pytest.mark.slow
 def test_without_casadi_counterweights_are_decided_and_uneven_throws_say_what_they_need() -> None:
     paths = [str(PROBLEMS / f"{name}.toml") for name in ("tractor-single", "inline-nine-uneven")]

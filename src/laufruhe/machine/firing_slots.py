@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
-from scipy.optimize import linprog
 
 from laufruhe.machine.engine import Cycle
 
@@ -196,6 +195,8 @@ class FiringSlots:
 
     def _timed(self, cover: Cover) -> FiringPattern | None:
         """The moments that break the bounds least, and then are the most even."""
+        from scipy.optimize import linprog
+
         count, whole = self.count, self.cycle.angle
         even = whole / count
         # moments of the firings, angle between the banks, unevenness, what is broken
