@@ -19,6 +19,7 @@ from laufruhe.errors import SolverError
 from laufruhe.files.reader import load
 from laufruhe.live import live_model
 from laufruhe.numerics.progress import Listener
+from laufruhe.present.pictures import PICTURES
 from laufruhe.problem.problem import Problem
 from laufruhe.report import files
 from laufruhe.report.json_result import as_json
@@ -109,13 +110,14 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         say("writing tables")
         with _timed(seconds, "tables"):
             write_tables(result, stage)
-        live = live_model(problem, result)
+        seconds = {**result.timing, **seconds}
+        result = replace(result, timing=seconds)
+        live, document = live_model(problem, result), result_document(result, list(PICTURES), request.command)
         if request.kinds:
             say("drawing")
         with _timed(seconds, "plots"):
             pictures = drawn()
-        result = replace(result, timing={**result.timing, **seconds})
-        document = result_document(result, list(pictures), request.command)
+        document = document.showing(pictures)
         files.write(stage / files.REPORT, document.as_markdown(f".{request.kinds[0]}" if request.kinds else ""))
         files.write(stage / files.PAGE, as_html(document, pictures, live))
         for place in filter(None, (stage / files.RESULT, copy)):

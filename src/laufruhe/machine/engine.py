@@ -165,16 +165,7 @@ class Engine:
     @property
     def pins(self) -> tuple[Rotor, ...]:
         """Rotating masses at the crank pins, as the rotors that they are."""
-        return tuple(
-            Rotor(
-                f"pin of {part.name}",
-                part.x,
-                part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)),
-                part.shaft,
-            )
-            for part in self.slider_cranks
-            if part.rotating_mass > 0.0
-        )
+        return _pins(self.slider_cranks)
 
     @property
     def cylinders(self) -> tuple[SliderCrank, ...]:
@@ -192,6 +183,18 @@ class Engine:
         turns = sorted(within(as_turn(part.firing_angle), whole) for part in self.cylinders)
         following = [*turns[1:], turns[0] + whole] if turns else []
         return tuple(math.tau * float(b - a) for a, b in zip(turns, following, strict=True))
+
+
+@lru_cache(maxsize=64)
+def _pins(parts: tuple[SliderCrank, ...]) -> tuple[Rotor, ...]:
+    """Rotating masses at the pins of cranks."""
+    return tuple(
+        Rotor(
+            f"pin of {part.name}", part.x, part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft
+        )
+        for part in parts
+        if part.rotating_mass > 0.0
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=256)

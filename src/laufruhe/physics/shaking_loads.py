@@ -89,8 +89,14 @@ def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum
     turning = tuple(rotors)
     if not turning:
         return Spectrum(cycle.base_order, np.zeros((1, 6), dtype=complex))
-    indices = [order_index(cycle, abs(rotor.shaft.ratio)) for rotor in turning]
+    indices = _indices(cycle, tuple([rotor.shaft.ratio for rotor in turning]))
     return Spectrum(cycle.base_order, cancelling_sums(_rotor_wrenches(turning, speed), indices))
+
+
+@lru_cache(maxsize=256)
+def _indices(cycle: Cycle, ratios: tuple[float, ...]) -> tuple[int, ...]:
+    """Of the orders of some shafts among those of a cycle."""
+    return tuple(order_index(cycle, abs(ratio)) for ratio in ratios)
 
 
 def added_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:

@@ -5,7 +5,7 @@ It is assembled once. Every block knows how it is written in Markdown; `web_page
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -81,6 +81,11 @@ class Document:
 
     title: str
     blocks: tuple[Block, ...]
+
+    def showing(self, pictures: Collection[str]) -> Document:
+        """Without the illustrations that there is no picture of."""
+        kept = (block for block in self.blocks if not isinstance(block, Illustration) or block.name in pictures)
+        return Document(self.title, tuple(kept))
 
     def as_markdown(self, ending: str) -> str:
         """The text of `report.md`; the ending is that of the picture files beside it."""

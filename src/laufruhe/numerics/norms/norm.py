@@ -228,7 +228,8 @@ def lengths(rows: Array) -> Array:
         return _scaled_lengths(rows)
     if size.min(initial=_MOST) < _LEAST:
         small = size < _LEAST
-        size[small] = _scaled_lengths(rows[small])
+        if (short := rows[small]).any():
+            size[small] = _scaled_lengths(short)
     return np.asarray(size)
 
 
