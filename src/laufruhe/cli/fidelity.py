@@ -25,6 +25,9 @@ from laufruhe.report import trade as report
 from laufruhe.report.web_page import as_html
 from laufruhe.studies.trade import Trade, seconds, trade, traded_part
 
+Pages = dict[str, bytes]
+"""What is written, by the names of the files."""
+
 
 def explained(path: Path, tolerance: float) -> tuple[str, Callable[[], str]]:
     """Text of what a scene needs, and what makes JSON of it."""
@@ -59,9 +62,6 @@ def _mount_times(problem: Problem, choice: Choice) -> tuple[float, float]:
 
 def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[str, Callable[[], str]]:
     """Pages and pictures of every problem, an index of them all; returns the index, and what makes JSON."""
-    from laufruhe.plots.style import as_svg, save
-    from laufruhe.plots.trade import figure, has_picture
-
     read = [(path, _with_objective(path)) for path in paths]
     of_wheels = [(path, problem.name) for path, problem in read if problem.flywheel_decisions]
     if len(of_wheels) == len(read):
@@ -69,19 +69,12 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
         raise refused("flywheel", "", rule, "fix it", of_wheels[0][0])
     paths, problems = zip(*((path, problem) for path, problem in read if not problem.flywheel_decisions), strict=True)
     found: dict[int, Trade] = {}
-    for k, one in _measured(paths, problems, say):
-        problem, path, found[k] = problems[k], paths[k], one
-        page, picture, shown = (f"{problem.name}.{end}" for end in ("md", "png", "html"))
-        with files.staged(files.Set(folder, "--out", "trade", (page, picture, shown), adds=True)) as stage:
-            pictures = {}
-            if has_picture(one):
-                drawn = figure(one)
-                save(drawn, stage / picture)
-                pictures[problem.name] = as_svg(drawn)
-            command = shlex.join(["laufruhe", "trade", str(path)])
-            document = report.trade_document(one, next(iter(pictures), None), command)
-            files.write(stage / page, document.as_markdown(".png"))
-            files.write(stage / shown, as_html(document, pictures))
+    for k, one, pages in _measured(paths, problems, say):
+        found[k] = one
+        names = [f"{problems[k].name}.{end}" for end in ("md", "png", "html")]
+        with files.staged(files.Set(folder, "--out", "trade", names, adds=True)) as stage:
+            for name, page in pages.items():
+                (stage / name).write_bytes(page)
     trades = [found[k] for k in range(len(problems))]
     index = report.index(trades, [name for _, name in of_wheels])
     if len(read) > 1:
@@ -97,26 +90,41 @@ def _together(trades: Sequence[Trade]) -> str:
 
 def _measured(
     paths: Sequence[Path], problems: Sequence[Problem], say: Callable[[str], None]
-) -> Iterator[tuple[int, Trade]]:
-    """One problem measured here, several side by side, as they come."""
+) -> Iterator[tuple[int, Trade, Pages]]:
+    """One problem measured here, several side by side, as they come; with its pages."""
     if len(problems) == 1 and given() is None:
-        yield 0, trade(problems[0], lambda text: say(f"{problems[0].name}: {text}"))
+        one = trade(problems[0], lambda text: say(f"{problems[0].name}: {text}"))
+        yield 0, one, _pages(paths[0], one)
         return
     pieces = [(path, tables_of(path)) for path in paths]
     with (
         executor_for(min(len(pieces), count_of())) as executor,
         closing(each(_measured_there, pieces, executor)) as answers,
     ):
-        for k, one in answers:
+        for k, (one, pages) in answers:
             say(f"{problems[k].name} is measured")
-            yield k, replace(one, problem=traded_part(problems[k]))
+            yield k, replace(one, problem=traded_part(problems[k])), pages
 
 
-def _measured_there(piece: tuple[Path, dict[str, Any]]) -> Trade:
+def _measured_there(piece: tuple[Path, dict[str, Any]]) -> tuple[Trade, Pages]:
     """By a worker, which has no use for the file; what of the problem is no number stays there."""
     path, tables = piece
     one = trade(load_tables(tables, path))
-    return replace(one, problem=replace(one.problem, phasing=None))
+    return replace(one, problem=replace(one.problem, phasing=None)), _pages(path, one)
+
+
+def _pages(path: Path, one: Trade) -> Pages:
+    """What is written of a problem: its page, in two forms, and the picture where there is one."""
+    from laufruhe.plots.style import as_png, as_svg
+    from laufruhe.plots.trade import figure, has_picture
+
+    name, pages, pictures = one.problem.name, Pages(), dict[str, str]()
+    if has_picture(one):
+        drawn = figure(one)
+        pages[f"{name}.png"], pictures[name] = as_png(drawn), as_svg(drawn)
+    document = report.trade_document(one, next(iter(pictures), None), shlex.join(["laufruhe", "trade", str(path)]))
+    texts = {"md": document.as_markdown(".png"), "html": as_html(document, pictures)}
+    return pages | {f"{name}.{end}": text.encode() for end, text in texts.items()}
 
 
 def _with_objective(path: Path) -> Problem:

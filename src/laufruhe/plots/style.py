@@ -231,12 +231,20 @@ def save(figure: Figure, path: Path) -> None:
     """Write a PNG or an SVG, as the ending says."""
     if path.suffix == ".svg":
         path.write_text(as_svg(figure), encoding="utf-8", newline="\n")
-        return
+    else:
+        path.write_bytes(as_png(figure))
+
+
+def as_png(figure: Figure) -> bytes:
+    """The picture as PNG."""
     canvas: Any = FigureCanvasAgg(figure)
     with styled():
         canvas.draw()
+    drawn = io.BytesIO()
     # all of it is opaque
-    Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3]).save(path, compress_level=3, dpi=(DPI, DPI))
+    image = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
+    image.save(drawn, format="png", compress_level=3, dpi=(DPI, DPI))
+    return drawn.getvalue()
 
 
 def as_svg(figure: Figure) -> str:

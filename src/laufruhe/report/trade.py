@@ -12,14 +12,15 @@ from laufruhe.present.numbers import DASH
 from laufruhe.report.document import Block, Code, Document, Illustration, Paragraph
 from laufruhe.report.grid import Grid, piped
 from laufruhe.report.strict_json import strict
+from laufruhe.solvers.nearby import compares_stars
 from laufruhe.studies.trade import KEEPS, REFERENCE_NAME, Row, Trade, is_local, is_open
 
-ALIKE = 1.3
+ALIKE, SMALLEST = 1.3, 1e-4
 LOCAL = (
-    " What is open here has many optima. Every fidelity begins at the design of the reference, or at the stars that it "
-    "ranks first, and finds an optimum nearby: that is its solve, which a search from nothing takes several times as "
-    "long for."
+    " What is open here has many optima. Every fidelity begins at the design of the reference and finds an optimum "
+    "nearby, in the time of its solve; a search from nothing takes several times as long."
 )
+OF_STARS = " Stars are ranked by each fidelity's physics at few steps, and the best of them decided at its own."
 OF_MOUNTS = " Choices about modes and time would change with the mounts that are open: no design is decided with them."
 HEAD = (
     "fidelity", "error", "error estimate", "another design", "gradient", "solve", "first design", "memory",
@@ -29,7 +30,8 @@ COLUMNS = (
     "**Another design**: objective of a further design of a prepared problem. **Gradient**: with its derivatives by "
     "all decisions. **Solve**: optimum at this fidelity's own angles, with all preparation. **First design**: "
     "objective with all preparation. **Regret**: by how much the exact objective of the design found exceeds that of "
-    "the best design known; of a design that by the exact model is beyond a limit, by how much it is."
+    "the best design known, or by how much that design is beyond a limit by the exact model, where that is more than "
+    "0.1 %; it is below zero where it is less."
 )
 INDEX = (
     "problem", "value within 0.1 %", "per design", "decision within 0.1 %", "per solve", "error of two-order",
@@ -56,7 +58,8 @@ def trade_document(found: Trade, picture: str | None, command: str) -> Document:
     if not found.whole:
         blocks.append(Paragraph("Stopped at the time limit: fidelities beyond the last row were not measured."))
     mounts = OF_MOUNTS if problem.mount_decisions and problem.load_terms else ""
-    blocks.append(Paragraph(COLUMNS + (LOCAL if is_local(problem) else "") + mounts, marked=True))
+    searched = OF_STARS if compares_stars(problem) else LOCAL if is_local(problem) else ""
+    blocks.append(Paragraph(COLUMNS + searched + mounts, marked=True))
     blocks.extend(Paragraph(line) for line in (*found.left_out, *_beyond(found)))
     return Document(f"Speed against accuracy: {problem.title}", (*blocks, Code(command)))
 
@@ -117,11 +120,11 @@ def as_json(found: Trade) -> str:
 
 def index(trades: Sequence[Trade], refused: Sequence[str] = ()) -> str:
     """One line for every problem, and what they have in common; those for whose open flywheel nothing is traded."""
-    rows = [*map(_index_row, trades), *([name, *[DASH] * (len(INDEX) - 2), OPEN_FLYWHEEL] for name in refused)]
+    rows = [*map(_index_row, trades), *([f"`{name}`", *[DASH] * (len(INDEX) - 2), OPEN_FLYWHEEL] for name in refused)]
     lines = [
         "# Speed against accuracy",
         "",
-        f"Which fidelity to take, measured on {len(trades)} ready problems. In short:",
+        f"Which fidelity to take, measured on {len(trades)} problem{'s' * (len(trades) > 1)}. In short:",
         "",
         "- `auto` is the safe choice: it states a bound of its error and keeps it. Problems that ask only for "
         "modes or sag need no loads.",
@@ -134,15 +137,16 @@ def index(trades: Sequence[Trade], refused: Sequence[str] = ()) -> str:
         "- Regret may be far below the error, because an optimum is flat, or far above it, because a shaft that "
         "balances the wrong load leaves the right one. Read both columns.",
         "",
-        piped(INDEX, sorted(rows), (0, 1, 3, len(INDEX) - 1)),
+        piped(INDEX, sorted(rows, key=lambda row: row[0].strip("[`")), (0, 1, 3, len(INDEX) - 1)),
         "",
         "*Per design, per solve*: time of the objective of one more design, and of an optimum, at the fidelity named. "
         "*Regret*: by how much the exact objective of the design that a fidelity decides exceeds that of the best "
-        "design known; *beyond a limit*: by how much that design exceeds a limit by the exact model, so that it is no "
-        "decision. Unbalances alone have one optimum, which each fidelity finds at its own angles. All else is "
-        "searched, at each fidelity from the design of the reference: what proves an optimum is left out, of the "
-        "reference too, for the share by which another design is worse needs no proof. *Uneven speed*: change of the "
-        "objective with a flywheel that leaves 2 % of irregularity.",
+        "design known; *beyond a limit*: by how much that design exceeds a limit by the exact model, where that is "
+        "more than 0.1 %, so that it is no decision. Unbalances alone have one optimum, which each fidelity finds at "
+        "its own angles; even stars are ranked by each fidelity's own physics; what else is open is searched for from "
+        "the design of the reference. Nothing is proven, of the reference neither: the share by which another design "
+        "is worse needs no proof. *Uneven speed*: change of the objective with a flywheel that leaves 2 % of "
+        "irregularity.",
     ]
     return "\n".join(lines) + "\n"
 
@@ -183,11 +187,11 @@ def _cost(trades: Sequence[Trade], name: str, what: str) -> str:
     broken = sum(row.excess > KEEPS for row in rows)
     if not errors:
         return f"{what} nothing that these problems show."
-    text = f"{what} up to {_percent(errors[-1])} of the number{_middle(errors)}"
+    text = f"{what} {_most(errors[-1])} of the number{_middle(errors)}"
     if regrets:
-        text += f"; of the design up to {_percent(regrets[-1])}{_middle(regrets)}"
+        text += f"; of the design {_most(regrets[-1])}{_middle(regrets)}"
     if broken:
-        text += f", and {broken} design{'s that break' if broken > 1 else ' that breaks'} a limit"
+        text += f"; it takes {broken} design{'s' * (broken > 1)} beyond a limit"
     return text + "."
 
 
@@ -197,8 +201,12 @@ def _middle(shares: Sequence[float]) -> str:
     return f", {_percent(shares[count // 2])} in the middle of {count} problems" if count > 2 else ""
 
 
+def _most(share: float) -> str:
+    return _percent(share) if share < SMALLEST else f"up to {_percent(share)}"
+
+
 def _percent(share: float) -> str:
-    if share < 1e-4:
+    if share < SMALLEST:
         return "less than 0.01 %"
     return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
 

@@ -38,6 +38,11 @@ def is_convex(problem: Problem) -> bool:
     return problem.phasing is None and len(problem.unbalances) == len(problem.decisions) and not asks_runs(problem)
 
 
+def compares_stars(problem: Problem) -> bool:
+    """Whether what else is open of each star is quickly decided, so that all are compared."""
+    return problem.phasing is not None and not (problem.phasing.continuous or problem.mount_decisions)
+
+
 def by_cones(problem: Problem, samples: int | None = None) -> Engine | None:
     """The best unbalances at some steps over the period of the loads, all by default, without refinement."""
     model = AffineModel(problem)
@@ -64,11 +69,10 @@ def next_to(problem: Problem, known: Result) -> Engine | None:
     known
         Of a problem with the same decisions: where numbers are sought from, and the stars that are compared.
     """
-    phasing = problem.phasing
-    if phasing is not None and not (phasing.continuous or problem.mount_decisions):
+    if compares_stars(problem):
         # the best of many stars may be far from the best known
         return _of_stars(problem, first_of(problem.at(_coarse(problem.fidelity))) or known)
-    engines = [_from(problem, known) if phasing is None else _of_stars(problem, known)]
+    engines = [_from(problem, known) if problem.phasing is None else _of_stars(problem, known)]
     if not _is_like(problem, known):
         with suppress(SolverError, ModelError):
             engines.append(_engine(first_of(problem)))
