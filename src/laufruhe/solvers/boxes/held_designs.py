@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.solvers.conclusion import Design, judged, unbalances_of
+from laufruhe.prove.certificate import Reach
+from laufruhe.solvers.boxes.search import B, Search, divided
+from laufruhe.solvers.conclusion import Design, Shown, concluded, judged, none_within, unbalances_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.result import Result, Status
 
@@ -28,36 +33,71 @@ class HeldDesign:
         """The objective of a design that is allowed."""
         return math.inf if self.design.rank[0] else self.design.value
 
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """Of the design."""
+        return self.design.rank
 
-class HeldDesigns:
+
+class HeldDesigns(Search[B, HeldDesign]):
     """What a search over boxes knows of its designs, and of the limits that were not met in boxes."""
+
+    conflict: tuple[str, ...] = ()
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
-        self.conflict: tuple[str, ...] = ()
-
-    @staticmethod
-    def better(best: HeldDesign, found: HeldDesign) -> HeldDesign:
-        """The better of the best design so far and another."""
-        return found if found.design.rank < best.design.rank else best
 
     def told(self, conflict: Sequence[str]) -> None:
         """What cannot be met in one box may be in another: all boxes together tell."""
         told = {*self.conflict, *conflict}
         self.conflict = tuple(limit.name for limit in self.problem.limits if limit.name in told)
 
-    def best_with(self, held: Problem, where: dict[str, Value]) -> HeldDesign:
-        """The best design with some decisions given, by the problem of its unbalances.
+    def solved(self, root: B | None, first: HeldDesign | None, most: int, what: str, how: str) -> Result:
+        """The best design that dividing the boxes comes to, proven as far as that goes.
 
-        Where none is allowed the unbalances stay as given, and the design breaks its limits.
+        Parameters
+        ----------
+        root
+            All that is open; None where no design is allowed.
+        first
+            A design to begin with.
+        most
+            Boxes, where no number of them is asked for.
+        what, how
+            Is divided, and bounded, in words.
         """
-        result, samples = None, None
-        values: dict[str, Value] = {decision.name: decision.start for decision in self.problem.decisions} | where
-        if held.decisions:
-            held = replace(held, tolerance=SHARE * self.problem.tolerance)
-            result = solve_unbalances(held)
-            if result.status is not Status.INFEASIBLE:
-                found = unbalances_of(held, result)
-                values |= dict(zip((decision.name for decision in held.decisions), found, strict=True))
-            samples = result.final.samples
-        return HeldDesign(judged(self.problem, list(values.values()), samples), result)
+        started, problem = time.perf_counter(), self.problem
+        initial, best, bound, boxes = evaluate(problem), first, math.inf, 1
+        if root is not None and first is not None:
+            most = most if problem.search.boxes is None else problem.search.boxes
+            nothing = nothing_of(problem)
+            best, bound, boxes = divided(self, root, first, nothing, problem.tolerance, most, f"boxes of {what}")
+        timing = {"solve": time.perf_counter() - started}
+        if best is None or (math.isinf(bound) and best.design.rank[0]):
+            return none_within(problem, initial, self.conflict, timing)
+        own, design = best.result, best.design
+        shown = Shown(
+            bound=0.0 if design.rank[0] else min(bound, design.value),
+            reach=Reach.WHOLE,
+            kkt_residual=own.certificate.kkt_residual if own is not None and own.certificate is not None else math.inf,
+            method=f"{how} {boxes} box{'es' * (boxes > 1)} of {what}",
+            prices=own.prices if own is not None else {},
+        )
+        return concluded(design, replace(initial, samples=design.evaluation.samples), shown, timing)
+
+
+def best_with(problem: Problem, held: Problem, where: dict[str, Value]) -> HeldDesign:
+    """The best design with some decisions given, by the problem of its unbalances.
+
+    Where none is allowed the unbalances stay as given, and the design breaks its limits.
+    """
+    result, samples = None, None
+    values: dict[str, Value] = {decision.name: decision.start for decision in problem.decisions} | where
+    if held.decisions:
+        held = replace(held, tolerance=SHARE * problem.tolerance)
+        result = solve_unbalances(held)
+        if result.status is not Status.INFEASIBLE:
+            found = unbalances_of(held, result)
+            values |= dict(zip((decision.name for decision in held.decisions), found, strict=True))
+        samples = result.final.samples
+    return HeldDesign(judged(problem, list(values.values()), samples), result)

@@ -7,7 +7,6 @@ but leads is open, searches from the best points of a grid find a design first.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -18,16 +17,14 @@ from laufruhe.load_models.affine import AffineProblem
 from laufruhe.load_models.led_model import LedModel, LedNorm
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision
-from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Box, halves
 from laufruhe.prove.boxes.leads import SLACK, LeadBound, LeadBoxes
-from laufruhe.prove.certificate import Multipliers, Reach, best_bound
-from laufruhe.solvers.boxes.held_designs import SHARE, HeldDesign, HeldDesigns
-from laufruhe.solvers.boxes.search import divided, searched
-from laufruhe.solvers.conclusion import Shown, concluded, judged, none_within
+from laufruhe.prove.certificate import Multipliers, best_bound
+from laufruhe.solvers.boxes.held_designs import SHARE, HeldDesign, HeldDesigns, best_with
+from laufruhe.solvers.boxes.search import searched
+from laufruhe.solvers.conclusion import judged
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import on_grid
 from laufruhe.solvers.result import Result
@@ -46,28 +43,12 @@ EXACT = 0.02
 
 def solve_leads(problem: Problem) -> Result:
     """The best leads, and the unbalances with them, proven as far as boxes go."""
-    started = time.perf_counter()
-    search, initial = _Search(problem), evaluate(problem)
+    search = _Search(problem)
     search.check_acts()
-    root = search.box(search.model.lower, search.model.upper)
-    nothing, timing = nothing_of(problem), {"solve": 0.0}
-    best, bound, boxes = search.first(), math.inf, 1
-    if root is not None:
-        most = (MOST_PROGRAMS if search.model.domains else MOST_BOXES) if problem.search.boxes is None else None
-        most = most or problem.search.boxes or 0
-        best, bound, boxes = divided(search, root, best, nothing, problem.tolerance, most, "boxes of leads")
-    timing["solve"] = time.perf_counter() - started
-    if math.isinf(bound) and best.design.rank[0]:
-        return none_within(problem, initial, search.conflict, timing)
-    how = "second-order cones over" if search.model.domains else "local searches; lower bound on"
-    shown = Shown(
-        bound=min(bound, best.design.value) if not best.design.rank[0] else 0.0,
-        reach=Reach.WHOLE,
-        kkt_residual=math.inf,
-        method=f"{how} {boxes} box{'es' * (boxes > 1)} of leads",
-        prices=best.result.prices if best.result is not None else {},
-    )
-    return concluded(best.design, replace(initial, samples=best.design.evaluation.samples), shown, timing)
+    root, first = search.box(search.model.lower, search.model.upper), search.first()
+    if search.model.domains:
+        return search.solved(root, first, MOST_PROGRAMS, "leads", "second-order cones over")
+    return search.solved(root, first, MOST_BOXES, "leads", "local searches; lower bound on")
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +68,8 @@ class _Box:
         return np.asarray(0.5 * (self.lower + self.upper))
 
 
-class _Search(HeldDesigns):
+class _Search(HeldDesigns[_Box]):
     """Boxes of the leads of a problem."""
-
-    is_shared = False
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
@@ -187,7 +166,7 @@ class _Search(HeldDesigns):
     def at(self, leads: Array) -> HeldDesign:
         """The best design with its leads given."""
         where: dict[str, Value] = {d.name: float(x) for d, x in zip(self.model.leads, leads, strict=True)}
-        return self.best_with(self._held(leads), where)
+        return best_with(self.problem, self._held(leads), where)
 
     def _held(self, leads: Array) -> Problem:
         """The problem with its leads given: what turns with them has turned."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import islice, product
@@ -10,16 +9,11 @@ from itertools import islice, product
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit
-from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Reach
-from laufruhe.solvers.boxes.held_designs import SHARE, HeldDesign, HeldDesigns
+from laufruhe.solvers.boxes.held_designs import SHARE, HeldDesign, HeldDesigns, best_with
 from laufruhe.solvers.boxes.place_boxes import Relaxation
-from laufruhe.solvers.boxes.search import divided
-from laufruhe.solvers.conclusion import Shown, concluded, none_within
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.result import Result, Status
 
@@ -66,41 +60,13 @@ def solve_places(problem: Problem) -> Result:
     problem
         Whose decisions are unbalances and places.
     """
-    started = time.perf_counter()
-    search, initial = _Search(problem), evaluate(problem)
-    best, bound, boxes = _divided(search, nothing_of(problem))
-    timing = {"solve": time.perf_counter() - started}
-    if best is None:
-        return none_within(problem, initial, search.conflict, timing)
-    own, design, certificate = best.result, best.design, best.result.certificate if best.result else None
-    shown = Shown(
-        bound=min(bound, design.value),
-        reach=Reach.WHOLE,
-        kkt_residual=certificate.kkt_residual if certificate is not None else 0.0,
-        method=f"second-order cones over {boxes} box{'es' * (boxes > 1)} of places",
-        prices=own.prices if own is not None else {},
-    )
-    return concluded(design, replace(initial, samples=design.evaluation.samples), shown, timing)
-
-
-def _divided(search: _Search, nothing: float) -> tuple[HeldDesign | None, float, int]:
-    """Divide the boxes until their least bound meets the best design, or as often as is worth it.
-
-    Returns
-    -------
-    That design, None where no place allows one; what bounds the boxes that are left; and how many there were.
-    """
-    problem = search.problem
-    most = MOST_BOXES if problem.search.boxes is None else problem.search.boxes
+    search = _Search(problem)
     root = search.box(*search.bounds)
-    if root is None:
-        return None, np.inf, 1
-    first = search.at(root.middle)
-    best, bound, seen = divided(search, root, first, nothing, problem.tolerance, most, "boxes of places")
-    return None if np.isinf(bound) and best.design.rank[0] else best, bound, seen
+    first = None if root is None else search.at(root.middle)
+    return search.solved(root, first, MOST_BOXES, "places", "second-order cones over")
 
 
-class _Search(HeldDesigns):
+class _Search(HeldDesigns[_Box]):
     """Boxes of the places of a problem."""
 
     is_shared = True
@@ -213,4 +179,4 @@ class _Search(HeldDesigns):
         """The best design with its places given."""
         where: dict[str, Value] = {p.name: float(x) for p, x in zip(self.places, places, strict=True)}
         engine = self.problem.design(list(where.values()), self.places)
-        return self.best_with(replace(self.problem, engine=engine, decisions=self.problem.unbalances), where)
+        return best_with(self.problem, replace(self.problem, engine=engine, decisions=self.problem.unbalances), where)

@@ -41,12 +41,16 @@ class Found(Protocol):
     def value(self) -> float:
         """Its objective; infinite where it is not allowed."""
 
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """By what breaks limits least, then by what is least."""
+
 
 B = TypeVar("B", bound=Box)
 F = TypeVar("F", bound=Found)
 
 
-class Search(Protocol[B, F]):
+class Search(Generic[B, F]):
     """What a method knows of its boxes and designs.
 
     Attributes
@@ -55,20 +59,19 @@ class Search(Protocol[B, F]):
         Whether other processes may divide its boxes.
     """
 
-    is_shared: bool
+    is_shared = False
 
     @property
     def conflict(self) -> tuple[str, ...]:
         """Limits that were not met in boxes."""
+        raise NotImplementedError
 
     def parts(self, box: B, value: float) -> Iterator[tuple[B | None, F | None]]:
         """Boxes that cover one together, and a design from each, None where none was sought.
 
         Of a box in which no design is allowed, or none better than a value, there is None.
         """
-
-    def better(self, best: F, found: F) -> F:
-        """The better of two designs."""
+        raise NotImplementedError
 
     def told(self, conflict: Sequence[str]) -> None:
         """Limits that were not met in boxes that another process divided."""
@@ -101,7 +104,7 @@ class _Designed(Division[B], Generic[B, F]):
         for part, found in parts:
             left = None if part is None or part.bound >= self.value else (part.bound, part)
             if left is not None and found is not None:
-                self.best = search.better(self.best, found)
+                self.best = min(self.best, found, key=lambda each: each.rank)
                 self.value = self.best.value
             yield left
             if not search.is_shared and passed():

@@ -20,7 +20,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.boxes.sizes import MOST_BOXES, SizeBoxes, divided_sizes
 from laufruhe.prove.certificate import Multipliers, Reach
-from laufruhe.solvers.boxes.held_designs import HeldDesigns
+from laufruhe.solvers.boxes.held_designs import best_with
 from laufruhe.solvers.conclusion import concluded, none_within
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.conflicts import smallest_conflict
@@ -73,7 +73,7 @@ class SizeProgram(LocalProgram):
         given = [float(x) for x in sizes]
         held = replace(problem, engine=problem.design(given, named), decisions=problem.unbalances)
         where: dict[str, Value] = dict(zip((d.name for d in named), given, strict=True))
-        return self.shares(HeldDesigns(problem).best_with(held, where).design.values)
+        return self.shares(best_with(problem, held, where).design.values)
 
 
 def solve_sizes(problem: Problem, known: float = math.inf) -> Result:

@@ -18,7 +18,7 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import room_of
-from laufruhe.solvers.boxes.search import divided
+from laufruhe.solvers.boxes.search import Search, divided
 from laufruhe.solvers.stars.design import StarDesign
 from laufruhe.solvers.stars.ranking import ranked_orders
 from laufruhe.solvers.throws.boxes import ThrowBox, ThrowPrograms
@@ -101,6 +101,11 @@ class _Best:
         """Infinite where none was found."""
         return math.inf if self.design is None else self.design.value
 
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """By its value."""
+        return self.design is None, self.value
+
 
 def search_throws(
     problem: Problem, phasing: Phasing, best: StarDesign | None, floor: float, improve: Improve
@@ -153,10 +158,8 @@ def knows(problem: Problem) -> bool:
     return bool(problem.objective)
 
 
-class ThrowSearch:
+class ThrowSearch(Search[_Part, _Best]):
     """Windows and boxes of the throws of a problem."""
-
-    is_shared = False
 
     def __init__(
         self, problem: Problem, phasing: Phasing, windows: Sequence[FiringWindow], improve: Improve,
@@ -263,9 +266,6 @@ class ThrowSearch:
         """Limits that were not met in boxes."""
         return tuple(limit.name for limit in self._problem.limits if limit.name in self._not_met)
 
-    def told(self, conflict: Sequence[str]) -> None:
-        """Of boxes that another divided: there is no other."""
-
     def cut(self, value: float) -> float:
         """What a design has to be better than."""
         return value * (1.0 - SHARE * self._problem.tolerance)
@@ -304,10 +304,5 @@ class ThrowSearch:
             window = found.program.window
             candidate = replace(self.candidate(window, nearest(window, found.middle)), left_out=left_out)
             improved = self._improve(candidate, moving) if candidate.firing_order is not None else None
-            self._best = self.better(self._best, _Best(improved))
+            self._best = min(self._best, _Best(improved), key=lambda each: each.rank)
         return _Part(found.bound, found, stage, left_out), self._best if moving or stands else None
-
-    @staticmethod
-    def better(best: _Best, found: _Best) -> _Best:
-        """The better of two designs."""
-        return found if found.value < best.value else best
