@@ -139,17 +139,20 @@ def rows() -> list[Row]:
         assert found.complete
         enumeration = None
         if n <= MOST_ENUMERATED:
+            start = time.perf_counter()
             listed = enumerate_stars(space, COUPLE)
+            whole = time.perf_counter() - start
             assert abs(listed.values[0] - found.values[0]) <= 1e-9 * max(1.0, listed.values[0])
-            enumeration = listed.seconds if n > 10 else seconds(lambda s=space: enumerate_stars(s, COUPLE))
+            enumeration = whole if n > 10 else seconds(lambda s=space: enumerate_stars(s, COUPLE))
         program = None
         if 5 <= n <= MOST_PROGRAMMED:
             problem = problem_of(TEXT.format(n=n) + COUPLE_TEXT)
             assert problem.phasing is not None
             model = StarModel(problem.phasing, space, (None, None))
+            start = time.perf_counter()
             answer = solve_program(model.at(model.samples), space, time_limit=300.0)
+            program = time.perf_counter() - start
             assert answer.status == "optimal"
-            program = answer.seconds
         took = seconds(lambda s=space: search_stars(s, COUPLE))
         out.append(Row(n, space.size, took, found.nodes, enumeration, program, float(found.values[0])))
         print(out[-1], flush=True)
@@ -175,8 +178,9 @@ def joint(n: int) -> tuple[str, ...]:
     every = (time.perf_counter() - start) * len(family.stars) / len(some)
     scip = ""
     if n <= MOST_JOINT_PROGRAMMED:
+        start = time.perf_counter()
         program = solve_program(model.at(24), family.space, owners, time_limit=60.0)
-        scip = f"{program.seconds:.2f} ({program.status})"
+        scip = f"{time.perf_counter() - start:.2f} ({program.status})"
     gap = (found.solved[0].value - found.lower_bound) / max(found.solved[0].value, floor)
     return (
         f"{n}", f"{len(family.stars)}", f"{by_cuts:.2f}", f"{len(found.solved)}", f"{gap:.1e}",

@@ -33,8 +33,6 @@ class ConicSolution:
         Dual rows of terms and limits.
     solver_seconds
         Spent inside the cone solver.
-    iterations
-        Of the interior-point method.
     shares
         Of every sum of terms in the largest of them, which add up to one; empty where there is one sum.
     prices
@@ -44,7 +42,6 @@ class ConicSolution:
     x: Array | None
     multipliers: Multipliers
     solver_seconds: float
-    iterations: int
     shares: Array = field(default_factory=lambda: np.zeros(0))
     prices: Array = field(default_factory=lambda: np.zeros(0))
 
@@ -140,7 +137,7 @@ def answered(problem: AffineProblem, blocks: list[Block], starts: list[int], fou
     terms = tuple(z / (weight * share or 1.0) for z, (weight, _), share in zip(rows, problem.terms, of, strict=False))
     multipliers = Multipliers(terms, tuple(rows[len(terms) :]))
     own = shares if problem.groups else np.zeros(0)
-    return ConicSolution(x, multipliers, float(found.solve_time), int(found.iterations), own, unit * duals)
+    return ConicSolution(x, multipliers, float(found.solve_time), own, unit * duals)
 
 
 def _numbers(values: Sequence[float]) -> Array:

@@ -45,8 +45,6 @@ class CutsFound:
         Stars times sets of shafts.
     infeasible
         How many of those solved cannot keep the limits.
-    seconds
-        Spent.
     """
 
     solved: tuple[Solved, ...]
@@ -55,7 +53,6 @@ class CutsFound:
     complete: bool
     designs: int
     infeasible: int
-    seconds: float
 
 
 def allowed_sets(choice: ShaftChoice, domains: Sequence[Domain], owners: Sequence[int]) -> tuple[tuple[int, ...], ...]:
@@ -98,8 +95,7 @@ def search_designs(
     nothing
         Value that counts as zero [SI].
     """
-    started = time.perf_counter()
-    search = _Search(model, stars, tolerance, nothing)
+    started, search = time.perf_counter(), _Search(model, stars, tolerance, nothing)
     complete = True
     while (place := search.nearest(count)) is not None:
         if time.perf_counter() - started > time_limit or (passed() and search.tried):
@@ -109,9 +105,7 @@ def search_designs(
         search.solve(*place)
     solved = sorted(search.solved, key=lambda s: (s.value, s.star, s.built))
     _, least = search.standing
-    seconds = time.perf_counter() - started
-    size = search.bounds.size
-    return CutsFound(tuple(solved), least, search.beyond, complete, size, search.infeasible, seconds)
+    return CutsFound(tuple(solved), least, search.beyond, complete, search.bounds.size, search.infeasible)
 
 
 class _Search:

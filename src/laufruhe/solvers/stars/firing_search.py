@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.load_models.pair_tables import PairObjective
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import tell
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.solvers.stars.search import BestStars, StarsFound
@@ -37,32 +35,31 @@ def enumerate_orders(
     time_limit
         Seconds after which it ends with the best so far; what it has then is not complete.
     """
-    started = time.perf_counter()
     found, seen, ended = BestStars(best, count), 0, False
     stars = np.zeros((1, count), dtype=np.uint8)
     squares = np.array([[table.constant + table.placed(stars, stars[:, 0], 0)[0] for table in objective.tables]])
     waiting: list[tuple[int, Stars, Array]] = [(1, stars, squares)]
-    while waiting and not ended:
-        tell("partial firing orders", seen, value=float(found.values.min(initial=np.inf)))
-        placed, stars, squares = waiting.pop()
-        ended = passed() or time.perf_counter() - started > time_limit
-        if placed == count:
-            values = objective.values(squares)
-            met = np.isfinite(values)
-            found.offer(stars[met], values[met])
-            seen += len(stars)
-            continue
-        rows, steps = np.nonzero(_free(stars, placed))
-        for start in range(0, len(rows), _BLOCK):
-            row, step = rows[start : start + _BLOCK], steps[start : start + _BLOCK].astype(np.uint8)
-            grown = stars[row]
-            more = [table.placed(grown, step, placed) for table in objective.tables]
-            grown[:, placed] = step
-            waiting.append((placed + 1, grown, squares[row] + np.stack(more, axis=1)))
+    with limited(time_limit):
+        while waiting and not ended:
+            tell("partial firing orders", seen, value=float(found.values.min(initial=np.inf)))
+            placed, stars, squares = waiting.pop()
+            ended = passed()
+            if placed == count:
+                values = objective.values(squares)
+                met = np.isfinite(values)
+                found.offer(stars[met], values[met])
+                seen += len(stars)
+                continue
+            rows, steps = np.nonzero(_free(stars, placed))
+            for start in range(0, len(rows), _BLOCK):
+                row, step = rows[start : start + _BLOCK], steps[start : start + _BLOCK].astype(np.uint8)
+                grown = stars[row]
+                more = [table.placed(grown, step, placed) for table in objective.tables]
+                grown[:, placed] = step
+                waiting.append((placed + 1, grown, squares[row] + np.stack(more, axis=1)))
     of_best = np.array([table.squares(found.stars[:1])[0] for table in objective.tables if len(found.values)])
     least = objective.below(of_best) if len(found.values) else float("inf")
-    seconds = time.perf_counter() - started
-    return StarsFound(found.stars, found.values, 0.0 if ended else least, not ended, seen, seconds)
+    return StarsFound(found.stars, found.values, 0.0 if ended else least, not ended, seen)
 
 
 def _free(stars: Stars, placed: int) -> NDArray[np.bool_]:

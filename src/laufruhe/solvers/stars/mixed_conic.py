@@ -45,15 +45,12 @@ class ProgramFound:
         Dual bound of the program's own rows, less what tolerances may hide.
     status
         SCIP's own word: "optimal", "timelimit", "infeasible" ...
-    seconds
-        Inside SCIP.
     """
 
     star: tuple[int, ...] | None
     built: tuple[int, ...]
     bound: float
     status: str
-    seconds: float
 
 
 def solve_program(
@@ -117,19 +114,18 @@ def _answer(program: Any, steps: Any, built: Any, unit: float, choosing: bool, t
         try:
             program.solve(solver=cp.SCIP, scip_params={"limits/time": seconds, "limits/gap": 1e-7})
         except cp.error.SolverError:
-            return ProgramFound(None, (), 0.0, "no feasible point", seconds)
+            return ProgramFound(None, (), 0.0, "no feasible point")
     stats = program.solver_stats
     model = stats.extra_stats["model"]
     status = str(stats.extra_stats["scip_status"])
-    seconds = float(stats.solve_time or 0.0)
     if status == "infeasible":
-        return ProgramFound(None, (), float("inf"), status, seconds)
+        return ProgramFound(None, (), float("inf"), status)
     if steps.value is None:
-        return ProgramFound(None, (), 0.0, status, seconds)
+        return ProgramFound(None, (), 0.0, status)
     star = tuple(int(p) for p in np.argmax(np.asarray(steps.value), axis=1))
     chosen = tuple(k for k, on in enumerate(built.value) if on > 0.5) if choosing else ()
     bound = max(0.0, (float(model.getDualbound()) - TRUST) * unit)
-    return ProgramFound(star, chosen, bound, status, seconds)
+    return ProgramFound(star, chosen, bound, status)
 
 
 class _Rows:

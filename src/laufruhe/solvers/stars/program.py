@@ -10,7 +10,6 @@ import numpy as np
 
 from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
 from laufruhe.load_models.star_model import StarModel, StarProblem
-from laufruhe.numerics.arrays import Array
 from laufruhe.prove.certificate import Multipliers, best_bound, gap_of
 from laufruhe.prove.throws.star_cut import Cut, cut_of
 from laufruhe.solvers.conclusion import KEPT
@@ -33,15 +32,12 @@ class Solved:
         Which sets of optional shafts are built.
     value, bound
         Objective of the design found, and what no design of this star goes under.
-    x
-        Decision vector, zero for shafts that are not built.
     """
 
     star: tuple[int, ...]
     built: tuple[int, ...]
     value: float
     bound: float
-    x: Array
 
 
 def owners_of(model: StarModel) -> tuple[int, ...]:
@@ -90,7 +86,7 @@ def solve_design(
         value, excess = judged.objective(solution.x), judged.excess(solution.x)
         # where the angles forbid what averages allow, what is proven at the angles is too much
         least = bound.value if excess <= FEASIBLE else min(bound.value, value)
-        found = Solved(star, built, value, least, _spread(solution.x, fine.at(star), kept))
+        found = Solved(star, built, value, least)
         best = (found, _with_idle(bound.multipliers, whole, idle))
         # what averages fall short by, no grid of this fidelity gains
         if excess <= FEASIBLE and gap_of(averaged.objective(solution.x), least, nothing) <= 0.25 * tolerance:
@@ -149,7 +145,7 @@ def _fixed(
     value = whole.objective(np.zeros(whole.size))
     terms = tuple(n.subgradient(x) for _, n in averaged.terms)
     limits = tuple(np.zeros_like(n.constant) for _, n in averaged.limits)
-    return Solved(star, built, value, min(averaged.objective(x), value), x), cut_of(sound, Multipliers(terms, limits))
+    return Solved(star, built, value, min(averaged.objective(x), value)), cut_of(sound, Multipliers(terms, limits))
 
 
 def _grids(full: int) -> list[int]:
@@ -182,10 +178,3 @@ def _only(affine: AffineProblem, kept: Sequence[bool]) -> AffineProblem:
         tuple(domains),
         affine.samples,
     )
-
-
-def _spread(x: Array, affine: AffineProblem, kept: Sequence[bool]) -> Array:
-    out = np.zeros(affine.size)
-    columns = np.concatenate([np.full(d.width, keep) for d, keep in zip(affine.domains, kept, strict=True)])
-    out[columns] = x
-    return out

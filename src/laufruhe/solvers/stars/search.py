@@ -10,7 +10,6 @@ the best of many directions is nearly tight.
 from __future__ import annotations
 
 import itertools
-import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from copy import copy
@@ -48,8 +47,6 @@ class StarsFound:
         Whether the search ended by itself, so that these are proven the best.
     nodes
         Partial and whole stars that were looked at.
-    seconds
-        Spent.
     """
 
     stars: Stars
@@ -57,7 +54,6 @@ class StarsFound:
     lower_bound: float
     complete: bool
     nodes: int
-    seconds: float
 
 
 @dataclass
@@ -94,13 +90,12 @@ class BestStars:
 
 def enumerate_stars(space: StarSpace, objective: AmplitudeObjective, count: int = 1) -> StarsFound:
     """The best stars by looking at every one, in blocks."""
-    started = time.perf_counter()
     best, seen = BestStars(count, space.throws), 0
     for block in space.blocks():
         best.offer(block, objective.values(space, block))
         seen += len(block)
     least = float(best.values[0]) if len(best.values) else float("inf")
-    return StarsFound(best.stars, best.values, least, True, seen, time.perf_counter() - started)
+    return StarsFound(best.stars, best.values, least, True, seen)
 
 
 def search_stars(
@@ -119,7 +114,6 @@ def search_stars(
     time_limit
         Seconds after which the search stops; what it has then is not complete.
     """
-    started = time.perf_counter()
     with limited(time_limit):
         best = BestStars(count, space.throws)
         for start in _good_starts(space, objective):
@@ -132,8 +126,7 @@ def search_stars(
             search.share()
     least = float(best.values[0]) if len(best.values) else float("inf")
     bound = least if not search.ended else search.root
-    seconds = time.perf_counter() - started
-    return StarsFound(best.stars, best.values, min(bound, least), not search.ended, search.looked_at, seconds)
+    return StarsFound(best.stars, best.values, min(bound, least), not search.ended, search.looked_at)
 
 
 class _Search:
