@@ -60,7 +60,7 @@ def run(request: Request, answer: Answer) -> None:
     with progress() as say:
         result, folder = _written(request, answer, say)
     _show(result, as_json(result, request.series) if request.json == "-" else None, folder)
-    raise typer.Exit(DONE if result.status in (Status.OPTIMAL, Status.FEASIBLE) else FAILED)
+    raise typer.Exit(DONE if result.status.has_design else FAILED)
 
 
 def stated(problem: Problem, _: Listener) -> Result:

@@ -27,7 +27,7 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
 from laufruhe.report.wording import why_star
-from laufruhe.solvers.result import Nearest, Reached, Result, Status, objective_of
+from laufruhe.solvers.result import Nearest, ObjectiveValue, Reached, Result
 from laufruhe.solvers.stars.ranking import RankedStar
 
 Record = dict[str, Any]
@@ -111,7 +111,7 @@ def _objective(result: Result) -> Record | None:
     """Null where nothing is minimised; without a design its value alone is."""
     if result.objective is not None:
         return _of(result.objective, "name value unit initial reduction")
-    given = objective_of(result.problem, result.initial, result.initial)
+    given = ObjectiveValue.given(result.problem, result.initial)
     return None if given is None else {**_of(given, "name value unit initial"), "value": None, "reduction": None}
 
 
@@ -328,7 +328,7 @@ def _ranks(result: Result) -> Record:
 
 def _reached(result: Result) -> Record:
     """`reached` and `nearest` without a design: what each conflicting limit can reach, and what breaks limits least."""
-    if result.status not in (Status.INFEASIBLE, Status.FAILED):
+    if result.status.has_design:
         return {}
     names, near, told = "name side limit unit value", result.nearest, "bound why ended"
     reached = [{**_of(one, f"{names} {told}"), "proof": str(one.proof), **_values(one)} for one in result.reached]

@@ -34,7 +34,7 @@ from laufruhe.server.scenes import Scene, key_of, scene_of
 from laufruhe.solvers import kinds_of, solve
 from laufruhe.solvers.conclusion import decision_values, limit_values
 from laufruhe.solvers.following import Followed
-from laufruhe.solvers.result import LimitValue, Result, Status
+from laufruhe.solvers.result import LimitValue, Result
 from laufruhe.units import readable
 
 ROUNDING = 1e-5
@@ -225,7 +225,7 @@ def _settled(result: Result, tables: Mapping[str, Any]) -> dict[str, Any]:
         "ranking": ranking_of(result),
         "holds": held_by(result, tables),
     }
-    designed = result.status in (Status.OPTIMAL, Status.FEASIBLE)
+    designed = result.status.has_design
     if designed and result.objective is not None and own is not None:
         found["optimum"] = {
             **told.optimum(problem, (), result.objective.value, own.lower_bound, own.gap, str(own.kind)),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cmath
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
@@ -29,7 +29,6 @@ from laufruhe.solvers.result import (
     ObjectiveValue,
     Result,
     Status,
-    objective_of,
 )
 from laufruhe.solvers.stars.ranking import none_of_given
 
@@ -185,7 +184,7 @@ def state(problem: Problem, to_start_from: bool = False) -> Result:
         problem=problem,
         status=Status.INFEASIBLE if why else Status.FEASIBLE,
         message=why,
-        objective=objective_of(problem, evaluation, evaluation),
+        objective=ObjectiveValue.given(problem, evaluation),
         certificate=None,
         decisions=(),
         limits=() if evaluation.resonance else limit_values(problem, evaluation),
@@ -196,9 +195,14 @@ def state(problem: Problem, to_start_from: bool = False) -> Result:
     )
 
 
+def quoted(names: Iterable[str]) -> str:
+    """Names of limits in a sentence."""
+    return " and ".join(f"'{name}'" for name in names)
+
+
 def contradiction(conflict: Sequence[str]) -> str:
     """That no design keeps limits of these names together."""
-    names = " and ".join(f"'{name}'" for name in conflict) or "the bounds"
+    names = quoted(conflict) or "the bounds"
     verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
     return f"no design exists: {names} {verb}"
 
@@ -237,7 +241,7 @@ def nearest_of(problem: Problem, design: Evaluation, decisions: tuple[DecisionVa
 
 def _broken(problem: Problem, design: Design) -> str:
     """What a message says of the limits that a design breaks."""
-    return " and ".join(f"'{name}'" for name in broken_limits(problem.limits, design.evaluation)) or "a limit"
+    return quoted(broken_limits(problem.limits, design.evaluation)) or "a limit"
 
 
 def limit_values(

@@ -30,7 +30,6 @@ CLOSE, SAMPLED = 1e-9, 1e-5
 """Share by which objectives before another may be exceeded at least; of what is known at sampled angles alone."""
 WIDER = (0.0, 10.0 * SAMPLED)
 """Shares by which they may be exceeded further, where a solver finds no design."""
-_DESIGNED = (Status.OPTIMAL, Status.FEASIBLE)
 
 
 def solve_in_order(problem: Problem, solve: Solve) -> Result:
@@ -41,7 +40,7 @@ def solve_in_order(problem: Problem, solve: Solve) -> Result:
     equal: list[tuple[DecisionRange, ...]] = []
     for rank in problem.ranks:
         found = _found(alone.changed(objective=rank.terms), problem.limits, held, solve)
-        if found.status not in _DESIGNED or found.objective is None:
+        if not found.status.has_design or found.objective is None:
             if not stages:
                 return found
             break
@@ -70,7 +69,7 @@ def _found(stage: Problem, limits: tuple[Limit, ...], held: list[Limit], solve: 
     for more in WIDER:
         held[:] = [replace(limit, maximum=limit.maximum * (1.0 + more)) for limit in held]
         found = solve(stage.changed(limits=(*limits, *held)))
-        if found.status in _DESIGNED or not held:
+        if found.status.has_design or not held:
             break
     return found
 

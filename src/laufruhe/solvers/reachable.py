@@ -20,7 +20,15 @@ from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach, certified
-from laufruhe.solvers.conclusion import KEPT, broken_limits, contradiction, limit_values, nearest_of, none_within
+from laufruhe.solvers.conclusion import (
+    KEPT,
+    broken_limits,
+    contradiction,
+    limit_values,
+    nearest_of,
+    none_within,
+    quoted,
+)
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Nearest, ObjectiveValue, Reached, Result, Status
 
@@ -29,7 +37,6 @@ LEAST_SECONDS = 10.0
 """All limits together may take so long, or as long as it took to find that there is no design."""
 HALVINGS, CLOSE = 10, 1e-3
 """Of the edges of a limit that has no least value to minimise, and the share of it at which they stop."""
-_DESIGNED = (Status.OPTIMAL, Status.FEASIBLE)
 LONG = "there was no time left for it; give more by a time limit"
 
 
@@ -147,7 +154,7 @@ def _asking(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, 
 def _least(told: Reached, asked: Problem, solve: Solve) -> _Answer:
     """By the problem that minimises what is limited."""
     result = solve(asked)
-    if result.status not in _DESIGNED or result.objective is None:
+    if not result.status.has_design or result.objective is None:
         return _none(told, result)
     proof = result.certificate
     return _Answer(
@@ -165,7 +172,7 @@ def _least(told: Reached, asked: Problem, solve: Solve) -> _Answer:
 def _none(told: Reached, result: Result) -> _Answer:
     """Why nothing is told where the other limits found no design."""
     if result.status is Status.INFEASIBLE:
-        names = " and ".join(f"'{name}'" for name in result.conflict)
+        names = quoted(result.conflict)
         why = f"the other limits cannot be met together either{names and ': no design keeps '}{names}"
         return _Answer(replace(told, why=why), is_none=True)
     return _Answer(replace(told, why=LONG if passed() else "no design was found that keeps the other limits"))
@@ -189,7 +196,7 @@ def _at_edges(
     """By edges between the one asked for and what a design without the limit has, halved."""
     high = told.side == "at most"
     first = solve(_asking(problem, problem.objective, others))
-    if first.status not in _DESIGNED:
+    if not first.status.has_design:
         return _none(told, first)
     best, reached = first, _extreme(first, limit, high)
     missed, bound = told.limit, told.limit if status is Status.INFEASIBLE else math.nan
@@ -199,7 +206,7 @@ def _at_edges(
         edge = 0.5 * (reached + missed)
         moved = replace(limit, maximum=edge) if high else replace(limit, minimum=edge)
         found = solve(_asking(problem, problem.objective, (*others, moved)))
-        if found.status in _DESIGNED:
+        if found.status.has_design:
             best, reached = found, _extreme(found, limit, high)
         else:
             missed, bound = edge, edge if found.status is Status.INFEASIBLE else bound

@@ -39,6 +39,11 @@ class Status(StrEnum):
     INFEASIBLE = "infeasible"
     FAILED = "failed"
 
+    @property
+    def has_design(self) -> bool:
+        """Whether there is a design within its limits."""
+        return self in (Status.OPTIMAL, Status.FEASIBLE)
+
 
 @dataclass(frozen=True)
 class DecisionValue:
@@ -210,6 +215,12 @@ class ObjectiveValue:
         """What a problem minimises, of a design and of the one given [SI]."""
         return cls(problem.objective_name, value, problem.objective_unit or "", initial)
 
+    @classmethod
+    def given(cls, problem: Problem, design: Evaluation) -> ObjectiveValue | None:
+        """Of a design that is the one given; None where nothing is minimised."""
+        value = objective_value(problem, design)
+        return cls.of(problem, value, value) if problem.objective else None
+
     @property
     def reduction(self) -> float:
         """Share by which the initial value fell; not a number where that is infinite."""
@@ -284,9 +295,8 @@ class Result:
     @property
     def designs(self) -> dict[str, Evaluation]:
         """As given and as decided, by these names; one where nothing was decided."""
-        if self.final is self.initial:
-            return {AS_GIVEN: self.initial}
-        return {AS_GIVEN: self.initial, AS_DECIDED: self.final}
+        given = {AS_GIVEN: self.initial}
+        return given if self.final is self.initial else given | {AS_DECIDED: self.final}
 
     def forces(self, steps: int = STEPS) -> xr.Dataset:
         """Loads on block, mounts and bearings over the crank angle, and how far mounts move, with units [xarray]."""
@@ -305,9 +315,8 @@ class Result:
         import pandas as pd
 
         names = [field.name for field in fields(DecisionValue)]
-        return pd.DataFrame([[getattr(d, name) for name in names] for d in self.decisions], columns=names).set_index(
-            "name"
-        )
+        rows = [[getattr(d, name) for name in names] for d in self.decisions]
+        return pd.DataFrame(rows, columns=names).set_index("name")
 
     @property
     def _with_loads(self) -> dict[str, Evaluation]:
@@ -339,11 +348,3 @@ class Result:
     def _repr_html_(self) -> str:
         lines = [html.escape(line.strip()) for line in repr(self).strip("<>").splitlines()]
         return f"<strong>{lines[0]}</strong><ul>" + "".join(f"<li>{line}</li>" for line in lines[1:]) + "</ul>"
-
-
-def objective_of(problem: Problem, initial: Evaluation, final: Evaluation) -> ObjectiveValue | None:
-    """The objective of the design and of the one given; None where nothing is minimised."""
-    if not problem.objective:
-        return None
-    value = objective_value(problem, final)
-    return ObjectiveValue.of(problem, value, value if final is initial else objective_value(problem, initial))

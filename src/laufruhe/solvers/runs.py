@@ -19,7 +19,7 @@ from laufruhe.machine.mount import every_spring
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.solvers.conclusion import broken_limits, with_limits
+from laufruhe.solvers.conclusion import broken_limits, quoted, with_limits
 from laufruhe.solvers.cones.run_limits import solve_run_cones
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.phasing import by_each_order, every_star
@@ -55,7 +55,7 @@ def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Resu
     if apart.objective:
         relaxed = decide(apart)
         broken = broken_limits(limits, relaxed.final)
-        if relaxed.status not in (Status.OPTIMAL, Status.FEASIBLE) or not (broken or terms):
+        if not relaxed.status.has_design or not (broken or terms):
             # without what is asked of run-ups nothing is missing
             return with_limits(relaxed, problem.limits)
         if relaxed.problem.fidelity != problem.fidelity:
@@ -68,7 +68,7 @@ def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Resu
     if terms or relaxed is None:
         name = terms[0].measure.name
         raise ModelError(f"{name} is minimised over unbalances and mounts, not over {others}; fix it, or limit it")
-    names = " and ".join(f"'{name}'" for name in broken_limits(limits, relaxed.final))
+    names = quoted(broken_limits(limits, relaxed.final))
     why = (
         f"the best design found breaks {names}: beside {others} a run-up is checked, not designed for; "
         f"relax it, fix {others}, or limit travel"

@@ -20,6 +20,7 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, angle_name, judged, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
+from laufruhe.solvers.cones.lightest import distance
 from laufruhe.solvers.result import DecisionRange, Result
 
 MOST_OPEN = 16
@@ -155,7 +156,7 @@ def _ends(rows: AffineProblem, domain: Domain) -> list[Array]:
     else:
         turns = (cmath.exp(2j * math.pi * k / DIRECTIONS) for k in range(DIRECTIONS))
         targets = [np.zeros(2), *(own.upper * np.array([turn.real, turn.imag]) for turn in turns)]
-    return [end for target in targets for end in _toward(rows, _apart(domain, target, rows.size), 1.0)]
+    return [end for target in targets for end in _toward(rows, distance(domain, target, rows.size), 1.0)]
 
 
 def _toward(rows: AffineProblem, far: AffineNorm, weight: float) -> list[Array]:
@@ -167,10 +168,3 @@ def _toward(rows: AffineProblem, far: AffineNorm, weight: float) -> list[Array]:
 def _size(domain: Domain, x: Array) -> float:
     part = x[domain.columns]
     return float(part[0]) if domain.width == 1 else float(np.hypot(*part))
-
-
-def _apart(domain: Domain, target: Array, columns: int) -> AffineNorm:
-    """How far a decision is from a point of the plane."""
-    slope = np.zeros((1, domain.width, columns))
-    slope[0, :, domain.columns] = np.eye(domain.width)
-    return AffineNorm(MEAN, -target[None], slope, Grid(np.ones(1), 1))

@@ -42,7 +42,7 @@ def lightest(problem: AffineProblem, x: Array, still: Array, weights: Sequence[f
         for d, w, size in zip(problem.domains, weights, sizes, strict=True)
     )
     limits = tuple((max(most, norm.value(x)), norm) for most, norm in problem.limits if _is_moved(norm, still))
-    terms = tuple((w, _size(d, problem.size)) for w, d in zip(weights, domains, strict=True) if w)
+    terms = tuple((w, distance(d, np.zeros(d.width), problem.size)) for w, d in zip(weights, domains, strict=True) if w)
     scales = np.concatenate([np.full(d.width, d.scale) for d in domains])
     # across the directions, in units of the sizes, nothing moves
     base, values, _ = np.linalg.svd(still / scales[:, None], full_matrices=True)
@@ -61,8 +61,8 @@ def _is_moved(norm: AffineNorm, still: Array) -> bool:
     return bool(moved > SAME_LOAD * np.abs(norm.slope * np.abs(still).max(axis=1)).max(initial=0.0))
 
 
-def _size(domain: Domain, columns: int) -> AffineNorm:
-    """Of one decision."""
+def distance(domain: Domain, target: Array, columns: int) -> AffineNorm:
+    """How far a decision is from a point of its own columns."""
     slope = np.zeros((1, domain.width, columns))
     slope[0, :, domain.columns] = np.eye(domain.width)
-    return AffineNorm(MEAN, np.zeros((1, domain.width)), slope, Grid(np.ones(1), 1))
+    return AffineNorm(MEAN, -target[None], slope, Grid(np.ones(1), 1))

@@ -25,7 +25,7 @@ from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.solvers.boxes.sizes import check_acts, solve_sizes
 from laufruhe.solvers.conclusion import KEPT, Design, concluded, judged
 from laufruhe.solvers.mounts.nonlinear import mounts_bound
-from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, searched, shown
 
 STARTS, LOOKS = 2, 6
@@ -60,7 +60,7 @@ def _first(program: LocalProgram, held: Problem) -> list[Array]:
     """As given, and with the best sizes and unbalances on the mounts as given."""
     problem, given = program.problem, program.shares(program.problem.start)
     alone = solve_sizes(replace(held, tolerance=ROUGHLY, search=replace(held.search, boxes=1)))
-    if alone.status not in (Status.OPTIMAL, Status.FEASIBLE):
+    if not alone.status.has_design:
         return [given]
     found = dict(zip((d.name for d in held.decisions), _decided(held, alone), strict=True))
     return [program.shares([found.get(d.name, d.start) for d in problem.decisions]), given]

@@ -52,7 +52,7 @@ Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
 
 def _rank(design: StarDesign) -> tuple[bool, float]:
     """Designs within their limits first, the least objective first."""
-    met = design.result.status in (Status.OPTIMAL, Status.FEASIBLE)
+    met = design.result.status.has_design
     return not met, design.value
 
 

@@ -32,7 +32,7 @@ def with_star(
     given = evaluate(problem)
     proven = certificate is not None and certificate.kind is Proof.GLOBAL
     status = best.status
-    if status in (Status.OPTIMAL, Status.FEASIBLE):
+    if status.has_design:
         status = Status.OPTIMAL if proven else Status.FEASIBLE
     initial = replace(given, samples=best.final.samples)
     value = best.objective.value if best.objective else objective_value(problem, best.final)

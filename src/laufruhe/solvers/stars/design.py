@@ -9,7 +9,7 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import KEPT, state
 from laufruhe.solvers.cones.unbalances import solve_unbalances
-from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.result import Result
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +37,7 @@ class StarDesign:
     @property
     def is_met(self) -> bool:
         """Whether it is a design within its limits."""
-        done = self.result.status in (Status.OPTIMAL, Status.FEASIBLE)
-        return done and self.result.final.excess(self.result.problem.limits) <= KEPT
+        return self.result.status.has_design and self.result.final.excess(self.result.problem.limits) <= KEPT
 
     @property
     def value(self) -> float:

@@ -21,7 +21,7 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified
 from laufruhe.prove.throws.swing import SwingBound
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.conclusion import broken_limits, with_limits
+from laufruhe.solvers.conclusion import broken_limits, quoted, with_limits
 from laufruhe.solvers.result import ObjectiveValue, Result
 from laufruhe.solvers.stars.conclusion import no_star, with_star
 from laufruhe.solvers.stars.design import solve_fixed
@@ -42,7 +42,7 @@ def solve_told_alike(problem: Problem, phasing: Phasing, solve: Callable[[Proble
     wheel = [limit for limit in problem.limits if limit.measure.channel.is_flywheel]
     broken = broken_limits(wheel, given)
     if broken:
-        names = " and ".join(f"'{name}'" for name in broken)
+        names = quoted(broken)
         why = f"no star keeps {names}: all that fire evenly turn the crank as evenly; give it more inertia"
         return no_star(problem, why, conflict=broken)
     limits = tuple(limit for limit in problem.limits if limit not in wheel)

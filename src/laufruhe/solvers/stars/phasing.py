@@ -20,6 +20,7 @@ from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.prove.throws.firing_share import firing_bound
+from laufruhe.solvers.conclusion import quoted
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.answers import Answer, Decided, searched
 from laufruhe.solvers.stars.conclusion import no_star, with_star
@@ -66,7 +67,7 @@ def solve_phasing(problem: Problem) -> Result:
         return solve_told_alike(problem, phasing, solve_phasing)
     started = time.perf_counter()
     if phasing.throws is not None:
-        result = _of_fixed_throws(problem, phasing)
+        result = by_each_order(problem, phasing, every_star(phasing))
     elif phasing.throw_bounds is not None:
         result = _uneven(problem, phasing, None)
     else:
@@ -125,11 +126,6 @@ def _with_more_angles(problem: Problem, families: Sequence[Family], result: Resu
             break
         result = found
     return result
-
-
-def _of_fixed_throws(problem: Problem, phasing: Phasing) -> Result:
-    """Throws as given: the best of their firing orders, and of the sets of shafts."""
-    return by_each_order(problem, phasing, every_star(phasing))
 
 
 def every_star(phasing: Phasing) -> list[Star]:
@@ -281,7 +277,7 @@ def _needed(problem: Problem, phasing: Phasing, best: Decided) -> tuple[int, ...
 def _none(problem: Problem, tried: int) -> Result:
     """Stars exist, but none keeps all limits: one may break some of them, and another the others."""
     names = tuple(limit.name for limit in problem.limits)
-    shown = (" and ".join(f"'{name}'" for name in names) or "the bounds") + " together" * (len(names) > 1)
+    shown = (quoted(names) or "the bounds") + " together" * (len(names) > 1)
     why = f"no star keeps {shown}, whatever else is decided ({tried} design(s) tried)"
     return no_star(problem, why, conflict=names)
 

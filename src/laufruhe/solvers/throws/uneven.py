@@ -28,7 +28,7 @@ from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified
 from laufruhe.prove.throws.uneven import steady_bound, uneven_bound
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, unbalances_of
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, quoted, unbalances_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.nonlinear import solve_nonlinear, try_all
 from laufruhe.solvers.smooth.program import TURN, SmoothProgram
@@ -135,14 +135,14 @@ def _trade_point(problem: Problem, phasing: Phasing, allowed: Intervals, best: S
 def _none(problem: Problem, phasing: Phasing, searched: Searched | None) -> Result:
     """No start led to a design: infeasible only where boxes, or a bound of what is limited, prove it."""
     if searched is not None and searched.bound == math.inf:
-        told = " and ".join(f"'{name}'" for name in searched.told) or "the bounds on firing intervals"
+        told = quoted(searched.told) or "the bounds on firing intervals"
         return no_star(problem, f"no crank keeps {told}, whatever else is decided", conflict=searched.told)
     for limit in problem.load_limits:
         alone = replace(problem, objective=(Term(limit.measure),))
         if _bound(alone, phasing, phasing.intervals)[0] > limit.maximum * (1.0 + KEPT):
             why = f"no crank keeps '{limit.name}', whatever else is decided"
             return no_star(problem, why, conflict=(limit.name,))
-    names = " and ".join(f"'{limit.name}'" for limit in problem.limits) or "the bounds"
+    names = quoted(limit.name for limit in problem.limits) or "the bounds"
     left = "" if searched is None else f", and {searched.boxes} boxes of throws do not exclude one; raise search.boxes"
     return no_star(problem, f"no crank was found that keeps {names}{left}; relax them, or open more", Status.FAILED)
 
