@@ -20,7 +20,7 @@ if "PYTEST_XDIST_WORKER" in os.environ and hasattr(os, "sched_getaffinity"):
 os.environ["MPLBACKEND"] = "Agg"
 
 # Derandomised: a failure repeats on the next machine, and no example database is needed.
-settings.register_profile("laufruhe", derandomize=True, deadline=None, database=None, max_examples=30)
+settings.register_profile("laufruhe", derandomize=True, deadline=None, database=None, max_examples=20)
 # `make test-fast` asks for this one
 settings.register_profile("fast", settings.get_profile("laufruhe"), max_examples=10)
 settings.load_profile("laufruhe")

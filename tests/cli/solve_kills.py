@@ -42,7 +42,7 @@ def results(folder: Path) -> dict[str, bytes]:
 def uninterrupted(folder: Path) -> Whole:
     """One run in a new folder, left alone."""
     folder.mkdir()
-    written(folder, scenes.TIGHT)
+    written(folder, scenes.SHAKING_ONLY)
     began = time.monotonic()
     process = started(folder)
     while not list(folder.glob(".unfinished-*")) and process.poll() is None:
@@ -58,7 +58,7 @@ def attacked(folder: Path, seed: int, whole: Whole, told: Told) -> None:
     rng = random.Random(seed)
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
-    written(folder, scenes.TIGHT)
+    written(folder, scenes.SHAKING_ONLY)
     for _ in range(rng.randint(1, 3)):
         count = rng.choice((1, 2))
         told.tried[f"solves, {count} at once"] += 1

@@ -189,7 +189,7 @@ def test_a_broken_matplotlibrc_in_the_working_folder(tmp_path: Path, monkeypatch
     import sys
 
     (tmp_path / "matplotlibrc").write_bytes(b"font.size: nonsense\n\xff\xfe\n")
-    path = written(tmp_path, scenes.GIVEN)
+    path = written(tmp_path, scenes.SHAKING_ONLY)
     words = [sys.executable, "-m", "laufruhe", "evaluate", str(path), "--out", "out"]
     done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")

@@ -28,7 +28,7 @@ angle = { between = [0, 360] }
 """
 FORCE = '[objective]\nminimise = "rms mount force"\n'
 SAGS = '[objective]\nminimise = "static sag"\n'
-SEARCH = "[search]\nstarts = 1\nboxes = 0\n[fidelity]\nsamples = 240\n"
+SEARCH = "[search]\nstarts = 1\nboxes = 0\n[fidelity]\nsamples = 120\n"
 STEP = 1e-5
 EXACT, PEAK = 2e-3, 2e-2
 CASES = [

@@ -13,7 +13,7 @@ from scipy.optimize import isotonic_regression
 import ready
 from cli import scenes
 from lanes import first_fast
-from laufruhe.plots import figures, style
+from laufruhe.plots import figure, names, style
 from laufruhe.plots.results import firings, torque, twist_modes
 from laufruhe.plots.words import FAINT, INK, READ, contrast, grouped, ink_on, legible, spread, typeset, wrapped
 from laufruhe.present.pictures import PICTURES
@@ -41,10 +41,12 @@ samples = 48
 )
 # layouts, cycles, mounts, what is open: each fills other pictures
 MODELS = (
-    "vee-two-90", "rotary-two", "soft-mounts-run-up", "tractor-four-bearings", "inline-five-torsion",
-    "inline-seven-uneven", "waterworks-steam-pump", "selective-assembly", "radial-seven", "car-four-willans", "robust",
+    "vee-two-90", "rotary-two", "soft-mounts-run-up", "waterworks-steam-pump", "radial-seven", "robust",
+    "tractor-four-bearings", "inline-five-torsion", "inline-seven-uneven", "selective-assembly", "car-four-willans",
     "twin-parallel-360",
 )  # fmt: skip
+# what most engines have is looked at for the first of them, which differ most
+OF_MOST, FIRST = {"polar", "cycle", "bars", "spectrum"}, 6
 
 
 def solved(name: str) -> Result:
@@ -54,8 +56,8 @@ def solved(name: str) -> Result:
 @pytest.mark.parametrize("name", first_fast(MODELS, 3))
 def test_no_picture_has_a_fault(name: str) -> None:
     result = solved(name)
-    found = {of: faults for of, figure in figures(result) if (faults := faults_of(figure, result.problem.title))}
-    assert found == {}
+    kinds = [of for of in names(result) if name in MODELS[:FIRST] or of not in OF_MOST]
+    assert {of: found for of in kinds if (found := faults_of(figure(result, of), result.problem.title))} == {}
 
 
 @pytest.mark.slow
