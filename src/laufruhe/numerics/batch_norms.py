@@ -36,12 +36,15 @@ class BatchNorm:
 
         One block of rows takes `cache_bytes`; `threads` are worked on at the same time.
         """
-        if not self.norm.of_row_lengths:
-            return np.array([self.value(design) for design in features])
         components, _, k = self.rows.shape
         block = max(cache_bytes // (8 * (components + 1) * max(k, 1)), _LEAST_BLOCK)
         out = np.empty(len(features))
         starts = range(0, len(features), block)
+        if not self.norm.of_row_lengths:
+            for start in starts:
+                own = slice(start, start + block)
+                out[own] = self.norm.values(self.grid, np.einsum("cfk,nf->nkc", self.rows, features[own]))
+            return out
 
         def work(own: Sequence[int]) -> None:
             product, lengths = np.empty((block, components * k)), np.empty((block, k))

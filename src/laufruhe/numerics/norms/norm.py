@@ -140,6 +140,10 @@ class Norm(ABC):
     def value(self, grid: Grid, rows: Array) -> float:
         """The norm."""
 
+    def values(self, grid: Grid, many: Array) -> Array:
+        """Of many signals, shape (n, k, d)."""
+        return np.array([self.value(grid, rows) for rows in many])
+
     @abstractmethod
     def subgradient(self, grid: Grid, rows: Array) -> Array:
         """A Z with dual norm at most one and <Z, V> = norm(V); zero rows give zero (P2).

@@ -7,7 +7,6 @@ their lengths add up to two at the most. Of several signals it is the largest.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.balls import smallest_balls
 from laufruhe.numerics.norms.maximum import in_place
 from laufruhe.numerics.norms.norm import (  # fmt: skip
     Cones,
@@ -28,9 +28,6 @@ from laufruhe.numerics.norms.norm import (  # fmt: skip
 )
 from laufruhe.numerics.spectrum import Spectrum
 
-SAME = 1e-13
-"""Share of a radius by which a point may stand outside a ball that holds it."""
-
 
 class PeakToPeak(Norm):
     """The largest diameter of the signals."""
@@ -41,17 +38,22 @@ class PeakToPeak(Norm):
 
     def value(self, grid: Grid, rows: Array) -> float:
         """The largest diameter."""
-        return max((2.0 * _ball(signal)[0] for signal in _signals(rows, grid.steps)), default=0.0)
+        return _diameter(_signals(rows, grid.steps))
+
+    def values(self, grid: Grid, many: Array) -> Array:
+        """Of all balls together."""
+        balls = smallest_balls(_signals(many, grid.steps))
+        return np.asarray(2.0 * balls.radii.reshape(len(many), -1).max(axis=1, initial=0.0))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
         """Along the radii to the points that hold the largest ball, by their shares of its centre."""
         z = np.zeros_like(rows)
-        balls = [_ball(signal) for signal in _signals(rows, grid.steps)]
-        largest = max(range(len(balls)), key=lambda g: balls[g][0], default=0)
-        if balls and balls[largest][0] > 0.0:
-            radius, centre, held, shares = balls[largest]
-            at = largest * grid.steps + held
-            z[at] = 2.0 * shares[:, None] * (rows[at] - centre) / radius
+        balls = smallest_balls(_signals(rows, grid.steps))
+        if balls.radii.max(initial=0.0) > 0.0:
+            largest = int(np.argmax(balls.radii))
+            at, shares = largest * grid.steps + balls.held[largest], balls.shares[largest]
+            along = (rows[at] - balls.centres[largest]) / balls.radii[largest]
+            np.add.at(z, at, 2.0 * shares[:, None] * along)
         return z
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
@@ -132,65 +134,9 @@ def _swing(signal: Spectrum) -> float:
 
 def _reach(steps: Array, bent: Array) -> float:
     """Diameter of the ball that holds a signal at equal steps and where it bends."""
-    return 2.0 * _ball(np.concatenate([steps, bent]))[0]
+    return _diameter(np.concatenate([steps, bent])[None])
 
 
-def _ball(points: Array) -> tuple[float, Array, np.ndarray, Array]:
-    """The smallest ball that holds points (k, d): radius, centre, the points that hold it, their shares of the centre.
-
-    The farthest point joins those that hold the ball, and the ball of these few is found
-    by trying every choice of them. The radius grows with every round, so it ends.
-    """
-    unit = float(np.abs(points).max(initial=0.0))
-    if unit == 0.0:
-        return 0.0, np.zeros(points.shape[-1]), np.zeros(1, dtype=np.intp), np.ones(1)
-    scaled = points / unit
-    if scaled.shape[-1] == 1:
-        ends = np.array([np.argmin(scaled), np.argmax(scaled)], dtype=np.intp)
-        low, high = scaled[ends]
-        return 0.5 * float(high[0] - low[0]) * unit, 0.5 * (low + high) * unit, ends, np.full(2, 0.5)
-    held = np.array([int(np.argmax(_apart(scaled, scaled.mean(axis=0))))], dtype=np.intp)
-    radius, centre, shares = 0.0, scaled[held[0]], np.ones(1)
-    for _ in range(len(points)):
-        far = _apart(scaled, centre)
-        farthest = int(np.argmax(far))
-        if far[farthest] <= radius * (1.0 + SAME) or farthest in held:
-            break
-        held, radius, centre, shares = _of_few(scaled, np.append(held, farthest))
-    return radius * unit, centre * unit, held, shares
-
-
-def _apart(points: Array, centre: Array) -> Array:
-    """Distances of points none of whose coordinates is over one."""
-    away = points - centre
-    return np.asarray(np.sqrt(np.einsum("kd,kd->k", away, away)))
-
-
-def _of_few(points: Array, few: np.ndarray) -> tuple[np.ndarray, float, Array, Array]:
-    """The smallest ball of a handful: that of the subset whose own ball, centred between them, holds all."""
-    best: tuple[np.ndarray, float, Array, Array] | None = None
-    for size in range(2, min(len(few), points.shape[-1] + 1) + 1):
-        for subset in itertools.combinations(few, size):
-            chosen = np.array(subset, dtype=np.intp)
-            shares = _centre_shares(points[chosen])
-            if shares.min() < -1e-9:
-                continue
-            shares = np.maximum(shares, 0.0) / np.maximum(shares, 0.0).sum()
-            centre = shares @ points[chosen]
-            radius = float(_apart(points[chosen], centre).max())
-            outside = float(_apart(points[few], centre).max())
-            if outside <= radius * (1.0 + 1e-12) and (best is None or radius < best[1]):
-                best = chosen, max(radius, outside), centre, shares
-    if best is None:
-        # points that all but coincide with others: a ball about their middle holds them too
-        shares = np.full(len(few), 1.0 / len(few))
-        centre = shares @ points[few]
-        return few, float(_apart(points[few], centre).max()), centre, shares
-    return best
-
-
-def _centre_shares(points: Array) -> Array:
-    """Shares that add up to one of the point as far from each of these, in the plane that they span."""
-    apart = points[1:] - points[0]
-    shares, *_ = np.linalg.lstsq(2.0 * apart @ apart.T, np.einsum("kd,kd->k", apart, apart), rcond=None)
-    return np.concatenate([[1.0 - shares.sum()], shares])
+def _diameter(signals: Array) -> float:
+    """The largest, of signals of shape (signals, steps, d)."""
+    return float(2.0 * smallest_balls(signals).radii.max(initial=0.0))
