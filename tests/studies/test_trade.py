@@ -11,9 +11,11 @@ import pytest
 import laufruhe
 from cli import scenes
 from laufruhe.cli.fidelity import traded
+from laufruhe.errors import SolverError
 from laufruhe.fidelity.error_bounds import reference
 from laufruhe.files.reader import load
 from laufruhe.machine import Engine
+from laufruhe.numerics.workers import HERE, working_on
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
@@ -21,7 +23,7 @@ from laufruhe.report.trade import choices, index, trade_document
 from laufruhe.solvers.conclusion import values_of
 from laufruhe.solvers.nearby import first_of, next_to
 from laufruhe.solvers.result import Status
-from laufruhe.studies.trade import Row, Trade
+from laufruhe.studies.trade import Row, Trade, trade
 from problem_files import PROBLEMS
 
 
@@ -101,6 +103,23 @@ def test_an_index_lists_what_nothing_is_traded_for(tmp_path: Path) -> None:
     assert "nothing is open" in boxer
     assert "the flywheel is open" in pump
     assert {entry.name for entry in (tmp_path / "trade").glob("*.md")} == {"README.md", "boxer-four.md"}
+
+
+@pytest.mark.slow
+def test_what_is_measured_in_time_has_its_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of several problems side by side; the rest is an error that counts them."""
+    quick, never = PROBLEMS / "boxer-four.toml", PROBLEMS / "inline-five.toml"
+
+    def out_of_time(problem: Problem, *_: object) -> Trade:
+        if problem.name == never.stem:
+            raise SolverError("the time limit is over before any fidelity was measured; raise it")
+        return trade(problem)
+
+    monkeypatch.setattr("laufruhe.cli.fidelity.trade", out_of_time)
+    monkeypatch.setattr("laufruhe.cli.fidelity.passed", lambda: True)
+    with working_on(HERE), pytest.raises(SolverError, match="1 of 2 problems are measured"):
+        traded([quick, never], tmp_path / "trade", lambda _: None)
+    assert (tmp_path / "trade/boxer-four.md").is_file()
 
 
 def test_what_a_file_asks_beyond_a_trade_is_told() -> None:

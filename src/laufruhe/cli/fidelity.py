@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.errors import refused
+from laufruhe.errors import SolverError, refused
 from laufruhe.fidelity.automatic import Choice, choose
 from laufruhe.fidelity.mount_needs import needs
 from laufruhe.files.reader import load, load_tables, tables_of
 from laufruhe.load_models.batch import prepare
+from laufruhe.numerics.budget import passed
 from laufruhe.numerics.workers import count_of, each, executor_for, given
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -75,6 +76,9 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
         with files.staged(files.Set(folder, "--out", "trade", names, adds=True)) as stage:
             for name, page in pages.items():
                 (stage / name).write_bytes(page)
+    if len(found) < len(problems):
+        what = f"{len(found)} of {len(problems)} problems are measured, with pages in {folder}"
+        raise SolverError(f"the time limit is over: {what}; raise it")
     trades = [found[k] for k in range(len(problems))]
     index = report.index(trades, [name for _, name in of_wheels])
     if len(read) > 1:
@@ -99,17 +103,24 @@ def _measured(
     pieces = [(path, tables_of(path)) for path in paths]
     with (
         executor_for(min(len(pieces), count_of())) as executor,
-        closing(each(_measured_there, pieces, executor)) as answers,
+        closing(each(_measured_there, pieces, executor, patient=True)) as answers,
     ):
-        for k, (one, pages) in answers:
-            say(f"{problems[k].name} is measured")
-            yield k, replace(one, problem=traded_part(problems[k])), pages
+        for k, answer in answers:
+            if answer is not None:
+                one, pages = answer
+                say(f"{problems[k].name} is measured")
+                yield k, replace(one, problem=traded_part(problems[k])), pages
 
 
-def _measured_there(piece: tuple[Path, dict[str, Any]]) -> tuple[Trade, Pages]:
-    """By a worker, which has no use for the file; what of the problem is no number stays there."""
+def _measured_there(piece: tuple[Path, dict[str, Any]]) -> tuple[Trade, Pages] | None:
+    """By a worker, which has no use for the file; what of the problem is no number stays there. None out of time."""
     path, tables = piece
-    one = trade(load_tables(tables, path))
+    try:
+        one = trade(load_tables(tables, path))
+    except SolverError:
+        if passed():
+            return None
+        raise
     return replace(one, problem=replace(one.problem, phasing=None)), _pages(path, one)
 
 
