@@ -225,9 +225,6 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
         where = "engine.throws" if phasing.throw_bounds is not None else "phasing.intervals"
         rule = f"lets throws leave the even steps, and those of layout '{engine.layout}' do not"
         raise Refused(where, None, rule, 'write throws = "open", without intervals')
-    for key in kind.keys:
-        if key.remedy and engine.own(key.name) is None:
-            raise Refused(f"engine.{key.name}", None, "is missing", key.remedy)
     both = all(isinstance(engine.own(key), Open) for key in ("bank_angle", "split_pin_angle"))
     if not phasing.continuous and both:
         rule = "is open beside bank_angle, and even firing binds only their sum"

@@ -65,11 +65,9 @@ def _panel(axes: Axes, panel: Panel) -> None:
     for mark in panel.marks:
         _mark(axes, mark)
     axes.set_title(typeset(panel.title), loc="left", size=SMALL)
-    if panel.bare:
-        axes.set_axis_off()
     _axis(axes, "x", panel.x)
     _axis(axes, "y", panel.y)
-    free = {mark.text for mark in panel.marks if isinstance(mark, Words) and mark.across == "left" and not panel.bare}
+    free = {mark.text for mark in panel.marks if isinstance(mark, Words) and mark.across == "left"}
     apart([text for text in axes.texts if text.get_text() in free])
 
 
@@ -78,7 +76,7 @@ def _mark(axes: Axes, mark: Mark) -> None:
         drawn = axes.text(
             mark.x, mark.y, typeset(mark.text), size=max(mark.size, SMALL), clip_on=False,
             color=ink_on(hue(mark.inside)) if mark.inside else legible(hue(mark.colour)),
-            ha=mark.across, va=mark.along, weight="bold" if mark.bold else "normal",
+            ha=mark.across, va=mark.along,
         )  # fmt: skip
         if mark.boxed:
             drawn.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.0})

@@ -84,7 +84,6 @@ class Words:
     colour: Colour = "ink"
     across: str = "left"
     along: str = "center"
-    bold: bool = False
     boxed: bool = False
     inside: Colour = ""
 
@@ -109,13 +108,12 @@ class Axis:
 
 @dataclass(frozen=True)
 class Panel:
-    """Marks on two axes; `bare` leaves the axes out."""
+    """Marks on two axes."""
 
     marks: Sequence[Mark]
     x: Axis = Axis()
     y: Axis = Axis()
     title: str = ""
-    bare: bool = False
 
 
 @dataclass(frozen=True)

@@ -27,15 +27,12 @@ class Key:
         "sign", "inertia", "ratio", "mass", "open mass", or "rod" of a mass, centre of gravity and inertia.
     default
         Where it is left out.
-    remedy
-        What to do where it is left out, if it must not be.
     """
 
     name: str
     kind: str
     description: str = ""
     default: Any = None
-    remedy: str = ""
 
 
 SPACING = Key(

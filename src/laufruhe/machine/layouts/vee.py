@@ -47,10 +47,7 @@ class Vee(LayoutKind):
     name = "vee"
     keys = (
         SPACING,
-        Key(
-            "bank_angle", "open angle", "Angle between the banks of a vee.",
-            remedy="add the angle between the banks, or its bounds",
-        ),
+        Key("bank_angle", "open angle", "Angle between the banks of a vee."),
         Key("split_pin_angle", "open angle", "Angle by which the right bank's crank pin leads."),
         STAGGER,
     )  # fmt: skip
@@ -61,6 +58,6 @@ class Vee(LayoutKind):
         """Two banks on shared or split pins."""
         own = asked.own
         if own["bank_angle"] is None:
-            raise KeyedError("bank_angle", "is missing; add the angle between the banks")
+            raise KeyedError("bank_angle", "is missing; add the angle between the banks, or its bounds")
         split, stagger = own["split_pin_angle"] or 0.0, own["bank_stagger"] or 0.0
         return vee(asked.cylinders, asked.spacing, own["bank_angle"], split, stagger)

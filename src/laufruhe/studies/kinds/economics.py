@@ -199,7 +199,7 @@ class Economics(Part):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Fronts on the left, what each set of shafts does and what is said of it on the right."""
+        """A front for every set of shafts, and the engines without any beside them."""
         built = _with_shafts(data)
         colours = dict(zip(built, _SERIES * (1 + len(built) // len(_SERIES)), strict=False))
         ends = (1.3 * float(data["optimum_mass"].max()) or 1.0, 1.06 * float(data["optimum"].max()))
@@ -209,17 +209,13 @@ class Economics(Part):
             p.Axis("mass on balancer shafts [kg]", (0.0, ends[0])),
             p.Axis(f"{data.attrs['objective']} [{unit}]", (0.0, ends[1])),
         )
-        table = p.Panel(_told(data, colours), p.Axis(ends=(0.0, 1.0)), p.Axis(ends=(0.0, 1.0)), bare=True)
-        legend = [
-            p.Line(marker="o", size=4.0, label="least force for this mass"),
-            p.Line(marker="D", width=0.0, label="optimum, whatever it weighs"),
-            p.Line(colour="before", label="no shafts"),
-            p.Line(dash=p.DASHES[0], width=1.2, label="more cylinders, no shafts, equal power"),
-        ]
+        legend = [p.Line(colour=colour, label=name, width=2.5) for name, colour in colours.items()]
+        legend.append(p.Line(dash=p.DASHES[0], width=1.2, label="more cylinders, no shafts, equal power"))
         gap = f"no design lies lower by more than {100.0 * float(data['gap'].max()):.1g} %"
-        words = f"Every point a proven optimum: {gap}. Crank weights are free."
+        words = f"Dots: least force for this mass; diamonds: whatever they weigh. All are proven optima: {gap}. "
+        words += "Crank weights are free."
         credit = p.credit(data)[:-1] + "; filled dots: no other point has less force, mass and shafts."
-        return p.Picture(data.attrs["title"], words, [fronts, table], credit, (5.4, 4.4), 2, 0.25, legend=legend)
+        return p.Picture(data.attrs["title"], words, [fronts], credit, (7.2, 4.6), legend=legend)
 
 
 def _rebuilt(case: CaseTable, whole: Problem, scenes: Scenes) -> Point:
@@ -314,31 +310,4 @@ def _levels(data: xr.Dataset, right: float, high: float) -> list[p.Mark]:
         top = min(force, top - LINE * high)
         place, colour = top + 0.15 * LINE * high, "ink" if more else "faint"
         marks.append(p.Words(right, place, f"{name}: {force:.0f}", 7.5, colour, "right", "bottom", boxed=True))
-    return marks
-
-
-def _told(data: xr.Dataset, colours: Mapping[str, p.Colour]) -> list[p.Mark]:
-    """A few lines of text for every set of shafts, from above."""
-    unit, claims = data["optimum"].attrs["units"], verdicts(data)
-    y = 1.0
-    marks: list[p.Mark] = []
-
-    def write(text: str, colour: str = "ink", bold: bool = False) -> None:
-        marks.append(p.Words(0.07, y, text, colour=colour, along="top", bold=bold))
-
-    for worth in worths(data):
-        row = data.sel(build=worth.build)
-        shafts = int(row["shafts"])
-        marks.append(p.Line([0.0, 0.05], [y - 0.012] * 2, colours[worth.build], width=2.5))
-        write(f"{worth.build}, {shafts} shaft{'s' if shafts > 1 else ''}", bold=True)
-        y -= LINE
-        write(f"{float(row['optimum']):.0f} {unit} ({percent(-worth.fall)}) with {float(row['optimum_mass']):.2f} kg")
-        y -= LINE
-        write(f"{'worth building' if worth.worth else 'not worth building'}: {worth.why}", "faint")
-        for verdict in claims.get(worth.build, ()):
-            y -= LINE
-            agreed = "confirmed" if verdict.agrees else f"not confirmed ({verdict.ours:+.0f} %)"
-            mark, colour = ("✓", "leaf") if verdict.agrees else ("✗", "rust")
-            write(f"{mark} said: {verdict.paper} {verdict.statement.partition(': ')[2]}: {agreed}", colour)
-        y -= 1.4 * LINE
     return marks
