@@ -178,9 +178,9 @@ class OpenMounts:
 
 
 def is_lifted(problem: Problem) -> bool:
-    """Whether all that is open are unbalances, and stiffness, places and inclinations of mounts."""
+    """Whether all that is open is what loads are affine in, and stiffness, places and inclinations of mounts."""
     mounts = problem.mount_decisions
-    others = [d for d in problem.decisions if d not in mounts and not (d.is_affine and d.rotor_drives)]
+    others = [d for d in problem.decisions if d not in mounts and not d.is_affine]
     if not mounts or others:
         return False
     low, high = number_ranges(problem)
