@@ -20,7 +20,7 @@ def rosenbrock(radius: float = 1.0) -> NonlinearProgram:
     z = ca.SX.sym("z", 2)
     return NonlinearProgram(
         z, (1 - z[0]) ** 2 + 100 * (z[1] - z[0] ** 2) ** 2, np.full(2, -3.0), np.full(2, 3.0),
-        names=("a", "b"), constraints=ca.sumsqr(z), constraint_lower=np.array([-np.inf]),
+        constraints=ca.sumsqr(z), constraint_lower=np.array([-np.inf]),
         constraint_upper=np.array([radius]), constraint_names=("disc",),
     )  # fmt: skip
 

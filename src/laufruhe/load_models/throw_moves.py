@@ -43,7 +43,7 @@ class ThrowMoves:
         self.phasing, self.layout, self.start = phasing, layout, start
         self.intervals = Intervals(max(intervals.least, min(APART, intervals.most)), intervals.most)
         self._throws = range(0 if phasing.throw_bounds else 1, len(start.throws))
-        self._open_bank, self._open_split = _is_open(phasing.bank), _is_open(phasing.split)
+        self._open_bank, self._open_split = phasing.opened
         self.size = len(self._throws) + self._open_bank + self._open_split
         self.lower, self.upper = self._bounds()
 
@@ -111,7 +111,3 @@ class ThrowMoves:
         following = [*moments[1:], moments[0] + cycle.angle]
         rows = [b - a for a, b in zip(moments, following, strict=True)]
         return rows, [f"firing interval after cylinder {number}" for number in order]
-
-
-def _is_open(bounds: tuple[float, float] | None) -> bool:
-    return bounds is not None and bounds[0] < bounds[1]

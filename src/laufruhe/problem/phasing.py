@@ -222,13 +222,19 @@ class PhasingOf(Generic[P]):
         return self.throw_bounds is not None or (self.throws is None and not self.intervals.forbid_unevenness)
 
     @property
+    def opened(self) -> tuple[bool, bool]:
+        """Whether the bank angle and split pins are open."""
+        bank, split = (pair is not None and pair[0] < pair[1] for pair in (self.bank, self.split))
+        return bank, split
+
+    @property
     def open_names(self) -> tuple[str, ...]:
         """What is open, for the screen."""
         found = (
             ("throws", self.throws is None),
             ("firing order", self.firing_order is None),
-            ("bank angle", self.bank is not None and self.bank[0] < self.bank[1]),
-            ("split pin angle", self.split is not None and self.split[0] < self.split[1]),
+            ("bank angle", self.opened[0]),
+            ("split pin angle", self.opened[1]),
             (f"which of {sum(map(len, self.shafts.optional))} shaft(s) are built", bool(self.shafts.optional)),
         )
         return tuple(name for name, is_open in found if is_open)
@@ -272,7 +278,7 @@ class PhasingOf(Generic[P]):
         if self.bank is None:
             return ((None, None),)
         split = self.split or (0.0, 0.0)
-        bank_open, split_open = self.bank[0] < self.bank[1], split[0] < split[1]
+        bank_open, split_open = self.opened
         if not bank_open and not split_open:
             return ((self.bank[0], split[0]),)
         step = math.tau / (self.cylinders // math.gcd(self.cycle.turns, self.cylinders))

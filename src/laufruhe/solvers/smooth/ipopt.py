@@ -75,7 +75,6 @@ class Task:
     constraint_upper: Array
     scales: Array
     objective_scale: float
-    constraint_scales: Array
     stages: tuple[tuple[float, ...], ...]
     max_iterations: int
     max_seconds: float
@@ -231,8 +230,8 @@ def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptim
     return LocalOptimum(
         x=y * task.scales,
         value=f * task.objective_scale,
-        constraints=g * task.constraint_scales,
-        multipliers=m * task.objective_scale / task.constraint_scales,
+        constraints=g,
+        multipliers=m * task.objective_scale,
         kkt_residual=residual,
         violation=violation,
         iterations=iterations,

@@ -69,8 +69,6 @@ class NonlinearProgram:
         Scalar expression.
     lower, upper
         Bounds of the variables, shape (n,).
-    names
-        Of the variables.
     constraints
         Column of expressions, shape (m,).
     constraint_lower, constraint_upper
@@ -79,8 +77,8 @@ class NonlinearProgram:
         As a report prints them.
     scales
         Typical sizes of the variables; the width of their bounds when left out.
-    objective_scale, constraint_scales
-        Typical sizes of objective and constraints.
+    objective_scale
+        Typical size of the objective; that of every constraint is one.
     parameters, stages
         Symbols and their values, one row a stage (N4).
     expand
@@ -97,14 +95,12 @@ class NonlinearProgram:
     objective: Any
     lower: Array
     upper: Array
-    names: tuple[str, ...] = ()
     constraints: Any = None
     constraint_lower: Array = field(default_factory=lambda: np.zeros(0))
     constraint_upper: Array = field(default_factory=lambda: np.zeros(0))
     constraint_names: tuple[str, ...] = ()
     scales: Array | None = None
     objective_scale: float = 1.0
-    constraint_scales: Array | None = None
     parameters: Any = None
     stages: tuple[tuple[float, ...], ...] = ((),)
     expand: bool = False
@@ -258,11 +254,10 @@ def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float, ma
     symbol = type(program.x)
     scales = program.variable_scales
     constraints = symbol(0, 1) if program.constraints is None else program.constraints
-    heights = np.ones(constraints.numel()) if program.constraint_scales is None else program.constraint_scales
     parameters = symbol(0, 1) if program.parameters is None else program.parameters
     y, told, outside = symbol.sym("y", program.x.numel()), program.told, None
     f, g, asked = ca.substitute(
-        [program.objective / program.objective_scale, constraints / ca.DM(heights),
+        [program.objective / program.objective_scale, constraints,
          symbol(0, 1) if told is None else told.asked], [program.x], [y * ca.DM(scales)]
     )  # fmt: skip
     inputs = {"x": y, "p": parameters}
@@ -271,7 +266,7 @@ def _task(program: NonlinearProgram, max_iterations: int, max_seconds: float, ma
         outside = Outside(ca.Function("asked", [y], [asked]).serialize(), told.teller, told.symbols.numel())
     oracle = ca.Function("oracle", {**inputs, "f": f, "g": g}, list(inputs), ["f", "g"])
     return Task(
-        oracle.serialize(), program.lower / scales, program.upper / scales, program.constraint_lower / heights,
-        program.constraint_upper / heights, scales, program.objective_scale, heights, program.stages,
+        oracle.serialize(), program.lower / scales, program.upper / scales, program.constraint_lower,
+        program.constraint_upper, scales, program.objective_scale, program.stages,
         max_iterations, max_seconds, program.expand and many, outside, program.deciding,
     )  # fmt: skip

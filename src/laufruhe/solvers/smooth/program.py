@@ -137,7 +137,6 @@ class SmoothProgram:
             least,
             lower,
             upper,
-            names=tuple(decision.name for decision in self._decisions),
             constraints=constraints,
             constraint_lower=np.array(self._held.lower),
             constraint_upper=np.array(self._held.upper),

@@ -245,9 +245,7 @@ def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
         why = f"each of the {len(fired)} best star(s) breaks a limit between the angles that the search looks at"
         return no_star(problem, f"{why}; raise phasing.best or fidelity.samples", Status.FAILED)
     value = result.objective.value if result.objective else best.value
-    angles = (phasing.bank, phasing.split)
-    is_one = not any(pair is not None and pair[0] < pair[1] for pair in angles)
-    shared = firing_bound(problem, result.final) if is_one and result.objective else 0.0
+    shared = firing_bound(problem, result.final) if result.objective and not any(phasing.opened) else 0.0
     certificate = certified(
         value, max(answer.bound, shared), nothing_of(problem), problem.tolerance, Reach.WHOLE,
         result.certificate.kkt_residual if result.certificate else 0.0, answer.method,

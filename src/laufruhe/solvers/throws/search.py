@@ -29,7 +29,6 @@ from laufruhe.solvers.throws.windows import (
     design_at,
     firing_of,
     nearest,
-    opened,
     stay,
     turn_freely,
     windows_of,
@@ -185,14 +184,14 @@ class ThrowSearch(Search[_Part, _Best]):
     @property
     def what(self) -> str:
         """What is divided, in words."""
-        return "boxes of throws" + (" and angles" if any(opened(self._phasing)) else "")
+        return "boxes of throws" + (" and angles" if any(self._phasing.opened) else "")
 
     @property
     def _is_one_angle(self) -> bool:
         """Whether all that is open is one angle of a crank with one throw."""
         phasing = self._phasing
         throws = phasing.layout(*phasing.least_geometry).throw_positions
-        return sum(opened(phasing)) == 1 and len(throws) == 1 and phasing.throw_bounds is None
+        return sum(phasing.opened) == 1 and len(throws) == 1 and phasing.throw_bounds is None
 
     @property
     def cost(self) -> float:
@@ -245,13 +244,13 @@ class ThrowSearch(Search[_Part, _Best]):
         """Waves of the throws, and of angles that are open beside them."""
         phasing = self._phasing
         layout = phasing.layout_of(candidate)
-        if not any(opened(phasing)):
+        if not any(phasing.opened):
             return ThrowWaves(problem, layout, rides)
         if not stay(phasing, candidate):
             raise ModelError("what rides on a throw knows how far pins are apart")
         # where nothing tells when the crank turns, its first throw stays where it is, and what rides on it
         stands = phasing.throw_bounds is not None or turn_freely(phasing, candidate, rides)
-        return ThrowWaves(problem, layout, rides, opened(phasing), 0.0 if stands else layout.side(0))
+        return ThrowWaves(problem, layout, rides, phasing.opened, 0.0 if stands else layout.side(0))
 
     def candidate(self, window: FiringWindow, throws: Array) -> Candidate:
         """A design with these throws, and with a firing order that they keep."""

@@ -251,7 +251,7 @@ def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[fl
         objective = amplitude_objective(first, phasing, families[0].layout)
         if objective is not None:
             return uneven_bound(phasing, families[0].space, objective, intervals), "windows around the even steps"
-    if phasing.bank is not None and phasing.bank[0] < phasing.bank[1]:
+    if phasing.opened[0]:
         # what stands still inside the crankcase leans with its bank
         felt = tuple(term for term in problem.objective if not term.measure.is_inside)
         problem = replace(problem, objective=felt)

@@ -45,14 +45,8 @@ def firing_of(phasing: Phasing) -> FiringBounds:
     layout, allowed = phasing.layout(*phasing.least_geometry), phasing.intervals
     return FiringBounds(
         phasing.cycle, layout, max(allowed.least, 0.0), allowed.most, phasing.throw_bounds, phasing.firing_order,
-        tuple(pair for pair in (phasing.bank, phasing.split) if pair is not None and pair[0] < pair[1]),
+        tuple(pair for pair, own in zip((phasing.bank, phasing.split), phasing.opened, strict=True) if pair and own),
     )  # fmt: skip
-
-
-def opened(phasing: Phasing) -> tuple[bool, bool]:
-    """Whether the bank angle and split pins are open."""
-    bank, split = (pair is not None and pair[0] < pair[1] for pair in (phasing.bank, phasing.split))
-    return bank, split
 
 
 def design_at(phasing: Phasing, angles: Array) -> Candidate:
@@ -62,7 +56,7 @@ def design_at(phasing: Phasing, angles: Array) -> Candidate:
     told = iter(angles[count:])
     geometry = [
         float(np.clip(next(told), *pair)) if is_open and pair is not None else (None if pair is None else pair[0])
-        for pair, is_open in zip((phasing.bank, phasing.split), opened(phasing), strict=True)
+        for pair, is_open in zip((phasing.bank, phasing.split), phasing.opened, strict=True)
     ]
     # throws that are open are counted from cylinder 1 at its dead centre
     turned = layout.side(0) * float(angles[count:].sum()) if phasing.throw_bounds is None else 0.0

@@ -18,7 +18,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.problem.tolerance import Over, Tolerance
 from laufruhe.prove.certificate import Proof, certified
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.conclusion import KEPT, Design, Shown, decision_values, limit_values
+from laufruhe.solvers.conclusion import KEPT, Design, Shown, decided, decision_values, limit_values
 from laufruhe.solvers.result import LimitValue, ObjectiveValue, Result, Status
 from laufruhe.solvers.tolerances.adversaries import Adversary, Found
 from laufruhe.solvers.tolerances.result import CONFIDENCE, SHARE, SHARES, BuiltDesign, PricedTolerance, RobustResult
@@ -106,8 +106,8 @@ def _design(
 
     ordered = np.sort(built)
     low, high = (int(binom.ppf(0.5 + side * 0.5 * CONFIDENCE, len(built), share)) for side in (-1.0, 1.0))
-    decided = zip(problem.decisions, values, strict=True)
-    entries = tuple((e.name, e.value, e.unit) for d, v in decided for e in decision_values(d, v))
+    pairs = zip(problem.decisions, values, strict=True)
+    entries = tuple((e.name, e.value, e.unit) for d, v in pairs for e in decision_values(d, v))
     drawing = _value(problem, values, np.zeros(problem.tolerances.count), problem.fidelity.samples)
     level = float(ordered[min(int(np.ceil(share * len(built))) - 1, len(built) - 1)])
     worst = found.bound if problem.over is None or problem.over.share is None else float(ordered[-1])
@@ -190,11 +190,7 @@ def robust_result(
         status=status if met else Status.FAILED,
         objective=ObjectiveValue.of(problem, found.bound, given.value),
         certificate=certificate,
-        decisions=tuple(
-            entry
-            for decision, value in zip(problem.decisions, design.values, strict=True)
-            for entry in decision_values(decision, value)
-        ),
+        decisions=decided(design),
         limits=limits,
         initial=evaluate(problem),
         final=design.evaluation,

@@ -72,12 +72,6 @@ class Least:
     samples: int
     conflict: tuple[str, ...] = ()
 
-    @property
-    def rank(self) -> tuple[bool, float]:
-        """By what breaks limits least, then by what is least."""
-        broken = self.found.excess > KEPT
-        return broken, self.found.excess if broken else self.found.bound
-
 
 def solve_robust(problem: Problem, solve: Solve) -> Result:
     """Decide for the engines that tolerances allow.
