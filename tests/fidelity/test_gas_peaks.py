@@ -28,7 +28,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers.accuracy import error_of
 from one_cylinder import cylinder_pressure
 
-FAST, USUAL, QUICK = 12, 25, 20_000
+FAST, USUAL, QUICK = 12, 18, 20_000
 SUBJECTS = channels.MOUNT_FORCE, channels.ROLL_MOMENT
 ANGLES = 30_000
 BEND = """

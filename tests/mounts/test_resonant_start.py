@@ -115,7 +115,7 @@ def test_from_the_shell(tmp_path: Path) -> None:
     refused = CliRunner().invoke(app, ["evaluate", str(path), "--out", str(out)])
     assert (refused.exit_code, out.exists()) == (2, False)
     assert CliRunner().invoke(app, ["check", str(path)]).exit_code == 0
-    solved = CliRunner().invoke(app, ["solve", str(path), "--out", str(out)])
+    solved = CliRunner().invoke(app, ["solve", str(path), "--no-plots", "--out", str(out)])
     assert solved.exit_code == 0, solved.output
     assert "the design as given stands on a resonance" in solved.output
     result = json.loads((out / "result.json").read_text(encoding="utf-8"))

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from laufruhe.physics.torsion import natural_modes, shaft_torque, vector_sums
-from laufruhe.plots import draw
+from laufruhe.plots import names
 from laufruhe.present.torsion import torque_over_speed
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.report.json_result import as_dict
@@ -94,6 +93,5 @@ def test_places_and_tables(result: Result, record: dict) -> None:
     assert "2.5, 5, 7.5, 10" in grids["Critical speeds of the crankshaft as decided"].note
 
 
-@pytest.mark.slow
-def test_pictures(result: Result, tmp_path: Path) -> None:
-    assert {"twist_modes.png", "twist_response.png"} <= set(draw(result, tmp_path))
+def test_pictures(result: Result) -> None:
+    assert {"twist_modes", "twist_response"} <= set(names(result))
