@@ -54,7 +54,7 @@ def one_speed(problem: Problem) -> list[str]:
         return mounting.forces(shaking_loads(problem.engine, point, problem.fidelity), point.speed)
 
     # the motion of one wrench is kept for forces and travel: a copy is another one
-    response, whole = seconds(lambda: mounting.forces(replace(wrench), point.speed)), seconds(anew)
+    response, whole = seconds(lambda: mounting.forces(wrench.holding(wrench.coefficients), point.speed)), seconds(anew)
     runs = {}
     for steps in (720, 1440):
         started = time.process_time()

@@ -39,6 +39,13 @@ def test_counterweights_and_shafts_are_decided_with_no_library_but_the_solver_of
 
 
 @pytest.mark.slow
+def test_who_draws_is_ready_without_what_studies_and_solvers_need() -> None:
+    names = "casadi", "clarabel", "cvxpy", "pandas", "pydantic", "scipy", "xarray"
+    code = f"import sys; sys.modules |= dict.fromkeys({names}); from laufruhe.plots import get_ready; get_ready()"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.slow
 def test_without_casadi_counterweights_are_decided_and_uneven_throws_say_what_they_need() -> None:
     paths = [str(PROBLEMS / f"{name}.toml") for name in ("tractor-single", "inline-nine-uneven")]
     found = subprocess.run([sys.executable, "-c", SCRIPT, *paths], check=True, capture_output=True, text=True)

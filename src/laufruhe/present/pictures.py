@@ -40,3 +40,10 @@ MOST_PRINTED = 8
 PRINTED_SHEETS = tuple(
     f"table-{name.replace('_', '-')}{f'-{k}' if k > 1 else ''}" for name in PRINTED for k in range(1, MOST_PRINTED + 1)
 )
+
+
+def rows_of(count: int, most: int) -> tuple[list[range], int]:
+    """So many in rows of at most so many, all about as long; and how many one holds."""
+    rows = max(-(-count // max(most, 1)), 1)
+    side = max(-(-count // rows), 1)
+    return [range(first, min(first + side, count)) for first in range(0, count, side)], side

@@ -22,13 +22,6 @@ def colour(k: int, count: int) -> Colour:
     return SERIES[k] if count <= len(SERIES) else k / (count - 1)
 
 
-def rows_of(count: int, most: int) -> tuple[list[range], int]:
-    """So many in rows of at most so many, all about as long; and how many one holds."""
-    rows = max(-(-count // max(most, 1)), 1)
-    side = max(-(-count // rows), 1)
-    return [range(first, min(first + side, count)) for first in range(0, count, side)], side
-
-
 @dataclass(frozen=True)
 class Line:
     """Dots, joined unless `width` is zero. One with a label stands in the legend, drawn or not.

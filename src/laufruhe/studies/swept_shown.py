@@ -11,6 +11,7 @@ import xarray as xr
 
 from laufruhe.present.numbers import number as figures
 from laufruhe.present.numbers import percent
+from laufruhe.present.pictures import rows_of
 from laufruhe.studies import picture as p
 from laufruhe.studies.text import NOTHING, Rows, Text, number
 from laufruhe.units import readable
@@ -178,7 +179,7 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
     widest = max(len(line) for label in labels for line in str(label).split("\n"))
     each = max(1.15, 0.2 + LETTER * widest)
     up = metric_axis(data, *(() if single.all() else ("objective_given",)))
-    rows, side = p.rows_of(count, max(int(p.WIDEST / each), 1))
+    rows, side = rows_of(count, max(int(p.WIDEST / each), 1))
     ticks = [(float(k), str(label)) for k, label in enumerate(labels)]
     panels = [
         p.Panel(

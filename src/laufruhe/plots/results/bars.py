@@ -16,9 +16,9 @@ from laufruhe.plots.style import Series, headed, page, series_of, styled, thin
 from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, ink_on
 from laufruhe.present.measures import hardest_point, has_mount_forces
 from laufruhe.present.numbers import number
+from laufruhe.present.pictures import rows_of
 from laufruhe.problem.evaluation import Evaluation, measured
 from laufruhe.solvers.result import Result
-from laufruhe.studies.picture import rows_of
 
 MOST_POINTS, MOST_GROUPS = 4, 7
 GROUP, WIDTH = 1.22, 0.42

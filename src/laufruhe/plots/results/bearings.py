@@ -16,8 +16,8 @@ from laufruhe.physics.bearing_wear import wear_of
 from laufruhe.plots.style import ORANGE, Series, entry_of_dots, headed, page, point_name, series_of, styled, thin
 from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_ticks
 from laufruhe.present.measures import BEARINGS, as_crank_turns, bearing_paths, has_bearings, load_designs
+from laufruhe.present.pictures import rows_of
 from laufruhe.solvers.result import Result
-from laufruhe.studies.picture import rows_of
 
 MOST_BEARINGS, MOST_COLUMNS, PANEL, STEPS = 6, 4, 1.95, 180
 # of a panel: where the ring of wear begins, how thick it is at most, and what the paths fill

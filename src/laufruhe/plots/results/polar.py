@@ -20,9 +20,9 @@ from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_
 from laufruhe.present.measures import hardest_point, has_mount_forces
 from laufruhe.present.numbers import figure as words
 from laufruhe.present.numbers import trimmed
+from laufruhe.present.pictures import rows_of
 from laufruhe.problem.evaluation import samples_of
 from laufruhe.solvers.result import Result
-from laufruhe.studies.picture import rows_of
 
 MOST_PANELS, MOST_COLUMNS = 12, 4
 POINTS = 1440
