@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections import defaultdict
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -31,6 +32,9 @@ _SETTINGS = {
     "static_regularization_constant": 1e-7,
 }
 
+ZERO, SIDES, LENGTH, MATRIX = "zero", "not under zero", "a length and its vector", "nowhere indefinite"
+_Parts: TypeAlias = defaultdict[Hashable, list[Array]]
+
 
 def proposed(program: Program) -> Iterator[Proposed]:
     """Multipliers of all conditions, s and moments, whatever the solver says of them; first and, where asked, again."""
@@ -46,7 +50,7 @@ class Stated:
         self.program = program
         self.rows: list[Any] = []
         self.right: list[Array] = []
-        self.cones: list[Any] = []
+        self.cones: list[tuple[str, Hashable]] = []
         self._solvers: dict[tuple[bool, tuple[float, float]], Any] = {}
         blocks = [_entries(size) for cap in program.caps for size in cap.blocks]
         heads = len(program.prices)
@@ -75,64 +79,61 @@ class Stated:
 
     def _shapes(self, number: int, shapes: Shapes) -> None:
         """E56: six kinds of rows."""
-        import clarabel
-
         numbers, each = self.program.numbers, _entries(6)
         own = np.arange(self.shapes[number], self.shapes[number + 1])
         corners = own[::each]
-        self._add(np.ones((1, 1)), corners[:1], np.ones(1), clarabel.ZeroConeT(1))
+        self._add(np.ones((1, 1)), corners[:1], ZERO, right=np.ones(1))
         both = np.concatenate([np.eye(numbers), -np.eye(numbers)], axis=1)
         columns = np.concatenate([corners[1:], self.first + np.arange(numbers)])
-        self._add(both, columns, np.zeros(numbers), clarabel.ZeroConeT(numbers))
-        for matrices, cone in ((shapes.equal, clarabel.ZeroConeT), (shapes.sides, clarabel.NonnegativeConeT)):
+        self._add(both, columns, ZERO, ("corners", number))
+        for name, matrices, cone in (("equal", shapes.equal, ZERO), ("sides", shapes.sides, SIDES)):
             rows = -column(matrices).reshape(len(matrices), -1)
-            self._add(rows, own, np.zeros(len(rows)), cone(len(rows)))
+            self._add(rows, own, cone, (name, number))
         for tensor in shapes.matrices:
             i, j, factor = triangle(tensor.shape[1])
             rows = column(tensor[:, i, j]).transpose(1, 0, 2).reshape(len(i), -1) * factor[:, None]
-            self._add(-rows, own, np.zeros(len(i)), clarabel.PSDTriangleConeT(tensor.shape[1]))
+            self._add(-rows, own, MATRIX, ("matrices", number))
         first = np.arange(each)
         for k in range(1, 1 + numbers):
             for sign in (1.0, -1.0):
                 rows = np.concatenate([-np.eye(each), -sign * np.eye(each)], axis=1)
                 columns = np.concatenate([own[first], own[k * each + first]])
-                self._add(rows, columns, np.zeros(each), clarabel.PSDTriangleConeT(6))
+                self._add(rows, columns, MATRIX, (sign, number))
 
-    def _priced(self, shapes: Shapes, parts: Sequence[Array]) -> Priced:
+    def _priced(self, number: int, shapes: Shapes, parts: _Parts) -> Priced:
         """From the multipliers of these rows."""
         matrices = [
             matrix_of(part, tensor.shape[1])
-            for part, tensor in zip(parts[4 : 4 + len(shapes.matrices)], shapes.matrices, strict=True)
+            for part, tensor in zip(parts["matrices", number], shapes.matrices, strict=True)
         ]
-        both = [matrix_of(part, 6) for part in parts[4 + len(shapes.matrices) :]]
-        return Priced(matrices, parts[3], -parts[2], parts[1], [*zip(both[::2], both[1::2], strict=True)])
+        above, under = ([matrix_of(part, 6) for part in parts[sign, number]] for sign in (1.0, -1.0))
+        (sides,), (equal,), (corners,) = (parts[name, number] for name in ("sides", "equal", "corners"))
+        return Priced(matrices, sides, -equal, corners, [*zip(above, under, strict=True)])
 
-    def _add(self, block: Array, columns: Indices, right: Array, cone: Any) -> None:
-        """Rows with entries in these columns alone."""
+    def _add(
+        self, block: Array, columns: Indices, cone: str, name: Hashable = None, right: Array | None = None
+    ) -> None:
+        """Rows with entries in these columns alone, and what their multipliers are known by."""
         from scipy.sparse import coo_array
 
         row, place = np.nonzero(block)
         shape = len(block), int(self.shapes[-1])
         self.rows.append(coo_array((block[row, place], (row, columns[place])), shape=shape))
-        self.right.append(np.asarray(right, dtype=float))
-        self.cones.append(cone)
+        self.right.append(np.zeros(len(block)) if right is None else np.asarray(right, dtype=float))
+        self.cones.append((cone, name))
 
     def _whole(self) -> None:
         """The first entry of every moment matrix is one."""
-        import clarabel
-
         count = len(self.program.sizes)
-        self._add(np.eye(count), np.asarray(self.ends[:-1]), np.ones(count), clarabel.ZeroConeT(count))
+        self._add(np.eye(count), np.asarray(self.ends[:-1]), ZERO, right=np.ones(count))
 
     def _linked(self) -> None:
         """(1, u)(1, u)' is the same for all orders."""
-        import clarabel
-
         corner, count = self._corner(0), _entries(1 + self.program.columns) - 1
         for order in range(1, len(self.program.sizes) if count else 1):
             both = np.concatenate([-np.eye(count), np.eye(count)], axis=1)
             columns = np.concatenate([corner[1:], self._corner(order)[1:]])
-            self._add(both, columns, np.zeros(count), clarabel.ZeroConeT(count))
+            self._add(both, columns, ZERO, "links")
 
     def _corner(self, order: int) -> Indices:
         """Where the entries of (1, u)(1, u)' stand: columns come first in a triangle column by column."""
@@ -140,28 +141,26 @@ class Stated:
 
     def _linear(self) -> None:
         """s between -1 and 1; sets of unbalances, budgets, and traces that are not over their head."""
-        import clarabel
-
         program, numbers = self.program, self.program.numbers
         own = self.first + np.arange(numbers)
         for sign in (1.0, -1.0):
-            self._add(sign * np.eye(numbers), own, np.ones(numbers), clarabel.NonnegativeConeT(numbers))
+            self._add(sign * np.eye(numbers), own, SIDES, right=np.ones(numbers))
         for matrix in program.sets:
-            self._add(column(matrix)[None], self._corner(0), np.zeros(1), clarabel.NonnegativeConeT(1))
+            self._add(column(matrix)[None], self._corner(0), SIDES, "sets")
         for budget in program.budgets:
             columns = np.concatenate([self._moment(order) for order, _ in budget.matrices])
             block = np.concatenate([column(matrix) for _, matrix in budget.matrices])[None]
-            self._add(block, columns, np.array([budget.most]), clarabel.NonnegativeConeT(1))
+            self._add(block, columns, SIDES, "budgets", np.array([budget.most]))
         if len(program.tops):
             held = np.flatnonzero(np.isfinite(program.tops))
-            self._add(np.eye(len(held)), held, program.tops[held], clarabel.NonnegativeConeT(len(held)))
+            self._add(np.eye(len(held)), held, SIDES, right=program.tops[held])
         at = 0
         for cap in program.caps:
             if cap.blocks:
                 span = np.arange(self.blocks[at], self.blocks[at + len(cap.blocks)])
                 traces = np.concatenate([_diagonal(size) for size in cap.blocks])
                 block, columns = np.append(traces, -1.0)[None], np.append(span, cap.head)
-                self._add(block, columns, np.zeros(1), clarabel.NonnegativeConeT(1))
+                self._add(block, columns, SIDES)
             at += len(cap.blocks)
 
     def _moment(self, order: int) -> Indices:
@@ -169,17 +168,12 @@ class Stated:
 
     def _moments(self) -> None:
         """No moment matrix is indefinite."""
-        import clarabel
-
-        for order, size in enumerate(self.program.sizes):
+        for order in range(len(self.program.sizes)):
             columns = self._moment(order)
-            cone = clarabel.PSDTriangleConeT(size)
-            self._add(-np.eye(len(columns)), columns, np.zeros(len(columns)), cone)
+            self._add(-np.eye(len(columns)), columns, MATRIX)
 
     def _cap(self, cap: Cap, at: int) -> None:
         """S - F(M)."""
-        import clarabel
-
         i, j, factor = triangle(cap.size)
         columns, blocks = [], []
         for order, rows in cap.rows:
@@ -199,18 +193,16 @@ class Stated:
             blocks.append(-column(np.eye(cap.size))[:, None])
             columns.append(np.array([cap.head]))
         whole = np.concatenate(blocks, axis=1)
-        self._add(whole, np.concatenate(columns), np.zeros(len(i)), clarabel.PSDTriangleConeT(cap.size))
+        self._add(whole, np.concatenate(columns), MATRIX, "caps")
 
     def _root(self, number: int, root: Root) -> None:
         """Over its line, and over the sum of lengths, each over that of its vector."""
-        import clarabel
-
         at, end = int(self.roots[number]), int(self.roots[number + 1])
         ends = np.array([number, at])
-        self._add(np.array([[root.slope, -1.0]]), ends, np.array([-root.offset]), clarabel.NonnegativeConeT(1))
+        self._add(np.array([[root.slope, -1.0]]), ends, SIDES, "lines", np.array([-root.offset]))
         own = np.arange(at, end)
         sums = np.concatenate([[-1.0], np.ones(end - at - 1)])[None]
-        self._add(sums, own, np.zeros(1), clarabel.NonnegativeConeT(1))
+        self._add(sums, own, SIDES)
         for order, rows in root.rows:
             for vector in rows:
                 at, (count, size) = at + 1, vector.shape
@@ -221,27 +213,23 @@ class Stated:
                 # off the diagonal an entry counts by the root of two
                 block[1:, 2:] *= math.sqrt(0.5)
                 columns = np.concatenate([[at], first])
-                self._add(block, columns, np.zeros(1 + count), clarabel.SecondOrderConeT(1 + count))
+                self._add(block, columns, LENGTH, ("lengths", number))
 
     def _goal(self) -> None:
         """The sum of roots at their prices, and of s, is not over a number."""
-        import clarabel
-
         goal = self.program.goal
         if goal is not None:
             columns = np.concatenate([self.roots[:-1], self.first + np.arange(self.program.numbers)])
             block = np.concatenate([[root.price for root in self.program.roots], goal.along])[None]
-            self._add(block, columns.astype(np.intp), np.array([goal.most]), clarabel.NonnegativeConeT(1))
+            self._add(block, columns.astype(np.intp), SIDES, "goal", np.array([goal.most]))
 
     def _held(self, limit: Held) -> None:
         """E43."""
-        import clarabel
-
         i, j, factor = triangle(limit.size)
         own = -column(limit.moments[i, j]) * factor[:, None]
         columns = np.concatenate([self.first + np.arange(self.program.numbers), self._moment(limit.order)])
         block = np.concatenate([-column(limit.slopes).T.reshape(len(i), -1), own], axis=1)
-        self._add(block, columns, column(limit.constant), clarabel.PSDTriangleConeT(limit.size))
+        self._add(block, columns, MATRIX, "held", column(limit.constant))
 
     def _cost(self, program: Program) -> Array:
         """Of heads or roots, of s and of shapes."""
@@ -272,35 +260,25 @@ class Stated:
         first, cost = self.first, self._cost(program)
         found = self._solved(cost, scaled, enough)
         z, x = np.nan_to_num(np.array(found.z)), np.nan_to_num(np.array(found.x))
-        parts = np.split(z, np.cumsum([len(right) for right in self.right])[:-1])
-        links = len(program.sizes) - 1 if program.columns else 0
-        corner = 1 + program.columns
-        linked = [matrix_of(np.append(0.0, part), corner) for part in parts[1 : 1 + links]]
-        after = parts[3 + links :]
-        sets, after = after[: len(program.sets)], after[len(program.sets) :]
-        budgets, after = after[: len(program.budgets)], after[len(program.budgets) :]
-        shaped: list[Priced] = []
-        for shapes in reversed(program.shapes):
-            rows = 4 + len(shapes.matrices) + 2 * program.numbers
-            shaped.append(self._priced(shapes, after[len(after) - rows :]))
-            after = after[: len(after) - rows]
-        goal, after = (0.0, after) if program.goal is None else (float(after[-1][0]), after[:-1])
-        counts = [2 + sum(len(rows) for _, rows in root.rows) for root in program.roots]
-        starts = len(after) - sum(counts) + np.cumsum([0, *counts])
-        along = [after[start : start + count] for start, count in zip(starts, counts, strict=False)]
-        after = after[: starts[0]]
-        last = after[len(after) - len(program.caps) - len(program.held) :]
-        caps = [matrix_of(part, cap.size) for part, cap in zip(last, program.caps, strict=False)]
-        rest = last[len(program.caps) :]
-        held = [matrix_of(part, limit.size) for part, limit in zip(rest, program.held, strict=True)]
-        lines = _numbers([parts[0] for parts in along])
-        lengths = [_lengths(root, parts[2:]) for root, parts in zip(program.roots, along, strict=True)]
+        parts: _Parts = defaultdict(list)
+        for (_, name), part in zip(self.cones, np.split(z, np.cumsum([*map(len, self.right)])[:-1]), strict=True):
+            parts[name].append(part)
         multipliers = Multipliers(
-            caps, held, _numbers(budgets), _numbers(sets), linked, lines, lengths, goal, shaped[::-1]
+            [matrix_of(part, cap.size) for part, cap in zip(parts["caps"], program.caps, strict=True)],
+            [matrix_of(part, limit.size) for part, limit in zip(parts["held"], program.held, strict=True)],
+            _numbers(parts["budgets"]),
+            _numbers(parts["sets"]),
+            [matrix_of(np.append(0.0, part), 1 + program.columns) for part in parts["links"]],
+            _numbers(parts["lines"]),
+            [_lengths(root, parts["lengths", number]) for number, root in enumerate(program.roots)],
+            float(sum(part[0] for part in parts["goal"])),
+            [self._priced(number, shapes, parts) for number, shapes in enumerate(program.shapes)],
         )
         moments = [matrix_of(x[self._moment(k)], size) for k, size in enumerate(program.sizes)]
         middle = np.clip(x[first : first + program.numbers], -1.0, 1.0)
-        return Proposed(multipliers, middle, moments, float(cost @ x), [self._found(x, k) for k in range(len(shaped))])
+        return Proposed(
+            multipliers, middle, moments, float(cost @ x), [self._found(x, k) for k in range(len(program.shapes))]
+        )
 
     def _solved(self, cost: Array, scaled: bool, enough: tuple[float, float]) -> Any:
         """By one solver for all that is minimised under the same conditions."""
@@ -311,10 +289,21 @@ class Stated:
             off = dict(zip(("tol_gap_rel", "tol_feas"), enough, strict=True))
             settings = {**_SETTINGS, **off, "equilibrate_enable": scaled}
             rows, right = csc_array(vstack(self.rows)), np.concatenate(self.right)
-            solver = self._solvers[scaled, enough] = solver_of(cost, rows, right, self.cones, settings)
+            solver = self._solvers[scaled, enough] = solver_of(cost, rows, right, self._kinds(), settings)
         else:
             solver.update(q=cost)
         return solver.solve()
+
+    def _kinds(self) -> list[Any]:
+        """Clarabel's cones."""
+        import clarabel
+
+        kinds = {ZERO: clarabel.ZeroConeT, SIDES: clarabel.NonnegativeConeT, LENGTH: clarabel.SecondOrderConeT}
+        return [
+            # a matrix by the size that has a triangle of so many entries
+            clarabel.PSDTriangleConeT(math.isqrt(2 * len(right))) if cone == MATRIX else kinds[cone](len(right))
+            for (cone, _), right in zip(self.cones, self.right, strict=True)
+        ]
 
     def _found(self, x: Array, number: int) -> Array:
         """Z, Z_1 ... of a mode."""

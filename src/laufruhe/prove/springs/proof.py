@@ -157,32 +157,26 @@ def narrowed(boxes: SpringBoxes, lower: Array, upper: Array, pull: Array) -> tup
     """
     program, mounts = boxes.left(lower, upper)
     numbers, count = program.numbers, boxes.own[0].start if boxes.own else len(lower)
-    least, most = lower.copy(), upper.copy()
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
     # numbers of shapes are not counted from the middle of a box
     middle[count:], half[count:] = 0.0, 1.0
     sides = [(j, side) for j, side in enumerate(mounts.straight) if side is not None]
     sides += [(numbers + k, count + k) for k in range(len(lower) - count)]
-    ends = [
-        (number, side, sign) for number, side in sides if pull[side] > LITTLE * pull.max()
-        for sign in (1.0, -1.0) if not boxes.is_at(lower, upper, side, sign)
-    ]  # fmt: skip
-    aims, stated, solved = np.eye(numbers + len(lower) - count), Stated(program), 0
-    own, along = (np.array(each, dtype=np.intp) for each in zip(*sides, strict=True))
-    # the least and the largest of every side that designs of the relaxation have
-    ends_seen = np.array([upper, -lower])
-    for number, side, sign in ends:
-        seen = float(ends_seen[0 if sign > 0.0 else 1, side]) - sign * float((lower if sign > 0.0 else upper)[side])
-        if seen < WON * (upper[side] - lower[side]):
-            continue
-        share, stands = stated.least(sign * aims[number])
-        solved += 1
-        edge, at = middle[side] + sign * half[side] * share, middle[along] + half[along] * stands[own]
-        ends_seen[:, along] = np.minimum(ends_seen[:, along], [at, -at])
-        if sign > 0.0:
-            least[side] = max(least[side], edge)
-        else:
-            most[side] = min(most[side], edge)
-        if least[side] > most[side]:
-            return None, solved
-    return (least, most), solved
+    own, along = np.array(sides, dtype=np.intp).reshape(-1, 2).T
+    stated, aims, solved = Stated(program), np.eye(numbers + len(lower) - count), 0
+    # lower ends and upper ones, these with the other sign; and the nearest to them that designs of the relaxation have
+    whole, seen = np.array([lower, -upper]), np.array([upper, -lower])
+    ends = whole.copy()
+    for number, side in sides:
+        for k, sign in enumerate((1.0, -1.0)) if pull[side] > LITTLE * pull.max() else ():
+            near = seen[k, side] - whole[k, side] < WON * (upper[side] - lower[side])
+            if near or boxes.is_at(lower, upper, side, sign):
+                continue
+            share, stands = stated.least(sign * aims[number])
+            solved += 1
+            ends[k, side] = max(ends[k, side], sign * middle[side] + half[side] * share)
+            if ends[:, side].sum() > 0.0:
+                return None, solved
+            at = middle[along] + half[along] * stands[own]
+            seen[:, along] = np.minimum(seen[:, along], [at, -at])
+    return (ends[0], -ends[1]), solved
