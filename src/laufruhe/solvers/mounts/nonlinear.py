@@ -29,7 +29,7 @@ from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_unbalances
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.mounts.bounds import divided_by
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
-from laufruhe.solvers.mounts.search import Found, MountSearch, judged_at
+from laufruhe.solvers.mounts.search import Found, MountSearch, Place, judged_at
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct
@@ -38,12 +38,16 @@ from laufruhe.solvers.smooth.program import SmoothProgram
 WORTH_SAYING = 1.01
 
 
-def solve_mounts(problem: Problem, workers: int | None = None, among: bool = False) -> Result:
-    """Convex where all that is asked is, else from many starts in `workers` processes; `among` others or alone."""
-    return solve_convex_mounts(problem) if is_convex(problem) else solve_joint(problem, workers, among)
+def solve_mounts(
+    problem: Problem, workers: int | None = None, among: bool = False, near: Sequence[float] | None = None
+) -> Result:
+    """Convex where all that is asked is, else from many starts, as `solve_joint` has them."""
+    return solve_convex_mounts(problem) if is_convex(problem) else solve_joint(problem, workers, among, near)
 
 
-def solve_joint(problem: Problem, workers: int | None = None, among: bool = False) -> Result:
+def solve_joint(
+    problem: Problem, workers: int | None = None, among: bool = False, near: Sequence[float] | None = None
+) -> Result:
     """The best local optimum that many starts find (E20-E24).
 
     Parameters
@@ -54,13 +58,15 @@ def solve_joint(problem: Problem, workers: int | None = None, among: bool = Fals
         Processes; as many as processors when left out.
     among
         Whether it is one of several, whose bounds come once the best of all is known.
+    near
+        Mounts that are good for another of them, to start from first.
 
     Raises
     ------
     SolverError
         If a process of the solver dies.
     """
-    return _solved(problem, workers, None, None, among)[0]
+    return _solved(problem, workers, None, None if near is None else (list(near), None), among)[0]
 
 
 def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tuple[Result, Candidate]:
@@ -85,13 +91,13 @@ def _solved(
     problem: Problem,
     workers: int | None,
     moves: ThrowMoves | None,
-    first: tuple[list[float], Array] | None,
+    first: Place | None,
     among: bool,
 ) -> tuple[Result, Array]:
     """Result, and deviations of the throws."""
     started = time.perf_counter()
     initial = evaluate_start(problem)
-    search = MountSearch(problem, initial, workers, moves, first)
+    search = MountSearch(problem, initial, workers, moves, first, beside=moves is None)
     modelled = time.perf_counter()
     search.run()
     divided = divided_by(problem, search, among)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 
@@ -47,6 +48,9 @@ ROOM, FELT = 0.5, 0.05
 # of the throws that a search starts from, about their star [rad]
 NUDGE = 0.02
 
+Place: TypeAlias = tuple[list[float], Array | None]
+"""Mounts, and columns of the unbalances."""
+
 
 @dataclass(frozen=True, eq=False)
 class Found:
@@ -82,7 +86,8 @@ class MountSearch:
     moves
         Throws that may leave the star of the problem.
     first
-        Mounts and columns to start from before all others, in place of those given or `beside` them.
+        Mounts and columns to start from before all others, in place of those given or `beside` them; without columns
+        the unbalances are those that are best on the mounts as given.
     coarser
         Times as long as those of the last word steps of run-ups are.
 
@@ -96,12 +101,15 @@ class MountSearch:
 
     def __init__(
         self, problem: Problem, initial: Evaluation, workers: int | None = None, moves: ThrowMoves | None = None,
-        first: tuple[list[float], Array] | None = None, beside: bool = False, coarser: int = COARSER,
+        first: Place | None = None, beside: bool = False, coarser: int = COARSER,
     ) -> None:  # fmt: skip
         self.problem, self.moves, self._workers, self._coarser = problem, moves, workers, coarser
         tell("starts of the mounts")
         self._points, self._size = start_points(problem)
-        self._points = self._points if first is None else [first, *self._points[0 if beside else 1 :]]
+        if first is not None:
+            mounts, columns = first
+            own = self._points[0][1] if columns is None else columns
+            self._points = [(mounts, own), *self._points[0 if beside else 1 :]]
         self._left_out = self._kept_anyway()
         tell("smooth program of all that is open")
         self.joint = self._program()
@@ -195,7 +203,7 @@ class MountSearch:
                 found, columns = _decided(joint, x)
                 mounts = found + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(found))
                 again.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.turns(x)))
-            more = self._ends(again, try_all)
+            more = self._ends(again, try_all, len(points))
             optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in more))
         self._take(optima)
 
@@ -233,9 +241,9 @@ class MountSearch:
     def _iterations(self) -> int:
         return ITERATIONS if self.joint.program.told is None else RUN_ITERATIONS
 
-    def _ends(self, starts: Sequence[Array], enough: Enough | None = None) -> tuple[LocalOptimum, ...]:
-        """Where starts of the program lead to."""
-        return solve_nonlinear(self.joint.program, starts, self._workers, self._iterations, enough=enough)
+    def _ends(self, starts: Sequence[Array], enough: Enough | None = None, known: int = 0) -> tuple[LocalOptimum, ...]:
+        """Where starts of the program lead to, which has had so many before."""
+        return solve_nonlinear(self.joint.program, starts, self._workers, self._iterations, enough=enough, known=known)
 
     def _is_explored(self, optima: Sequence[LocalOptimum]) -> bool:
         return is_explored(optima, max(abs(min(o.value for o in optima)), 1e-12))

@@ -21,7 +21,7 @@ from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.norms import RMS
 from laufruhe.numerics.progress import tell, within
-from laufruhe.numerics.workers import in_turn
+from laufruhe.numerics.workers import executor_for, in_turn, working_on
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Measure, Term
@@ -32,6 +32,7 @@ from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
 from laufruhe.solvers.conclusion import contradiction
 from laufruhe.solvers.mounts.bounds import bounded_under
 from laufruhe.solvers.mounts.nonlinear import solve_mounts, solve_moved
+from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.answers import MOST_LISTED
 from laufruhe.solvers.stars.conclusion import no_star, with_star
@@ -42,8 +43,8 @@ from laufruhe.solvers.stars.ranking import RankedStar, ranked_star, ranking_resu
 from laufruhe.solvers.throws.starts import firing_intervals, none_fires, starts_of
 
 MOST_SEARCHED = 3
-FEWER_STARTS = 4
-SHORTEST_SEARCH = 4
+# starts of a star beside those that are good for the first of the ranking
+BESIDE = 2
 
 
 Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
@@ -85,10 +86,12 @@ def solve_star_mounts(problem: Problem) -> Result:
              for order in told_orders(problem, _only(phasing, star, steps), star, steps)]  # fmt: skip
     designs = count - len(ranking) + len(stars)
     ranked = time.perf_counter()
-    found = _solved_shortly(problem, phasing, stars)
-    found = _bounded(_solved_fully(problem, found), phasing, designs)
-    if phasing.continuous:
-        found = sorted([*found, *_moved(problem, phasing, found)], key=_rank)
+    # searches and bounds have the same workers, whose start costs as much as a star
+    with executor_for() as executor, working_on(executor):
+        found = _solved_shortly(problem, phasing, stars)
+        found = _bounded(_solved_fully(problem, found), phasing, designs)
+        if phasing.continuous:
+            found = sorted([*found, *_moved(problem, phasing, found)], key=_rank)
     timing = {"rank": ranked - started, "solve": time.perf_counter() - ranked}
     return replace(_result(problem, phasing, found, designs), timing=timing)
 
@@ -146,14 +149,20 @@ def _problem_of(problem: Problem, phasing: Phasing, candidate: Candidate, starts
 
 
 def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star]) -> list[StarDesign]:
-    """Every star and firing order with a quarter of the starts, the best first."""
+    """The star that ranks first with all starts, the others from its mounts and a few of their own; the best first."""
     starts = problem.search.starts
-    few = starts if len(stars) == 1 else min(starts, max(SHORTEST_SEARCH, starts // FEWER_STARTS))
-    problems = [_problem_of(problem, phasing, candidate, few) for candidate, _ in stars]
-    # stars side by side, and the starts of each in one process
-    work = partial(solve_mounts, workers=1 if len(stars) > 1 else None, among=True)
+    problems = [_problem_of(problem, phasing, candidate, starts) for candidate, _ in stars[:1]]
+    problems += [_problem_of(problem, phasing, candidate, min(starts, BESIDE)) for candidate, _ in stars[1:]]
+    results = list[Result]()
     with limited(phasing.time_limit):
-        results = in_turn(work, problems, "stars on their mounts")
+        for first in problems[:1]:
+            with within(f"first of {len(stars)} star(s)"):
+                results.append(solve_mounts(first, among=True))
+        known = [result for result in results if result.decisions and starts > BESIDE]
+        near = place_of(known[0].problem, known[0])[0] if known else None
+        # stars side by side, and the starts of each in one process
+        work = partial(solve_mounts, workers=1, among=True, near=near)
+        results += in_turn(work, problems[1:], "stars on their mounts") if not passed() else []
     found = [StarDesign(star, result, steps) for (star, steps), result in zip(stars, results, strict=False)]
     return sorted(found, key=_rank)
 

@@ -132,6 +132,7 @@ def solve_nonlinear(
     max_iterations: int = 500,
     max_seconds: float = 60.0,
     enough: Enough | None = None,
+    known: int = 0,
 ) -> tuple[LocalOptimum, ...]:
     """Local optima that the starts lead to, the best usable one first.
 
@@ -151,6 +152,8 @@ def solve_nonlinear(
         Of every start and stage.
     enough
         Whether the ends of the first stage so far tell all; all starts are tried when left out.
+    known
+        Starts that the program has had before, for which it was built.
 
     Raises
     ------
@@ -158,7 +161,7 @@ def solve_nonlinear(
         Where workers die again and again.
     """
     points = [(k, np.clip(np.asarray(s, dtype=float), program.lower, program.upper)) for k, s in enumerate(starts)]
-    task = _task(program, max_iterations, max_seconds, len(points) >= WORTH_EXPANDING)
+    task = _task(program, max_iterations, max_seconds, known + len(points) >= WORTH_EXPANDING)
     with ExitStack() as stack:
         if enough is None:
             optima = _first_ends(task, points, workers, None, stack)[0]
