@@ -138,7 +138,8 @@ def test_numbers_that_were_not_offered_are_refused(name: str) -> None:
         [], {"more": 1}, {"edits": {}}, {"edits": [["set", "x"]]}, {"edits": [["run", "x", 1]]},
         {"edits": [["set", 1, 1]]}, {"edits": [["set", "x", [[[1]]]]]}, {"edits": [["set", "x", "1" * 101]]},
         {"edits": [["set", "x", 1]] * 301}, {"edits": [["set", "x", True]]}, {"has": "x" * 101}, {"design": {"a": "b"}},
-        {"design": []}, {"edits": [["set", "x", {"a": {"b": 1}}]]},
+        {"design": []}, {"edits": [["set", "x", 10**400]]}, {"design": {"a": float("inf")}},
+        {"edits": [["set", "x", {"a": {"b": 1}}]]},
     ],
 )  # fmt: skip
 def test_what_no_page_asks_is_refused(given: object) -> None:

@@ -45,19 +45,13 @@ def optimum(
 
 def limits(found: Iterable[LimitValue], problem: Problem) -> list[dict[str, Any]]:
     """How a design stands to its limits, and what they cost."""
-    return [_limit(limit, problem.objective_unit or "") for limit in found]
-
-
-def _limit(limit: LimitValue, of: str) -> dict[str, Any]:
-    return {
-        "name": limit.name,
-        "value": limit.value,
-        "limit": limit.limit,
-        "unit": limit.unit,
-        "side": limit.side,
-        "active": limit.active,
-        "price": limit.shadow_price,
-        "text": figure(limit.value, limit.unit),
-        "limitText": figure(limit.limit, limit.unit),
-        "priceText": price_of(limit.shadow_price, of, limit.unit),
-    }
+    return [
+        {
+            **{key: getattr(limit, key) for key in ("name", "value", "limit", "unit", "side", "active")},
+            "price": limit.shadow_price,
+            "text": figure(limit.value, limit.unit),
+            "limitText": figure(limit.limit, limit.unit),
+            "priceText": price_of(limit.shadow_price, problem.objective_unit or "", limit.unit),
+        }
+        for limit in found
+    ]
