@@ -23,6 +23,8 @@ P = TypeVar("P")
 
 # of the difference that counts as none, what is left for roundings
 NEARLY = 0.9
+# of a side, that a cut keeps from its ends
+EDGE = 0.1
 # boxes whose middles are told
 MOST_PLACES = 3
 
@@ -126,10 +128,12 @@ class Box(NamedTuple):
     side: int
 
 
-def halves(box: Box) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-    """A box cut in the middle of its side."""
-    here, middle = np.arange(len(box.lower)) == box.side, 0.5 * (box.lower + box.upper)
-    return (box.lower, np.where(here, middle, box.upper)), (np.where(here, middle, box.lower), box.upper)
+def halves(box: Box, at: float | None = None) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+    """A box cut in the middle of its side, or near a place on it, away from its ends."""
+    here, low, high = np.arange(len(box.lower)) == box.side, box.lower[box.side], box.upper[box.side]
+    keep = EDGE * (high - low)
+    cut = 0.5 * (low + high) if at is None else np.clip(at, low + keep, high - keep)
+    return (box.lower, np.where(here, cut, box.upper)), (np.where(here, cut, box.lower), box.upper)
 
 
 def widest(lower: Array, upper: Array, whole: Array) -> int:

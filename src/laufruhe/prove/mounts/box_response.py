@@ -214,10 +214,6 @@ class BoxModel:
         """Operating points of these names; all when None."""
         return [k for k, point in enumerate(self.problem.points) if names is None or point.name in names]
 
-    def matrices(self, x: Array) -> Matrices:
-        """At one design."""
-        return self._parts(self.mounting(x))
-
     @property
     def stiffness_slopes(self) -> Array:
         """A by every open number, shape (n, 6, 6)."""

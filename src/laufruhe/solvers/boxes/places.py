@@ -12,6 +12,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
+from laufruhe.prove.best_first import Box, halves
 from laufruhe.solvers.boxes.held_designs import SHARE, HeldDesign, HeldDesigns, best_with
 from laufruhe.solvers.boxes.place_boxes import Relaxation
 from laufruhe.solvers.cones.unbalances import solve_unbalances
@@ -26,8 +27,6 @@ REACH, INSIDE = 1e-9, 1e-7
 HALVINGS = 10
 # of a box, from which allowed places are sought
 MOST_CORNERS = 16
-# of a side, that a cut keeps from its ends
-EDGE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +91,8 @@ class _Search(HeldDesigns[_Box]):
         width, whole = box.upper - box.lower, self.bounds[1] - self.bounds[0]
         pulled = box.spread if box.spread.max(initial=0.0) > 1e-9 * whole.max() else width / whole
         side = int(np.argmax(pulled))
-        keep = EDGE * width[side]
-        cut = float(np.clip(box.middle[side], box.lower[side] + keep, box.upper[side] - keep))
-        here = np.arange(len(width)) == side
-        yield self.box(box.lower, np.where(here, cut, box.upper), box.bound)
-        yield self.box(np.where(here, cut, box.lower), box.upper, box.bound)
+        for half in halves(Box(box.lower, box.upper, side), float(box.middle[side])):
+            yield self.box(*half, box.bound)
 
     def box(self, lower: Array, upper: Array, floor: float = 0.0) -> _Box | None:
         """The bound of a box, and where its program puts the places; None where no design is allowed."""

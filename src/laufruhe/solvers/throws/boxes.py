@@ -20,6 +20,7 @@ from laufruhe.load_models.throw_waves import ThrowWaves, WaveNorm
 from laufruhe.machine.firing_windows import SLACK, FiringBounds, FiringWindow
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, Grid
+from laufruhe.prove.best_first import Box, halves
 from laufruhe.prove.certificate import ROUNDING, Multipliers, minorant
 from laufruhe.prove.throws.arcs import ArcBox, Arcs
 from laufruhe.solvers.cones.conic import solve_cones
@@ -28,8 +29,8 @@ from laufruhe.solvers.throws.riders import BoxColumns, Riders
 
 # rounds in which one box shrinks, and by how much of its sides it has to
 _ROUNDS, _WORTH = 6, 0.8
-# of a side, that a cut keeps from its ends; a side that is cut no more [rad]
-_EDGE, NARROWEST = 0.1, 1e-9
+# a side that is cut no more [rad]
+NARROWEST = 1e-9
 # multipliers that are tried on other boxes
 _KNOWN = 8
 
@@ -234,11 +235,8 @@ class ThrowPrograms:
         width = box.upper - box.lower
         pulled = np.where(width > NARROWEST, box.spread, 0.0)
         side = int(np.argmax(pulled if pulled.any() else width))
-        keep = _EDGE * width[side]
-        at = float(np.clip(box.middle[side], box.lower[side] + keep, box.upper[side] - keep))
-        here = np.arange(len(width)) == side
-        yield self.box(box.program, box.lower, np.where(here, at, box.upper), box.bound, cut)
-        yield self.box(box.program, np.where(here, at, box.lower), box.upper, box.bound, cut)
+        for half in halves(Box(box.lower, box.upper, side), float(box.middle[side])):
+            yield self.box(box.program, *half, box.bound, cut)
 
     def _under(
         self, rows: AffineProblem, columns: BoxColumns, found: Multipliers, arcs_of: ArcBox
