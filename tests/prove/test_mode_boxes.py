@@ -121,6 +121,9 @@ def test_sides_hold_whatever_a_solver_proposes() -> None:
         assert side is not None
         smallest = min((x[side] - 0.5 * (boxes.lower + boxes.upper)[side]) / half[side] for x in inside)
         assert -1.01 <= follows(own, told.multipliers) <= smallest
+        # by the solver of the aim before, as exactly as it is worth
+        proven, stands = stated.least(np.eye(program.numbers + 10)[number])
+        assert follows(own, told.multipliers) - 0.05 < proven <= min(smallest, stands[number] + 0.05)
         for by, noise in ((2.0, 0.0), (1.0, 1e-3), (0.0, 1.0), (0.0, 0.0)):
             assert follows(own, spoilt(told.multipliers, by, noise, generator)) <= smallest
 
