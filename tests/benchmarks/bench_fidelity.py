@@ -24,7 +24,7 @@ from pages import PAGES, ROOT, publish, spent  # noqa: E402
 
 from laufruhe import load  # noqa: E402
 from laufruhe.fidelity.automatic import automatic, choose  # noqa: E402
-from laufruhe.load_models.batch import Designs, prepare, random_decisions  # noqa: E402
+from laufruhe.load_models.batch import Designs, prepare  # noqa: E402
 from laufruhe.machine import Cycle, Engine, Mount, OperatingPoint  # noqa: E402
 from laufruhe.machine.layouts import Mechanism, boxer, build, inline  # noqa: E402
 from laufruhe.numerics.batch_norms import BatchNorm  # noqa: E402
@@ -35,6 +35,7 @@ from laufruhe.problem import channels  # noqa: E402
 from laufruhe.problem.evaluation import evaluate, objective_value  # noqa: E402
 from laufruhe.problem.measure import Measure, Term  # noqa: E402
 from laufruhe.problem.problem import Problem  # noqa: E402
+from random_decisions import random_decisions  # noqa: E402
 
 OUT = PAGES / "fidelity.md"
 DESIGNS = 100_000

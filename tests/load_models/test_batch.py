@@ -11,11 +11,12 @@ import pytest
 from laufruhe.errors import ModelError
 from laufruhe.fidelity.automatic import automatic
 from laufruhe.files.reader import load
-from laufruhe.load_models.batch import Designs, prepare, random_decisions
+from laufruhe.load_models.batch import Designs, prepare
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.problem import Problem
 from problem_files import PROBLEMS, READY
+from random_decisions import random_decisions
 
 COUNT = 12
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,13 +106,3 @@ def _merged(rows: Array, weights: Array) -> tuple[Array, Array]:
     rank[order] = np.arange(len(order))
     total: Array = np.bincount(rank[inverse.ravel()], weights=weights, minlength=len(order)).astype(float)
     return rows[:, :, first[order]], total
-
-
-def random_decisions(problem: Problem, count: int, seed: int = 0) -> NDArray[np.complex128]:
-    """Decisions spread evenly over their bounds, shape (count, decisions)."""
-    rng = np.random.default_rng(seed)
-    columns: Sequence[NDArray[np.complex128]] = [
-        rng.uniform(d.lower, d.upper, count) * np.exp(1j * rng.uniform(*d.set.angles, count))
-        for d in problem.unbalances
-    ]
-    return np.stack(columns, axis=1) if columns else np.zeros((count, 0), dtype=complex)

@@ -14,11 +14,10 @@ from operator import add
 import numpy as np
 
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
-from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import Spectrum, common_base
-from laufruhe.problem.decision import Decision, Kind
+from laufruhe.problem.decision import Kind
 from laufruhe.problem.measure import Measure, bends_of, load_rows, selected
 from laufruhe.problem.problem import Problem
 
@@ -77,7 +76,7 @@ class LedModel:
         self.lower, self.upper = (np.array([getattr(d, side) for d in self.leads]) for side in ("lower", "upper"))
         self.start = np.array([d.start_number for d in self.leads])
         self.names = [shaft for d in self.leads for shaft in d.keys(Kind.LEAD)]
-        self.whole = AffineModel(_of(problem, problem.engine, problem.unbalances), True, True)
+        self.whole = AffineModel(replace(problem, decisions=problem.unbalances), True, True)
         self.domains = self.whole.domains
         self._shafts = [AffineModel(carried(problem, name.__eq__), True, True) for name in self.names]
         self._still = AffineModel(carried(problem, lambda name: name not in self.names), True, True)
@@ -162,11 +161,7 @@ def carried(problem: Problem, belongs: Callable[[str], bool]) -> Problem:
         replace(d, drives=tuple(v if v.rotor in own else replace(v, gain=0.0) for v in d.rotor_drives))
         for d in problem.unbalances
     ]
-    return _of(problem, replace(engine, slider_cranks=parts, rotors=rotors), decisions)
-
-
-def _of(problem: Problem, engine: Engine, decisions: Sequence[Decision]) -> Problem:
-    return replace(problem, engine=engine, decisions=tuple(decisions))
+    return replace(problem, engine=replace(engine, slider_cranks=parts, rotors=rotors), decisions=tuple(decisions))
 
 
 def _share(spectra: Sequence[tuple[Spectrum, tuple[Spectrum, ...]]]) -> Share:

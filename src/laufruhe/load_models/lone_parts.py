@@ -12,6 +12,7 @@ from dataclasses import replace
 
 from laufruhe.machine import Chambers, Engine, GasModel, OperatingPoint, Rotor, SliderCrank
 from laufruhe.machine.facing import Facing
+from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.physics.gas_cycle import alike_under
 from laufruhe.problem.problem import Problem
 
@@ -38,6 +39,12 @@ def only_rotors(engine: Engine, rotors: Sequence[Rotor], beside: bool) -> Engine
     """These rotors alone; the places of the cylinders beside them where these are asked."""
     parts = tuple(map(idle, engine.slider_cranks)) if beside else ()
     return replace(engine, slider_cranks=parts, rotors=tuple(rotors))
+
+
+def leaning(upright: ComplexArray, across: ComplexArray, upside: ComplexArray) -> tuple[ComplexArray, ...]:
+    """What a cylinder loads times the cosine of its bank, times the sine, and at any, from the banks of `QUARTERS`."""
+    still = 0.5 * (upright + upside)
+    return 0.5 * (upright - upside), across - still, still
 
 
 def working(problem: Problem, name: str) -> Problem:

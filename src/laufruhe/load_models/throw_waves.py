@@ -20,7 +20,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import MOST_NUMBERS, AffineModel, AffineNorm
-from laufruhe.load_models.lone_parts import QUARTERS, lone, motored, only_rotors, working
+from laufruhe.load_models.lone_parts import QUARTERS, leaning, lone, motored, only_rotors, working
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.norms.norm import amplitudes, mean_square
@@ -287,9 +287,7 @@ class ThrowWaves:
         """Of what leans with the bank, of what does not, and of what leans against it, from the banks of `QUARTERS`."""
         if len(found) == 1:
             return found
-        upright, across, upside = found
-        still = 0.5 * (upright + upside)
-        a, b = 0.5 * (upright - upside), across - still
+        a, b, still = leaning(*found)
         return [0.5 * (a - 1j * b), still, 0.5 * (a + 1j * b)]
 
     def _weights(self, measure: Measure, part: Moving) -> ComplexArray:

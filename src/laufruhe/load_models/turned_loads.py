@@ -19,7 +19,7 @@ import casadi as ca
 import numpy as np
 
 from laufruhe.load_models.lines import Lines, summed
-from laufruhe.load_models.lone_parts import QUARTERS, lone, motored, only_rotors, working
+from laufruhe.load_models.lone_parts import QUARTERS, leaning, lone, motored, only_rotors, working
 from laufruhe.machine import Engine, Rotor
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.spectrum import Spectrum
@@ -165,9 +165,7 @@ def _leaning(rows: Sequence[ComplexArray]) -> _Leaning:
     """From the three banks of `QUARTERS`, or from one that stays."""
     if len(rows) == 1:
         return _Leaning(0.0 * rows[0], 0.0 * rows[0], rows[0])
-    upright, across, upside = rows
-    still = 0.5 * (upright + upside)
-    return _Leaning(0.5 * (upright - upside), across - still, still)
+    return _Leaning(*leaning(*rows))
 
 
 def _dm(values: Array) -> Any:

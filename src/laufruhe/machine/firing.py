@@ -181,6 +181,12 @@ def slot_order(slots: Sequence[int]) -> tuple[int, ...]:
     return tuple(1 + slots.index(slot) for slot in range(len(slots)))
 
 
+def from_one(order: Sequence[int]) -> tuple[int, ...]:
+    """A firing order that begins with cylinder 1."""
+    first = order.index(1)
+    return (*order[first:], *order[:first])
+
+
 def order_slots(order: Sequence[int]) -> tuple[int, ...]:
     """Slot in which each cylinder of a firing order fires."""
     return tuple(order.index(number) for number in range(1, len(order) + 1))

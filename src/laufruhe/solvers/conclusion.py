@@ -151,7 +151,8 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
     proven = certificate.kind is Proof.GLOBAL
     message = f"the design as given has no finite loads: {initial.resonance}" if initial.resonance else ""
     if not met:
-        message = f"the best design found breaks {_broken(problem, design)}; relax it, or open more"
+        broken = quoted(broken_limits(problem.limits, design.evaluation)) or "a limit"
+        message = f"the best design found breaks {broken}; relax it, or open more"
     return Result(
         problem=problem,
         status=Status.FAILED if not met else Status.OPTIMAL if proven else Status.FEASIBLE,
@@ -237,11 +238,6 @@ def nearest_of(problem: Problem, design: Evaluation, decisions: tuple[DecisionVa
     return Nearest(
         broken.name, stands.side, stands.edge, broken.measure.unit, stands.value, stands.excess, names, decisions
     )
-
-
-def _broken(problem: Problem, design: Design) -> str:
-    """What a message says of the limits that a design breaks."""
-    return quoted(broken_limits(problem.limits, design.evaluation)) or "a limit"
 
 
 def limit_values(

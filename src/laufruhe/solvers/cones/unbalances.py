@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
+from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.problem.channels import OF_MOUNTS
@@ -147,13 +147,10 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, nothing: float,
     x = settled(problem, fine, solution.x)
     averaged = model.at(fine.samples, averaged=True)
     bound = best_bound(averaged, x, on_grid(coarse, averaged, solution.multipliers))
-    judge = model.at(fine.samples, finer=True) if _has_peaks(problem) else fine
+    has_peaks = any(measure.is_load and measure.norm.refinement > 1 for measure in problem.measures)
+    judge = model.at(fine.samples, finer=True) if has_peaks else fine
     value = judge.objective(x)
     return Optimum(x, bound, fine, gap_of(value, bound.value, nothing), judge.excess(x), samples, nothing)
-
-
-def _has_peaks(problem: Problem) -> bool:
-    return any(measure.is_load and measure.norm.refinement > 1 for measure in problem.measures)
 
 
 def tightened(affine: AffineProblem, margin: float) -> AffineProblem:
@@ -169,14 +166,10 @@ def _idle(problem: Problem, model: AffineModel) -> tuple[list[Limit], tuple[str,
     still = [limit for limit in problem.load_limits if not model.norm(limit.measure, model.full_samples).slope.any()]
     # a whole number of times as fine
     samples = model.full_samples * max(2, math.ceil(FINE / model.full_samples))
-    idle = [(limit, _given(model.norm(limit.measure, samples))) for limit in still]
+    none = np.zeros(sum(domain.width for domain in model.domains))
+    idle = [(limit, model.norm(limit.measure, samples).value(none)) for limit in still]
     broken = [limit.name for limit, value in idle if value > limit.maximum * (1.0 + KEPT)]
     return still, tuple(broken[:1])
-
-
-def _given(norm: AffineNorm) -> float:
-    """Without anything that is open."""
-    return norm.value(np.zeros(norm.slope.shape[-1]))
 
 
 def settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
@@ -198,8 +191,11 @@ def _without_negligible(affine: AffineProblem, x: Array) -> Array:
     may_be_nothing = all(domain.set.lower <= 0.0 for domain in affine.domains)
     if may_be_nothing and affine.objective(nothing) <= affine.objective(x) and _keeps_limits(affine, x, nothing):
         return nothing
-    norms = [(norm, max(norm.value(x), norm.value(nothing))) for _, norm in affine.terms]
-    norms = _linear(norms)
+    # without their constants: what decisions alone make
+    norms = [
+        (replace(norm, constant=np.zeros_like(norm.constant)), max(norm.value(x), norm.value(nothing)))
+        for _, norm in affine.terms
+    ]
     for domain in affine.domains:
         if domain.set.lower > 0.0 or not x[domain.columns].any():
             continue
@@ -217,11 +213,6 @@ def _keeps_limits(affine: AffineProblem, x: Array, without: Array) -> bool:
     return all(
         norm.value(without) <= (1.0 + 0.1 * FEASIBLE) * max(maximum, norm.value(x)) for maximum, norm in affine.limits
     )
-
-
-def _linear(norms: Sequence[tuple[AffineNorm, float]]) -> list[tuple[AffineNorm, float]]:
-    """The norms without their constants: what decisions alone make."""
-    return [(replace(norm, constant=np.zeros_like(norm.constant)), size) for norm, size in norms]
 
 
 def _indistinguishable(problem: Problem, affine: AffineProblem) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.amplitudes import amplitude_objective
-from laufruhe.machine.firing import firing_turns, intervals_of
+from laufruhe.machine.firing import firing_turns, from_one, intervals_of
 from laufruhe.machine.firing_slots import FiringPattern, FiringSlots
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.turns import angle_of
@@ -184,9 +184,7 @@ def _order_of(layout: Layout, pattern: FiringPattern, order: Sequence[int]) -> t
     for pin, own in enumerate(order):
         cylinders = [k for k, at in enumerate(layout.pins) if at == pin]
         cylinder.update(dict(zip(pattern.members[own], cylinders, strict=True)))
-    firing = [cylinder[slot] + 1 for slot in range(len(cylinder))]
-    first = firing.index(1)
-    return (*firing[first:], *firing[:first])
+    return from_one([cylinder[slot] + 1 for slot in range(len(cylinder))])
 
 
 def _geometry(phasing: Phasing, angle: float) -> tuple[float | None, float | None]:
@@ -233,9 +231,8 @@ def turning_back(phasing: Phasing, candidate: Candidate) -> Candidate:
     number = {(pin, layout.side(k)): k + 1 for k, pin in enumerate(layout.pins)}
     partners = [number[pin, -layout.side(k)] for k, pin in enumerate(layout.pins)]
     order = [partners[k - 1] for k in reversed(candidate.firing_order or ())]
-    first = order.index(1) if order else 0
     throws = [-angle for angle in candidate.throws]
     # cylinder 1 at its dead centre when phi = 0 (C5)
     shift = angle_of(layout.own_turn(0)) - throws[layout.pins[0]]
     turned = tuple((angle + shift) % math.tau for angle in throws)
-    return replace(candidate, throws=turned, firing_order=(*order[first:], *order[:first]) or None)
+    return replace(candidate, throws=turned, firing_order=from_one(order) if order else None)

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from laufruhe.machine import Engine
 from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.problem.channels import STORED_WORK
@@ -93,7 +92,10 @@ def bounding(problem: Problem, value: float) -> Callable[[Problem], Problem]:
     bounds, given = _bounds(problem), evaluate(problem)
     # the degree knows all orders of the pistons
     is_known = problem.fidelity.kinematics == "exact" and problem.fidelity.orders is None
-    alone = [evaluate(problem, _of(problem.engine, k)) for k in range(len(problem.engine.slider_cranks))]
+    alone = [
+        evaluate(problem, replace(problem.engine, slider_cranks=(part,), rotors=()))
+        for part in problem.engine.slider_cranks
+    ]
     slopes: dict[tuple[Measure, str], float] = {}
     for term in problem.objective:
         for name in _points(problem, term.measure) if turns(term.measure) else ():
@@ -107,10 +109,6 @@ def bounding(problem: Problem, value: float) -> Callable[[Problem], Problem]:
 
     exchange = _Exchange(heaviest, lambda m, name: slopes[m, name], lambda _, name, most: bounds[name].work(most))
     return exchange.made
-
-
-def _of(engine: Engine, k: int) -> Engine:
-    return replace(engine, slider_cranks=(engine.slider_cranks[k],), rotors=())
 
 
 def _work(name: str) -> Measure:

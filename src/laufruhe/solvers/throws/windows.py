@@ -12,6 +12,7 @@ import numpy as np
 
 from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.uneven_model import rotor_states
+from laufruhe.machine.firing import from_one
 from laufruhe.machine.firing_windows import FiringBounds, FiringWindow
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Term
@@ -108,15 +109,10 @@ def _without_images(windows: Sequence[FiringWindow], count: int) -> list[FiringW
     kept = []
     for window in windows:
         mirrored = tuple(count + 1 - number for number in window.order)
-        images = [_from_one(order) for own in (window.order, mirrored) for order in (own, own[::-1])]
+        images = [from_one(order) for own in (window.order, mirrored) for order in (own, own[::-1])]
         if window.order == min(images):
             kept.append(window)
     return kept
-
-
-def _from_one(order: tuple[int, ...]) -> tuple[int, ...]:
-    first = order.index(1)
-    return (*order[first:], *order[:first])
 
 
 def amid(window: FiringWindow) -> Array:
