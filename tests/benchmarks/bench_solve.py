@@ -53,9 +53,15 @@ def command_rows() -> list[Row]:
     python, laufruhe = sys.executable, str(Path(sys.executable).with_name("laufruhe"))
     pairs = [
         ([laufruhe, "--help"], "import numpy"),
-        ([laufruhe, "check", str(PROBLEM)], "import numpy, pydantic"),
-        ([laufruhe, "solve", "--no-plots", str(PROBLEM)], "import clarabel, pydantic, jinja2, xlsxwriter"),
-        ([laufruhe, "solve", str(PROBLEM)], "import clarabel, pydantic, jinja2, xlsxwriter, matplotlib.pyplot"),
+        ([laufruhe, "check", str(PROBLEM)], "import numpy; from pydantic import BaseModel"),
+        (
+            [laufruhe, "solve", "--no-plots", str(PROBLEM)],
+            "import clarabel, jinja2, xlsxwriter; from pydantic import BaseModel",
+        ),
+        (
+            [laufruhe, "solve", str(PROBLEM)],
+            "import clarabel, jinja2, xlsxwriter, matplotlib.pyplot; from pydantic import BaseModel",
+        ),
         ([laufruhe, "solve", str(PROBLEM)], "import cvxpy, matplotlib.pyplot"),
     ]
     rows = []
