@@ -18,7 +18,8 @@ from laufruhe.studies.trade import KEEPS, REFERENCE_NAME, Row, Trade, is_local, 
 ALIKE, SMALLEST = 1.3, 1e-4
 LOCAL = (
     " What is open here has many optima. Every fidelity begins at the design of the reference and finds an optimum "
-    "nearby, in the time of its solve; a search from nothing takes several times as long."
+    "nearby, in the time of its solve; where that design is worth a tenth more or less to it, it searches from nothing "
+    "too, which takes several times as long."
 )
 OF_STARS = " Stars are ranked by each fidelity's physics at few steps, and the best of them decided at its own."
 OF_MOUNTS = " Choices about modes and time would change with the mounts that are open: no design is decided with them."
@@ -144,9 +145,9 @@ def index(trades: Sequence[Trade], refused: Sequence[str] = ()) -> str:
         "design known; *beyond a limit*: by how much that design exceeds a limit by the exact model, where that is "
         "more than 0.1 %, so that it is no decision. Unbalances alone have one optimum, which each fidelity finds at "
         "its own angles; even stars are ranked by each fidelity's own physics; what else is open is searched for from "
-        "the design of the reference. Nothing is proven, of the reference neither: the share by which another design "
-        "is worse needs no proof. *Uneven speed*: change of the objective with a flywheel that leaves 2 % of "
-        "irregularity.",
+        "the design of the reference, and from nothing too where that is worth a tenth more or less. Nothing is "
+        "proven, of the reference neither: the share by which another design is worse needs no proof. *Uneven speed*: "
+        "change of the objective with a flywheel that leaves 2 % of irregularity.",
     ]
     return "\n".join(lines) + "\n"
 

@@ -27,6 +27,8 @@ from laufruhe.solvers.stars.ranking import candidates_of
 
 STARTS, STARS, STARS_THAT_MOVE = 3, 3, 2
 """Of a first search where mounts are open, and stars that are ranked; fewer of them where mounts or throws move too."""
+BOXES = 100
+"""Of places and leads at most, each of which has a design in its middle."""
 LIKE = 0.1
 """Share by which what is minimised of a design known may differ where searches from it are enough."""
 STEPS = 96
@@ -145,8 +147,9 @@ def _begun(problem: Problem, known: Result) -> Problem:
 
 
 def _unproven(problem: Problem, starts: int) -> Search:
-    """With so many starts at most, and boxes where these find a design alone."""
-    boxes = problem.search.boxes if Kind.PLACE in kinds_of(problem) else 0
+    """With so many starts at most, and a few boxes where these find designs."""
+    most = problem.search.boxes if problem.search.boxes is not None else BOXES
+    boxes = min(most, BOXES) if kinds_of(problem) & {Kind.PLACE, Kind.LEAD} else 0
     return replace(problem.search, starts=min(problem.search.starts, starts), boxes=boxes, proves=False)
 
 
