@@ -19,8 +19,10 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.tolerance import Over, Tolerances
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.conclusion import unbalances_of
+from laufruhe.solvers.conclusion import KEPT, unbalances_of
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.tolerances.adversaries import EveryError, Found
+from laufruhe.solvers.tolerances.robust import SMALL, Least, _kept, _Program
 from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft
 
 ENGINE = (
@@ -177,6 +179,49 @@ def test_share_of_engines(problem: Problem, result: Result) -> None:
     for k, step in itertools.product(range(2), (-2e-3, 2e-3)):
         moved = [v * (1.0 + step * (j == k)) for j, v in enumerate(values)]
         assert level(moved) >= worst(shared) * (1.0 - 3e-4)
+
+
+def limited(read: Callable[[str], Problem], most: float) -> tuple[Problem, _Program]:
+    """A limit of the shaking force, and the program of engines as drawn."""
+    limit = f'[[constraints]]\nlimit = "maximum shaking force"\nmax = "{most} N"\n'
+    problem = read(TEXT + ROBUST + limit)
+    program = _Program(problem, 0.0)
+    program.add([np.zeros(problem.tolerances.count)])
+    return problem, program
+
+
+def test_limits_that_are_lowered_too_far_show_no_conflict(read: Callable[[str], Problem]) -> None:
+    """That no design is left is then because of what they were lowered by."""
+    _, program = limited(read, 1900.0)
+    assert program.solved(program.angles) is not None
+    program.lower(0.91)
+    assert program.solved(program.angles) is None
+    assert program.conflict == ()
+    _, program = limited(read, 100.0)
+    assert program.solved(program.angles) is None
+    assert program.conflict == ("maximum shaking force",)
+
+
+def test_a_design_keeps_limits_by_what_is_proven(read: Callable[[str], Problem]) -> None:
+    """Where that is more than the worst engine found, limits are lowered by it and the design is sought again."""
+    problem, program = limited(read, 1000.0)
+    angles = program.angles
+
+    class Over(EveryError):
+        """Proves a little more than there is of the engine as drawn."""
+
+        def at(self, values: Sequence[complex], proven: bool) -> Found:
+            drawn = evaluate(problem, problem.design(values))
+            return replace(super().at(values, proven), excess=drawn.excess(problem.limits) + 1e-3)
+
+    seeker = Over(problem, 2 * problem.fidelity.samples, 0.5 * problem.tolerance)
+    solved = program.solved(angles)
+    assert solved is not None
+    first = Least(solved[0], seeker.at(solved[0], proven=True), 0.0, program.held, 1, angles, seeker.samples)
+    assert KEPT < first.found.excess < SMALL
+    kept = _kept(program, seeker, first)
+    assert kept.found.excess <= KEPT
+    assert kept.found.value > first.found.value
 
 
 def test_limits_are_kept_by_every_engine(read: Callable[[str], Problem]) -> None:

@@ -47,6 +47,10 @@ JOINS = 0.1
 """Share of the tolerance by which an engine has to be worse than all in the program to join it."""
 MOST_MARGINS, MOST_DOUBLINGS = 3, 3
 """Times that limits are lowered, and that the angles of the fidelity are doubled, where its own leave a gap."""
+FALLS = 0.99
+"""What is passed by limits has to fall by so much for more errors to join: else angles or margins are what it is."""
+SMALL = 1e-2
+"""Share of a limit by which what is proven may be over it for margins to help."""
 OUTER = 12
 """Rounds in which the engines that may be above are chosen anew."""
 
@@ -59,6 +63,8 @@ class Least:
     ----------
     samples
         Steps over the cycle at which engines are measured.
+    margin
+        Share by which limits were lowered, for peaks stand between angles.
     conflict
         Limits that no design keeps in every engine; nothing else means anything then.
     """
@@ -70,6 +76,7 @@ class Least:
     scenarios: int
     angles: int
     samples: int
+    margin: float = 0.0
     conflict: tuple[str, ...] = ()
 
 
@@ -192,6 +199,10 @@ class _Program:
             model.base = base
         return bool(new)
 
+    def lower(self, excess: float) -> None:
+        """Limits by a little more than what one is passed by."""
+        self.margin, self.margins = self.margin + 1.05 * excess, self.margins + 1
+
     @property
     def angles(self) -> int:
         """Of the fidelity within the period of all loads."""
@@ -212,13 +223,15 @@ class _Program:
         ), [(k, limit) for k, limit, _ in limits]
 
     def solved(self, samples: int) -> tuple[tuple[Value, ...], float] | None:
-        """Its optimum and what no design goes under; None where no design keeps the limits."""
+        """Its optimum and what no design goes under; None where no design keeps the limits at these angles."""
         coarse, owners = self.at(samples)
         coarse = tightened(coarse, self.margin)
         solution = solve_cones(coarse)
         if solution.x is None:
+            # margins, and means of a few angles, forbid what is allowed (P7)
+            averaged, _ = self.at(samples, averaged=True)
             names = [limit.name for _, limit in owners]
-            self.conflict = tuple(dict.fromkeys(conflict_of(coarse, names)))
+            self.conflict = tuple(dict.fromkeys(conflict_of(averaged, names))) if _is_empty(averaged) else ()
             return None
         shares = solution.shares
         terms = tuple(z for z, k in zip(solution.multipliers.terms, coarse.groups, strict=True) if shares[k] > 0.0)
@@ -240,6 +253,11 @@ class _Program:
         return max(objective_value(self.problem, each) for each in found)
 
 
+def _is_empty(affine: AffineProblem) -> bool:
+    """Whether no design keeps its limits."""
+    return solve_cones(replace(affine, terms=())).x is None
+
+
 def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], nothing: float) -> Least:
     """The design whose worst engine is least, from a given one (R8)."""
     found = seeker.at(start, proven=not problem.decisions)
@@ -248,38 +266,56 @@ def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], 
         return replace(best, bound=found.value)
     program, values, bound = _Program(problem, nothing), start, 0.0
     program.add([np.zeros(problem.tolerances.count)])
-    samples, level = program.angles // COARSER, 0.0
-    for _ in in_time(range(MOST_ROUNDS)):
-        if (found.value > level * (1.0 + JOINS * problem.tolerance) or found.excess > FEASIBLE) and program.add(
-            found.errors
-        ):
-            samples = max(samples, program.angles // COARSER)
-        elif found.excess > FEASIBLE and samples >= program.angles and program.margins < MOST_MARGINS:
+    samples, level, before, solved = program.angles // COARSER, 0.0, math.inf, None
+    for round_ in in_time(range(MOST_ROUNDS)):
+        known = round_ == 0 or solved is not None
+        is_worse = found.value > level * (1.0 + JOINS * problem.tolerance)
+        is_new = known and (is_worse or FEASIBLE < found.excess < FALLS * before)
+        if is_new and program.add(found.errors):
+            samples, before = max(samples, program.angles // COARSER), found.excess
+        elif known and found.excess > FEASIBLE and samples >= program.angles and program.margins < MOST_MARGINS:
             # it knows all engines that hold this design, and peaks stand between its angles: limits a little lower
-            program.margin, program.margins = program.margin + 1.05 * found.excess, program.margins + 1
+            program.lower(found.excess)
         else:
-            samples, program.margin, program.margins = 2 * samples, 0.0, 0
+            samples, program.margin, program.margins, before = 2 * samples, 0.0, 0, math.inf
             if samples > program.angles << MOST_DOUBLINGS:
                 break
             if samples > program.angles:
                 seeker = replace(seeker, samples=2 * seeker.samples)
                 program.samples = seeker.samples
         solved = program.solved(samples)
-        if solved is None:
+        if program.conflict:
             return replace(best, conflict=program.conflict)
+        if solved is None:
+            continue
         values, own = solved
         bound, level = max(bound, own), program.level(values)
         found = seeker.at(values, proven=False)
         if gap_of(found.value, bound, nothing) <= problem.tolerance and found.excess <= FEASIBLE:
             found = seeker.at(values, proven=True)
-        each = Least(values, found, bound, program.held, len(program.errors), samples, seeker.samples)
+        each = Least(values, found, bound, program.held, len(program.errors), samples, seeker.samples, program.margin)
         best = min(best, each, key=lambda one: (one.found.excess > KEPT, one.found.value))
         if gap_of(found.bound, bound, nothing) <= problem.tolerance and found.excess <= FEASIBLE:
             break
-    found = best.found
-    if not found.proven or best.samples < seeker.samples:
-        found = seeker.at(best.values, proven=True)
-    return replace(best, found=found, bound=bound, samples=seeker.samples)
+    if not best.found.proven or best.samples < seeker.samples:
+        best = replace(best, found=seeker.at(best.values, proven=True), samples=seeker.samples)
+    return replace(_kept(program, seeker, best), bound=bound)
+
+
+def _kept(program: _Program, seeker: Adversary, best: Least) -> Least:
+    """A design that keeps its limits by what is proven too, where that is a little more than the worst found."""
+    program.margin = best.margin
+    for _ in in_time(range(MOST_MARGINS)):
+        if not KEPT < best.found.excess <= SMALL:
+            break
+        program.lower(best.found.excess)
+        solved = program.solved(best.angles)
+        if solved is None:
+            break
+        found = seeker.at(solved[0], proven=True)
+        if found.excess < best.found.excess:
+            best = replace(best, values=solved[0], found=found, held=program.held)
+    return best
 
 
 def _least_share(
