@@ -16,10 +16,9 @@ from lanes import first_fast
 from laufruhe.plots import figure, names, style
 from laufruhe.plots.results import firings, torque, twist_modes
 from laufruhe.plots.words import FAINT, INK, READ, contrast, grouped, ink_on, legible, spread, typeset, wrapped
-from laufruhe.present.pictures import PICTURES
+from laufruhe.present.pictures import PICTURES, rows_of
 from laufruhe.solvers import Result
 from laufruhe.studies import picture
-from laufruhe.studies.picture import rows_of
 from picture_faults import faults_of
 from problem_files import FOUR, MOUNTS, changed, shaft
 

@@ -28,7 +28,7 @@ from laufruhe.prove.springs.conditions import conditions, of_stiffness
 from laufruhe.prove.springs.high_orders import HighOrder
 from laufruhe.prove.springs.lines import Felt
 from laufruhe.prove.springs.mirrored import mirrored_halves, mirrored_parts
-from laufruhe.prove.springs.open_mounts import OpenMounts, open_mounts
+from laufruhe.prove.springs.open_mounts import OpenMounts, is_lifted, open_mounts
 from laufruhe.prove.springs.opened import own_axes
 from laufruhe.prove.springs.orders import Order
 from laufruhe.prove.springs.program import proposed
@@ -190,13 +190,16 @@ def in_planes(boxes: SpringBoxes, x: np.ndarray) -> np.ndarray:
     return np.array([seen[0, 0], seen[1, 1], seen[0, 1]])
 
 
-@pytest.mark.parametrize("name", ["stiffness", "all"])
+@pytest.mark.parametrize("name", ["stiffness", "all", "damped alike"])
 def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """E42, E43, E52, E53, E57: motion, forces and travel by solving anew, and no condition broken, with turned and
     moved mounts and unbalances open too; of all motions, and of both halves where mounts mirror each other."""
     monkeypatch.setattr(orders_, "ASIDE", -1.0)
     plain = asked_for(tmp_path, ASKED["narrowed"], mounts=TURNED) if name == "stiffness" else None
-    problem = plain or load(POWERTRAIN.with_name("tractor-four-elastic.toml"))
+    damping = 'damping = ["900 N s/m", "900 N s/m", "900 N s/m"]\n' * (name == "damped alike")
+    text = POWERTRAIN.with_name("tractor-four-elastic.toml").read_text(encoding="utf-8")
+    (tmp_path / "four.toml").write_text(changed(text, ("turned    = [", f"{damping}turned    = [")), encoding="utf-8")
+    problem = plain or load(tmp_path / "four.toml")
     boxes, generator = asked_of(problem), np.random.default_rng(4)
     about = np.array([d.start_number for d in problem.mount_decisions])
     kept, halves = 0, set[int]()
@@ -228,6 +231,16 @@ def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatc
             assert np.linalg.eigvalsh(whole)[0] >= -1e-9 * max(1.0, np.abs(whole).max())
     assert kept > 10
     assert halves == {0, 1, 2}
+
+
+@pytest.mark.parametrize(("damping", "follows"), [("900", True), ("500", False)])
+def test_damping_of_a_mount_that_turns_is_followed_where_it_is_the_same_along_all_axes(
+    damping: str, follows: bool, tmp_path: Path
+) -> None:
+    text = POWERTRAIN.with_name("tractor-four-elastic.toml").read_text(encoding="utf-8")
+    own = f'damping = ["900 N s/m", "900 N s/m", "{damping} N s/m"]\nturned    = ['
+    (tmp_path / "four.toml").write_text(changed(text, ("turned    = [", own)), encoding="utf-8")
+    assert is_lifted(load(tmp_path / "four.toml")) is follows
 
 
 ASKEW = {

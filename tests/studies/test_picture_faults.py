@@ -11,8 +11,9 @@ from tests.studies.conftest import parts_of
 
 from lanes import first_fast
 from laufruhe.plots.picture import draw
+from laufruhe.present.pictures import rows_of
 from laufruhe.studies.kinds import KINDS
-from laufruhe.studies.picture import WIDEST, Bars, Picture, rows_of
+from laufruhe.studies.picture import WIDEST, Bars, Picture
 from picture_faults import faults_of
 
 FIGURES = ("fig-25", "fig-10", "fig-08-09", "fig-22", "fig-32", "reciprocating-mass")

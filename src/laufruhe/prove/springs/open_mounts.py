@@ -187,9 +187,11 @@ def is_lifted(problem: Problem) -> bool:
     moved, turned = (np.any(low[:, part] < high[:, part], axis=1) for part in (POSITION, TURNED))
     still = all(np.all(low[:, part] == high[:, part]) for part in (LOSS, DAMPING, LAG))
     springs = every_spring(mounting_in(problem.engine).mounts)
-    damped = np.any(low[:, DAMPING] != 0.0, axis=1) | np.array([bool(spring.dynamic) for _, spring in springs])
-    # damping of a mount that turns or moves is not linear in these numbers
-    return still and not np.any(damped & (moved | turned)) and bool(np.all(low[:, STIFFNESS] >= 0.0))
+    dynamic = np.array([bool(spring.dynamic) for _, spring in springs])
+    damped, unlike = np.any(low[:, DAMPING] != 0.0, axis=1), np.ptp(low[:, DAMPING], axis=1) > 0.0
+    # damping of a mount that moves, or turns and has not the same along all axes, is not linear in these numbers
+    nonlinear = (damped | dynamic) & moved | (unlike | dynamic) & turned
+    return still and not np.any(nonlinear) and bool(np.all(low[:, STIFFNESS] >= 0.0))
 
 
 def open_mounts(problem: Problem, lower: Array, upper: Array, framed: Framed | None = None) -> OpenMounts:
