@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
+from concurrent.futures import CancelledError, Executor, Future
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any, ParamSpec, TypeVar
 
 from laufruhe.errors import Complaint, InputError, SolverError
@@ -23,15 +24,18 @@ class Cluster(Executor):
     def __init__(self, client: Any) -> None:
         from distributed.scheduler import KilledWorker
 
-        self._client, self._inner = client, client.get_executor(pure=False)
+        self._client = client
         self.losses = (KilledWorker,)
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
         """Ask for a call; while the scheduler is away it waits."""
         if self._client.status in ("closing", "closed"):
             raise RuntimeError("the connection is closed")
-        found: Future[T] = self._inner.submit(fn, *args, **kwargs)
-        return found
+        asked, answer = self._client.submit(fn, *args, pure=False, **kwargs), Future[T]()
+        # a call that nobody waits for is given up
+        answer.add_done_callback(lambda done: asked.cancel() if done.cancelled() else None)
+        asked.add_done_callback(partial(_tell, answer))
+        return answer
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
         """Nothing is left to end: the client belongs to who has made it."""
@@ -46,6 +50,17 @@ class Cluster(Executor):
     def gone(self) -> str:
         """What is said where nobody works any more."""
         return f"the cluster at {self._client.scheduler.address if self._client.scheduler else 'its address'} is gone"
+
+
+def _tell(answer: Future[Any], asked: Any) -> None:
+    """What has become of a call; one that is done and whose answer cannot be fetched any more is lost."""
+    if not answer.set_running_or_notify_cancel():
+        return
+    try:
+        answer.set_result(asked.result(PATIENCE))
+    except Exception as error:
+        is_its_own = asked.status == "error"
+        answer.set_exception(error if is_its_own else CancelledError(str(error)))
 
 
 @contextmanager

@@ -1,0 +1,79 @@
+"""Calls of a cluster whose answers cannot be fetched: they are lost, and asked for again; no cluster is needed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+pytest.importorskip("distributed", reason="Dask is not installed: pip install 'laufruhe[cluster]'")
+
+from laufruhe.numerics.cluster import Cluster
+from laufruhe.numerics.workers import each
+
+
+class Call:
+    """As `distributed.Future`: what is done, and what comes of fetching it."""
+
+    def __init__(self, status: str, fetch: Callable[[], Any]) -> None:
+        self.status, self._fetch = status, fetch
+
+    def add_done_callback(self, told: Callable[[Call], None]) -> None:
+        told(self)
+
+    def result(self, _: float) -> Any:
+        return self._fetch()
+
+    def cancel(self) -> None:
+        self.status = "cancelled"
+
+
+class Client:
+    """Whose first answers cannot be fetched, because a connection ends."""
+
+    status, scheduler = "running", None
+
+    def __init__(self, unreachable: int) -> None:
+        self.unreachable, self.asked = unreachable, 0
+
+    def scheduler_info(self, n_workers: int) -> dict[str, Any]:
+        return {"workers": {"one": {"nthreads": abs(n_workers)}}}
+
+    def submit(self, work: Callable[..., Any], *words: Any, pure: bool) -> Call:
+        assert not pure
+        self.asked += 1
+
+        def fetch() -> Any:
+            raise OSError("the connection is lost")
+
+        try:
+            answer = work(*words)
+        except ValueError as error:
+            raised = error
+
+            def told() -> Any:
+                raise raised
+
+            return Call("error", told)
+        return Call("finished", fetch if self.asked <= self.unreachable else lambda: answer)
+
+
+def half(number: int) -> float:
+    """Of an even number."""
+    if number % 2:
+        raise ValueError(f"{number} is odd")
+    return 0.5 * number
+
+
+def test_answers_that_cannot_be_fetched_are_asked_for_again() -> None:
+    client = Client(unreachable=2)
+    assert sorted(each(half, [2, 4, 6], Cluster(client))) == [(0, 1.0), (1, 2.0), (2, 3.0)]
+    assert client.asked == 5
+
+
+def test_what_a_call_raises_is_its_own_and_asked_for_once() -> None:
+    client = Client(unreachable=0)
+    with pytest.raises(ValueError, match="3 is odd"):
+        list(each(half, [3], Cluster(client)))
+    assert client.asked == 1
