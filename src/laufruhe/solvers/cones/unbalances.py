@@ -96,7 +96,8 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optim
         if found is None:
             if best is not None and best.excess <= KEPT:
                 return best, samples
-            if not _met_on_average(model, samples):
+            # means averaged, for at a few angles alone one may be more than over the whole cycle (P7)
+            if is_empty(model.at(samples, averaged=True)):
                 return None, samples
             samples *= 2
             continue
@@ -113,14 +114,6 @@ def _first_samples(model: AffineModel) -> int:
     half = model.full_samples // 2
     many = model.full_samples % 2 == 0 and any(len(norm.grid.weights) > MANY_ROWS for _, norm in model.at(half).terms)
     return half if many else model.full_samples
-
-
-def _met_on_average(model: AffineModel, samples: int) -> bool:
-    """Whether designs exist by rows that are never more than what they stand for: means averaged, peaks at angles (P7).
-
-    At a few angles alone a mean may be more than over the whole cycle, and forbid what is allowed.
-    """
-    return solve_cones(replace(model.at(samples, averaged=True), terms=())).x is not None
 
 
 def _allowed(problem: Problem, model: AffineModel, samples: int, nothing: float) -> Optimum | None:
@@ -256,10 +249,15 @@ def _shown(limits: Sequence[Limit], idle: Sequence[Limit], optimum: Optimum, val
     )
 
 
+def is_empty(affine: AffineProblem) -> bool:
+    """Whether no design keeps its limits; proven by rows that are never more than what they stand for."""
+    return solve_cones(replace(affine, terms=())).x is None
+
+
 def conflict_of(affine: AffineProblem, names: Sequence[str]) -> tuple[str, ...]:
     """A smallest set of limits that no design meets together: each is needed for the contradiction."""
 
     def excluded(kept: Sequence[int]) -> bool:
-        return solve_cones(replace(affine, terms=(), limits=tuple(affine.limits[k] for k in kept))).x is None
+        return is_empty(replace(affine, limits=tuple(affine.limits[k] for k in kept)))
 
     return tuple(names[k] for k in smallest(range(len(affine.limits)), excluded))

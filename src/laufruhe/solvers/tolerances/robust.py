@@ -31,7 +31,7 @@ from laufruhe.problem.tolerance import Over
 from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, judged, none_within, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.cones.unbalances import conflict_of, tightened
+from laufruhe.solvers.cones.unbalances import conflict_of, is_empty, tightened
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.tolerances.adversaries import Adversary, DrawnEngines, EveryError, Found
 from laufruhe.solvers.tolerances.conclusion import Held, compared, robust_result
@@ -231,7 +231,7 @@ class _Program:
             # margins, and means of a few angles, forbid what is allowed (P7)
             averaged, _ = self.at(samples, averaged=True)
             names = [limit.name for _, limit in owners]
-            self.conflict = tuple(dict.fromkeys(conflict_of(averaged, names))) if _is_empty(averaged) else ()
+            self.conflict = tuple(dict.fromkeys(conflict_of(averaged, names))) if is_empty(averaged) else ()
             return None
         shares = solution.shares
         terms = tuple(z for z, k in zip(solution.multipliers.terms, coarse.groups, strict=True) if shares[k] > 0.0)
@@ -253,11 +253,6 @@ class _Program:
         return max(objective_value(self.problem, each) for each in found)
 
 
-def _is_empty(affine: AffineProblem) -> bool:
-    """Whether no design keeps its limits."""
-    return solve_cones(replace(affine, terms=())).x is None
-
-
 def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], nothing: float) -> Least:
     """The design whose worst engine is least, from a given one (R8)."""
     found = seeker.at(start, proven=not problem.decisions)
@@ -266,9 +261,8 @@ def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], 
         return replace(best, bound=found.value)
     program, values, bound = _Program(problem, nothing), start, 0.0
     program.add([np.zeros(problem.tolerances.count)])
-    samples, level, before, solved = program.angles // COARSER, 0.0, math.inf, None
-    for round_ in in_time(range(MOST_ROUNDS)):
-        known = round_ == 0 or solved is not None
+    samples, level, before, known = program.angles // COARSER, 0.0, math.inf, True
+    for _ in in_time(range(MOST_ROUNDS)):
         is_worse = found.value > level * (1.0 + JOINS * problem.tolerance)
         is_new = known and (is_worse or FEASIBLE < found.excess < FALLS * before)
         if is_new and program.add(found.errors):
@@ -286,6 +280,7 @@ def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], 
         solved = program.solved(samples)
         if program.conflict:
             return replace(best, conflict=program.conflict)
+        known = solved is not None
         if solved is None:
             continue
         values, own = solved
