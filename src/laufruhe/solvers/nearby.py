@@ -22,7 +22,7 @@ from laufruhe.problem.problem import Phasing, Problem, Search
 from laufruhe.solvers import kinds_of, solve
 from laufruhe.solvers.conclusion import given_design, values_of
 from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import candidates_of
 
 STARTS, STARS, STARS_THAT_MOVE = 3, 3, 2
@@ -60,7 +60,7 @@ def first_of(problem: Problem) -> Result | None:
         few = min(phasing.best, STARS_THAT_MOVE if moves else STARS)
         problem = replace(problem, phasing=replace(phasing, best=few, thorough=False))
     result = solve(replace(problem, search=_unproven(problem, STARTS)))
-    return result if result.status in (Status.OPTIMAL, Status.FEASIBLE) else None
+    return result if result.status.has_design else None
 
 
 def next_to(problem: Problem, known: Result) -> Engine | None:
@@ -154,5 +154,5 @@ def _unproven(problem: Problem, starts: int) -> Search:
 
 
 def _engine(result: Result | None) -> Engine | None:
-    met = result is not None and result.status in (Status.OPTIMAL, Status.FEASIBLE)
+    met = result is not None and result.status.has_design
     return result.final.engine if result is not None and met else None
