@@ -15,6 +15,7 @@ import laufruhe.solvers
 from cli import scenes
 from laufruhe.cli import app
 from laufruhe.errors import SolverError
+from laufruhe.numerics.cores import ONE_THREAD
 from problem_files import PROBLEMS, written
 
 PAGES = {".laufruhe.json", "result.json", "report.md", "report.html"}
@@ -287,8 +288,10 @@ def test_markup_in_a_title_is_text(here: Path) -> None:
     assert title in result.stdout
 
 
-def in_a_process(*words: str, code: str = "from laufruhe.cli import main; main()") -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
+def in_a_process(
+    *words: str, code: str = "from laufruhe.cli import main; main()", env: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False, env=env)
 
 
 def test_help_imports_no_heavy_library() -> None:
@@ -302,6 +305,23 @@ def test_help_imports_no_heavy_library() -> None:
     done = in_a_process(code=code)
     assert done.returncode == 0, done.stderr
     assert "solve" in done.stdout
+
+
+@pytest.mark.parametrize(("given", "told"), [({}, ["1"] * 3), ({"OPENBLAS_NUM_THREADS": "2"}, ["2"])])
+def test_linear_algebra_of_a_command_takes_one_thread_unless_told(given: dict[str, str], told: list[str]) -> None:
+    """Said before NumPy reads it, by the command alone: who imports the package keeps what the environment says."""
+    code = (
+        "import os, sys\n"
+        "from laufruhe.cli import commands\n"
+        "from laufruhe.numerics.cores import ONE_THREAD\n"
+        "said = lambda: [os.environ[name] for name in ONE_THREAD if name in os.environ]\n"
+        "before = said()\n"
+        "commands.supervised = lambda _: print('numpy' in sys.modules, before, said())\n"
+        "commands.main()\n"
+    )
+    around = {name: value for name, value in os.environ.items() if name not in ONE_THREAD} | given
+    done = in_a_process(code=code, env=around)
+    assert done.stdout == f"False {list(given.values())} {told}\n", done.stderr
 
 
 @pytest.mark.slow

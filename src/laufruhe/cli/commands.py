@@ -32,6 +32,7 @@ from laufruhe.cli.screen import (
 )
 from laufruhe.cli.supervised import supervised
 from laufruhe.errors import refused
+from laufruhe.numerics.cores import ONE_THREAD
 
 
 class _Commands(TyperGroup):
@@ -286,6 +287,8 @@ def main() -> None:
     """Entry point of the `laufruhe` command; ends the process."""
     # classes of models and marks of pictures are many, and none of them is garbage
     gc.set_threshold(SELDOM)
+    if not ONE_THREAD.keys() & os.environ.keys():
+        os.environ.update(ONE_THREAD)
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             # a terminal that knows no Greek gets an escape in place of a traceback

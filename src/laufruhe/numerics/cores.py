@@ -7,6 +7,9 @@ import os
 import signal
 from contextlib import suppress
 
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Variables by which a process begins whose linear algebra takes one thread: on matrices as small as ours more only
+wait in a loop, which takes twice the processor time, and sums depend on how many they are."""
 _DEATH_SIGNAL = 1
 
 

@@ -22,12 +22,11 @@ from types import TracebackType
 from typing import Any, ParamSpec, TypeAlias, TypeVar
 
 from laufruhe.errors import SolverError
-from laufruhe.numerics.cores import end_with_parent, processors
+from laufruhe.numerics.cores import ONE_THREAD, end_with_parent, processors
 
 P = ParamSpec("P")
 T = TypeVar("T")
 _Call: TypeAlias = tuple[Future[Any], bytes]
-_THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 _SERVES = False
 _PROGRAM = "from laufruhe.numerics.processes import serve; serve({})"
 
@@ -164,7 +163,7 @@ class Processes(Executor):
         child = subprocess.Popen(
             [sys.executable, "-c", _PROGRAM.format(os.getpid())],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
-            env={**os.environ, **_THREADS, "PYTHONPATH": path},
+            env={**os.environ, **ONE_THREAD, "PYTHONPATH": path},
         )  # fmt: skip
         with self._lock:
             self._children.add(child)
