@@ -67,7 +67,7 @@ class Scene:
 
     def analytic(self) -> FloatArray:
         """Mount forces over the working cycle from the analytic loads."""
-        return mount_forces(self.engine, shaking_loads(self.engine, self.point).sample(SAMPLES))
+        return rigid_mounting(self.engine.mounts).forces(shaking_loads(self.engine, self.point)).sample(SAMPLES)
 
     def exact(self, steps: int) -> FloatArray:
         """Analytic mount forces where the simulation has its own."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.bearing import Bearing
@@ -46,7 +46,7 @@ class Cycle(Enum):
         """Crank angle of a cycle [rad]."""
         return math.tau * self.value
 
-    @property
+    @cached_property
     def base_order(self) -> Fraction:
         """Lowest order of gas loads (C6)."""
         return Fraction(1, self.value)

@@ -142,7 +142,7 @@ class Spectrum:
             return self.smooth.sample(samples) + self.corners.values(angles, self.period)
         if len(self.coefficients) <= FEW:
             # a product with few waves takes less time than a transform
-            flat = np.ascontiguousarray(self.coefficients).reshape(len(self.coefficients), -1)
+            flat = self.coefficients.reshape(len(self.coefficients), -1)
             found = _waves(len(flat), samples) @ np.concatenate([flat.real, flat.imag])
             return np.asarray(found.reshape(samples, *self.coefficients.shape[1:]))
         if len(self.coefficients) <= samples // 2 + 1:
@@ -203,14 +203,14 @@ class Spectrum:
     @cached_property
     def step(self) -> int:
         """Greatest common divisor of what its coefficients stand at, zero where none but the mean is."""
-        used: Any = self.coefficients.reshape(len(self.coefficients), -1).any(axis=1)
-        return int(np.gcd.reduce(used.nonzero()[0]))
+        used = np.logical_or.reduce(self.coefficients.reshape(len(self.coefficients), -1), axis=1)
+        return gcd(*used.nonzero()[0].tolist())
 
     def repeats(self, also: tuple[Fraction, ...] = ()) -> Fraction:
         """Lowest order of its own shortest period, which holds some further orders too."""
         orders, step = [order for order in also if order > 0], self.step
         if step:
-            orders.append(step * self.base)
+            orders.append(self.base * step)
         return common_base(orders or [Fraction(1)])
 
     def over(self, base: Fraction) -> Spectrum:

@@ -142,28 +142,53 @@ def star_sum(
     Shape (m, c). A real or imaginary part below the rounding of its own sum,
     (n + 2) eps sum |w|, cannot be told from zero and is zero.
     """
-    sums = phasors(turns, multiples) @ weights
-    return _flushed(sums, np.abs(weights).sum(axis=0), len(turns))
+    return _star_sum(phasors(turns, multiples), weights)
 
 
-def cancelling_sums(values: NDArray[np.complex128], indices: Sequence[int]) -> NDArray[np.complex128]:
+def star_orders(weights: NDArray[np.float64], turns: tuple[Turn, ...], count: int) -> NDArray[np.complex128]:
+    """`star_sum` of the multiples 0 ... count - 1; what it is of the same turns is kept."""
+    return _star_sum(_waves(turns, count), weights)
+
+
+@lru_cache(maxsize=8)
+def _waves(turns: tuple[Turn, ...], count: int) -> NDArray[np.complex128]:
+    waves = phasors(turns, np.arange(count))
+    waves.setflags(write=False)
+    return waves
+
+
+def _star_sum(waves: NDArray[np.complex128], weights: NDArray[np.float64]) -> NDArray[np.complex128]:
+    return _flushed((waves @ weights).view(float), _rounding(len(weights)) * np.abs(weights).sum(axis=0).repeat(2))
+
+
+def cancelling_sums(values: NDArray[np.complex128], indices: tuple[int, ...]) -> NDArray[np.complex128]:
     """Sums of the values (n, c) of each index, shape (largest + 1, c), zero under the rounding of their own terms."""
     # every sum as a product with zeros and ones: a few values cost a few calls
-    members = _members(tuple(indices))
-    parts = np.ascontiguousarray(values).view(float)
-    size = members @ np.abs(parts)
-    return _flushed((members @ parts).view(complex), size[:, ::2] + size[:, 1::2], len(indices))
+    members, roundings = _members(indices)
+    parts = values.view(float)
+    return _flushed(members @ parts, roundings @ np.abs(parts) @ _both_parts(values.shape[1]))
 
 
 @lru_cache(maxsize=256)
-def _members(indices: tuple[int, ...]) -> NDArray[np.float64]:
-    """One where a value is of an index, shape (largest + 1, n)."""
+def _members(indices: tuple[int, ...]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """One, and the rounding of a sum, where a value is of an index, each of shape (largest + 1, n)."""
     members = np.asarray(np.arange(max(indices) + 1)[:, None] == np.array(indices), dtype=float)
     members.setflags(write=False)
-    return members
+    return members, _rounding(len(indices)) * members
 
 
-def _flushed(sums: NDArray[np.complex128], magnitude: NDArray[np.float64], count: int) -> NDArray[np.complex128]:
-    parts = sums.view(float).reshape(*sums.shape, 2)
-    rounding = np.abs(parts) <= ((count + 2) * _EPS * magnitude)[..., None]
-    return np.asarray(np.where(rounding, 0.0, parts).view(complex)[..., 0])
+@lru_cache(maxsize=16)
+def _both_parts(count: int) -> NDArray[np.float64]:
+    """Adds up real and imaginary part of so many numbers, for both; shape (2 count, 2 count)."""
+    return np.asarray(np.kron(np.eye(count), np.ones((2, 2))), dtype=float)
+
+
+def _rounding(count: int) -> float:
+    """Of a sum of so many terms, over the size of them all."""
+    return (count + 2) * _EPS
+
+
+def _flushed(sums: NDArray[np.float64], least: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Sums (m, 2 c) of real and imaginary parts as complex numbers (m, c), what cannot be told from zero at zero."""
+    sums[np.abs(sums) <= least] = 0.0
+    return sums.view(complex)

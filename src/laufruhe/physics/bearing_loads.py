@@ -246,7 +246,7 @@ def _felt(
     series = _inertia_orders(part, fidelity, felt) * (ratio * speed) ** 2
     moved = series * star_sum(np.ones((1, 1)), [part.star_turn], np.arange(len(series)))
     moved = moved if ratio > 0.0 else moved.conj()
-    load = fidelity.kept(spread(moved, order_index(cycle, abs(ratio)), cycle))
+    load = fidelity.kept(Spectrum(cycle.base_order, spread(moved, order_index(cycle, abs(ratio)))))
     if gas is not None:
         load = load + fidelity.kept(_gas_orders(cycle, part, gas, fidelity, felt))
     load.coefficients.setflags(write=False)

@@ -56,18 +56,27 @@ class Effect:
     series: Callable[[], ComplexArray]
 
 
-def mass_effects(part: SliderCrank, fidelity: Fidelity) -> tuple[Effect, ...]:
+def effects_of(part: SliderCrank, fidelity: Fidelity) -> list[Effect]:
+    """Loads of point masses and rods."""
+    masses, rods = _all_effects(part, fidelity)
+    return [effect for effect in (*masses, *rods) if effect.size != 0.0]
+
+
+def mass_effects(part: SliderCrank, fidelity: Fidelity) -> list[Effect]:
     """Loads of the point masses (L2, L3, L7)."""
-    masses, _ = CLOSED_FORMS.get(type(part), _of_momentum)(part, fidelity)
-    return tuple(effect for effect in masses if effect.size != 0.0)
+    masses, _ = _all_effects(part, fidelity)
+    return [effect for effect in masses if effect.size != 0.0]
 
 
-def rod_effects(part: SliderCrank, fidelity: Fidelity) -> tuple[Effect, ...]:
+def rod_effects(part: SliderCrank, fidelity: Fidelity) -> list[Effect]:
     """Roll moment of what point masses leave of the rods' inertia (L4, L7)."""
-    if fidelity.rod != "rigid":
-        return ()
-    _, rods = CLOSED_FORMS.get(type(part), _of_momentum)(part, fidelity)
-    return tuple(effect for effect in rods if effect.size != 0.0)
+    _, rods = _all_effects(part, fidelity)
+    return [effect for effect in rods if effect.size != 0.0]
+
+
+def _all_effects(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
+    masses, rods = CLOSED_FORMS.get(type(part), _of_momentum)(part, fidelity)
+    return masses, rods if fidelity.rod == "rigid" else ()
 
 
 def momentum_loads(part: SliderCrank, motion: Motion, square: Any, turning: Any = 0.0) -> tuple[Any, Any, Any]:

@@ -96,11 +96,12 @@ class RigidMounting:
         """Whether a part of a wrench has next to nothing along what is free, as most have."""
         parts = np.ascontiguousarray(part.coefficients).view(float)
         # squares of real and imaginary parts tell
-        along = (parts @ self._leak).ravel()
-        if not along.any():
-            return True
+        along = parts @ self._leak
+        square = float(np.vdot(along, along))
+        if square == 0.0:
+            return not np.any(along)
         whole = float(np.vdot(parts, parts)) * (UNCARRIED_SHARE / max(self.arm, 1.0)) ** 2 / max(parts.size, 1)
-        return bool(self._leak.shape[1] * float(along @ along) <= whole < math.inf)
+        return bool(self._leak.shape[1] * square <= whole < math.inf)
 
 
 def rigid_mounting(mounts: Sequence[Mount]) -> RigidMounting:

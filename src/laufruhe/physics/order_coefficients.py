@@ -18,9 +18,11 @@ from functools import lru_cache
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.numerics.arrays import ComplexArray
+from laufruhe.numerics.arrays import Array, ComplexArray
 
 _TAIL = 1e-18
+_QUARTERS = np.array([1.0, 1j, -1.0, -1j])
+"""Powers of i."""
 MAX_ORDER = 20_000
 
 
@@ -47,15 +49,14 @@ def _complement(rod_ratio: float, offset_ratio: float) -> float:
     return math.sqrt(low * high) / (1.0 + offset_ratio)
 
 
-def _power_series(power: float, q1: float, q2: float, difference: float, terms: int) -> ComplexArray:
-    """Coefficients of ((1 + i q1 E)(1 - i q2 E))^power (K8), shape (terms,)."""
-    linear, square = 1j * difference, q1 * q2
-    series = np.zeros(terms, dtype=complex)
-    series[0] = 1.0
+def _power_series(power: float, q1: float, q2: float, difference: float, terms: int) -> Array:
+    """Coefficients of ((1 + q1 D)(1 - q2 D))^power (K8), D = i E, shape (terms,): they are real."""
+    square, before, last = -q1 * q2, 0.0, 1.0
+    series = [last]
     for j in range(terms - 1):
-        before = series[j - 1] if j > 0 else 0.0
-        series[j + 1] = (linear * (power - j) * series[j] + square * (2.0 * power + 1.0 - j) * before) / (j + 1)
-    return series
+        before, last = last, (difference * (power - j) * last + square * (2.0 * power + 1.0 - j) * before) / (j + 1)
+        series.append(last)
+    return np.array(series)
 
 
 @lru_cache(maxsize=1024)
@@ -91,12 +92,17 @@ def cos_psi_power_orders(power: float, rod_ratio: float, offset_ratio: float, hi
     scale = ((1.0 - offset_ratio) * (1.0 + offset_ratio) / ((1.0 + q1 * q1) * (1.0 + q2 * q2))) ** (power / 2.0)
     tail = orders_needed(rod_ratio, offset_ratio)
     series = _power_series(power / 2.0, q1, q2, difference, highest + tail + 1)
-    upper = np.array([np.vdot(series[: tail + 1], series[h : h + tail + 1]) for h in range(highest + 1)]) * scale
-    both = np.concatenate([upper[:0:-1].conj(), upper])
-    both.setflags(write=False)
-    return both
+    upper = np.correlate(series, series[: tail + 1], "valid") * scale * _QUARTERS[np.arange(highest + 1) % 4]
+    return _fixed(np.concatenate([upper[:0:-1].conj(), upper]))
 
 
+def _fixed(found: ComplexArray) -> ComplexArray:
+    """What is kept, and nobody may change."""
+    found.setflags(write=False)
+    return found
+
+
+@lru_cache(maxsize=256)
 def piston_acceleration_orders(rod_ratio: float, offset_ratio: float = 0.0, highest: int | None = None) -> ComplexArray:
     """Coefficients of s''/r: c_1 = -1 - ..., c_2 = -(lambda + lambda^3/4 + ...) (K10).
 
@@ -119,7 +125,7 @@ def piston_acceleration_orders(rod_ratio: float, offset_ratio: float = 0.0, high
         out = -(h**2) * (2.0 / rod_ratio) * rod
     if highest >= 1:
         out[1] -= 1.0
-    return out
+    return _fixed(out)
 
 
 def _two_sided(one_sided: ComplexArray) -> ComplexArray:
@@ -132,7 +138,7 @@ def _one_sided(two_sided: ComplexArray, highest: int) -> ComplexArray:
     middle = len(two_sided) // 2
     out = 2.0 * two_sided[middle : middle + highest + 1]
     out[0] /= 2.0
-    return out
+    return _fixed(out)
 
 
 def _velocity(rod_ratio: float, offset_ratio: float, highest: int) -> ComplexArray:
@@ -143,6 +149,7 @@ def _velocity(rod_ratio: float, offset_ratio: float, highest: int) -> ComplexArr
     return np.asarray(acceleration / (1j * h))
 
 
+@lru_cache(maxsize=256)
 def inertia_roll_orders(rod_ratio: float, offset_ratio: float, ratio: float, highest: int) -> ComplexArray:
     """Coefficients of -s''/r (n s'/r + e/r), for a crank of ratio n (L3).
 
@@ -156,6 +163,7 @@ def inertia_roll_orders(rod_ratio: float, offset_ratio: float, ratio: float, hig
     return _one_sided(-np.convolve(acceleration, arm, mode="full"), highest)
 
 
+@lru_cache(maxsize=256)
 def rod_roll_orders(rod_ratio: float, offset_ratio: float, ratio: float, highest: int) -> ComplexArray:
     """Coefficients of -psi'' (1 + n psi'), for a crank of ratio n (L4).
 

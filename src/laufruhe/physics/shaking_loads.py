@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,10 +22,12 @@ from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_moment
-from laufruhe.physics.mechanism import mass_effects, rod_effects
+from laufruhe.physics.mechanism import effects_of, mass_effects, rod_effects
 from laufruhe.physics.star_loads import order_index, star_loads
 from laufruhe.physics.uneven_speed import uneven_geared_loads, uneven_loads, uneven_rotor_loads
 from laufruhe.physics.wrench import plane_parts
+
+_Parts: TypeAlias = tuple[complex, ...]
 
 
 def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -42,21 +45,21 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     if fidelity.is_uneven:
         return uneven_loads(engine, point, fidelity)
     gas = fidelity.gas_of(point)
-    moving = _slider_crank_loads(engine.cycle, engine.slider_cranks, point.speed, gas, fidelity)
-    total = Summed(moving, rotating_loads(engine, point.speed))
+    moving, pins = _slider_crank_loads(engine.cycle, engine.slider_cranks, point.speed, gas, fidelity)
+    total = Summed(moving, _turning_loads(pins, engine.rotors, point.speed, engine.cycle))
     return total + added_geared_loads(engine, point, fidelity) if engine.geared else total
 
 
 @lru_cache(maxsize=64)
 def _slider_crank_loads(
     cycle: Cycle, parts: tuple[SliderCrank, ...], speed: float, gas: GasModel | None, fidelity: Fidelity
-) -> Spectrum:
-    """Pistons, rods and gas: the same for every design that differs in its rotors alone."""
+) -> tuple[Spectrum, _Turning]:
+    """Pistons, rods and gas, and masses at the pins: the same for every design that differs in its rotors alone."""
     engine = Engine("pistons, rods and gas", cycle, parts)
-    total = reciprocating_loads(engine, speed, fidelity) + rod_inertia_loads(engine, speed, fidelity)
+    total = star_loads(engine, speed, lambda part: effects_of(part, fidelity))
     if gas is not None:
         total = total + gas_loads(engine, gas, fidelity)
-    return held(fidelity.kept(total))
+    return held(fidelity.kept(total)), _turning(engine.pins, speed, cycle)
 
 
 def forget() -> None:
@@ -86,11 +89,25 @@ def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum
     -------
     Spectrum of shape (n, 6) [N, N m]; linear in the unbalances and their conjugates.
     """
-    turning = tuple(rotors)
-    if not turning:
+    return _turning_loads(_NOTHING, tuple(rotors), speed, cycle)
+
+
+_Turning: TypeAlias = tuple[list[_Parts], tuple[int, ...]]
+"""The wrench of each of some rotors, and the index of its order among those of a cycle."""
+_NOTHING: _Turning = ([], ())
+
+
+def _turning(rotors: tuple[Rotor, ...], speed: float, cycle: Cycle) -> _Turning:
+    return _wrenches(rotors, speed), _indices(cycle, tuple([rotor.shaft.ratio for rotor in rotors]))
+
+
+def _turning_loads(known: _Turning, rotors: tuple[Rotor, ...], speed: float, cycle: Cycle) -> Spectrum:
+    """Of rotors whose wrenches are known, and of others beside them: what cancels among them all is zero."""
+    (wrenches, indices), (own, own_indices) = known, _turning(rotors, speed, cycle)
+    if not wrenches and not own:
         return Spectrum(cycle.base_order, np.zeros((1, 6), dtype=complex))
-    indices = _indices(cycle, tuple([rotor.shaft.ratio for rotor in turning]))
-    return Spectrum(cycle.base_order, cancelling_sums(_rotor_wrenches(turning, speed), indices))
+    every = np.array(wrenches + own, dtype=complex)
+    return Spectrum(cycle.base_order, cancelling_sums(every, indices + own_indices))
 
 
 @lru_cache(maxsize=256)
@@ -117,15 +134,15 @@ def added_rotor_loads(
 
 def rotor_wrench(rotor: Rotor, speed: float) -> NDArray[np.complex128]:
     """Coefficient of order |n| of one rotor's wrench, shape (6,) (L1)."""
-    return np.asarray(_rotor_wrenches((rotor,), speed)[0])
+    return np.array(_wrenches((rotor,), speed)[0], dtype=complex)
 
 
-def _rotor_wrenches(rotors: Sequence[Rotor], speed: float) -> NDArray[np.complex128]:
-    """Of each rotor, shape (rotors, 6)."""
-    wrenches = []
+def _wrenches(rotors: Sequence[Rotor], speed: float) -> list[_Parts]:
+    """Of each rotor the six parts."""
+    wrenches: list[_Parts] = []
     for rotor in rotors:
         shaft = rotor.shaft
         forward = shaft.ratio > 0.0
         force = (shaft.ratio * speed) ** 2 * (rotor.unbalance if forward else rotor.unbalance.conjugate())
         wrenches.append(plane_parts(force * (-1j if forward else 1j), force, rotor.x, shaft))
-    return np.array(wrenches, dtype=complex)
+    return wrenches

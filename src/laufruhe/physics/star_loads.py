@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.numerics.spectrum import Spectrum, as_order
-from laufruhe.numerics.turns import as_turn, cis, star_sum
+from laufruhe.numerics.turns import as_turn, cis, star_orders
 from laufruhe.physics.mechanism import Direction, Effect
 from laufruhe.physics.wrench import ROLL, plane_wrench
 
@@ -19,28 +19,41 @@ from laufruhe.physics.wrench import ROLL, plane_wrench
 def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]) -> Spectrum:
     """(coefficients of one cylinder) x (phase and weight of each), summed over the star, shape (n, 6) (L6)."""
     cycle = engine.cycle
-    alike: dict[Hashable, list[tuple[SliderCrank, Effect]]] = defaultdict(list)
-    for part in engine.slider_cranks:
+    alike: dict[Hashable, list[tuple[int, Effect]]] = defaultdict(list)
+    for k, part in enumerate(engine.slider_cranks):
         for effect in effects(part):
-            alike[effect.direction, effect.shape, part.shaft.ratio].append((part, effect))
-    total = Spectrum(cycle.base_order, np.zeros((1, 6), dtype=complex))
-    for members in alike.values():
-        first, effect = members[0]
-        series = effect.series()
-        weights = np.array([own.size * square_of(part, speed) * _weight(part, own.direction) for part, own in members])
-        star = star_sum(weights, [part.star_turn for part, _ in members], np.arange(len(series)))
-        load = series[:, None] * star
-        ratio = first.shaft.ratio
-        # a crank that runs backwards turns its phasors backwards: Re c e^{-ix} = Re conj(c) e^{ix}
-        total = total + spread(load if ratio > 0.0 else load.conj(), order_index(cycle, abs(ratio)), cycle)
-    return total
+            alike[effect.direction, effect.shape, part.shaft.ratio].append((k, effect))
+    loads = [_load_of_alike(engine, speed, members) for members in alike.values()]
+    total = np.zeros((max(map(len, loads), default=1), 6), dtype=complex)
+    for load in loads:
+        total[: len(load)] += load
+    return Spectrum(cycle.base_order, total)
 
 
-def spread(load: NDArray[np.complex128], step: int, cycle: Cycle) -> Spectrum:
+def _load_of_alike(engine: Engine, speed: float, members: Sequence[tuple[int, Effect]]) -> NDArray[np.complex128]:
+    """Of effects alike of cylinders by their numbers, by the orders of the cycle."""
+    first = engine.slider_cranks[members[0][0]]
+    series = members[0][1].series()
+    weights = np.empty((len(members), 6))
+    for row, (k, own) in zip(weights, members, strict=True):
+        part = engine.slider_cranks[k]
+        row[:] = _weight(part, own.direction)
+        row *= own.size * square_of(part, speed)
+    turns = tuple([engine.slider_cranks[k].star_turn for k, _ in members])
+    load = star_orders(weights, turns, len(series))
+    load *= series[:, None]
+    ratio = first.shaft.ratio
+    # a crank that runs backwards turns its phasors backwards: Re c e^{-ix} = Re conj(c) e^{ix}
+    return spread(load if ratio > 0.0 else load.conj(), order_index(engine.cycle, abs(ratio)))
+
+
+def spread(load: NDArray[np.complex128], step: int) -> NDArray[np.complex128]:
     """A load by order of its own crank angle, shape (n, d), in orders of the cycle, `step` to one of its own."""
+    if step == 1:
+        return load
     out = np.zeros(((len(load) - 1) * step + 1, load.shape[1]), dtype=complex)
     out[::step] = load
-    return Spectrum(cycle.base_order, out)
+    return out
 
 
 @lru_cache(maxsize=1024)

@@ -151,8 +151,8 @@ class Measure:
 
     def shares(self, points: Sequence[OperatingPoint]) -> Array:
         """Weight of every operating point, shape (points,); zero where it does not count, one in all."""
-        weights = np.array([p.weight if self.counts_point(p) else 0.0 for p in points])
-        return np.asarray(weights / weights.sum())
+        weights = [p.weight if self.counts_point(p) else 0.0 for p in points]
+        return np.array(weights) / (sum(weights) or math.nan)
 
     def counted(self, orders: Sequence[float] | Array) -> NDArray[np.bool_]:
         """Which orders of crank speed count, shape of `orders`."""
@@ -281,7 +281,7 @@ def load_rows(
         return Rows(measure.norm, np.zeros((1, 1)), Grid(np.ones(1), 1))
     count = len(bends[0])
     # of one block no copy is needed
-    rows, shares = (own[0] if len(own) == 1 else np.concatenate(own) for own in (blocks, weights))
+    rows, shares = (blocks[0], weights[0]) if len(blocks) == 1 else (np.concatenate(blocks), np.concatenate(weights))
     return Rows(measure.norm, rows, Grid(shares, samples + count, count, len(blocks)))
 
 
