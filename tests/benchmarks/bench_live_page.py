@@ -181,8 +181,8 @@ def main() -> None:
         "twelve cylinders, four mounts, two points": twelve,
     }
     drags, rows = [], []
-    with tempfile.TemporaryDirectory() as name, launched() as browser, watched(browser) as (page, refused):
-        folder, version = Path(name), browser.version
+    with tempfile.TemporaryDirectory() as name, launched() as browser, watched(browser) as seen:
+        page, folder, version = seen.page, Path(name), browser.version
         for told, make in scenes.items():
             problem = make()
             work, processor = frames(page, report(problem, folder))
@@ -190,7 +190,7 @@ def main() -> None:
             rows.append(_row(f"live page, {told}", updates(page, "[data-decision]", "[data-measure=objective]")))
             if python:
                 rows.append(_row(f"Dash, {told}", in_dash(python, problem, page, folder)))
-        assert refused == []
+        assert seen.refused == []
     publish(OUT, TEXT.format(
         drags="\n".join(drags), rows="\n".join(rows), moves=MOVES, updates=UPDATES, frame=FRAME,
         load=os.getloadavg()[0],

@@ -63,13 +63,14 @@ def measured(name: str, control: str, folder: Path) -> np.ndarray:
     assert server.stdout is not None
     address = server.stdout.readline().partition(": ")[2].strip()
     try:
-        with launched() as browser, watched(browser, viewport={"width": 1400, "height": 1000}) as (page, refused):
+        with launched() as browser, watched(browser, viewport={"width": 1400, "height": 1000}) as seen:
+            page = seen.page
             page.goto(address)
             page.locator('#optimum[data-stage="settled"]').wait_for(timeout=PATIENCE)
             asked = {"control": control, "moves": MOVES, "spacing": SPACING}
             page.evaluate(SLIDE, {**asked, "moves": 10})
             found = page.evaluate(SLIDE, asked)
-            assert not refused
+            assert not seen.refused
     finally:
         server.terminate()
         server.wait()

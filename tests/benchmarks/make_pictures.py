@@ -54,7 +54,8 @@ def live_page() -> None:
             folder,
         ]
         subprocess.run(words, check=True)
-        with chromium.launched() as browser, chromium.watched(browser, **VIEW) as (page, _):
+        with chromium.launched() as browser, chromium.watched(browser, **VIEW) as seen:
+            page = seen.page
             page.goto((Path(folder) / "report.html").as_uri())
             page.locator("[data-decision]").first.wait_for()
             page.locator("#live").evaluate("live => live.scrollIntoView()")

@@ -6,6 +6,7 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from importlib.resources import files
 from urllib.parse import urlsplit
 
@@ -19,6 +20,20 @@ MISSING = f"no Chromium on this machine: apt-get install chromium, or its path i
 INNER = {"file", "data", "blob", "about"}
 LOOPBACK = "127.0.0.1"
 GRAVE = {"serious", "critical"}
+SCREEN = {"width": 1280, "height": 720}
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A page, the addresses that it was refused, and the errors that its scripts raised."""
+
+    page: Page
+    refused: list[str] = field(default_factory=list)
+    errors: list[str] = field(default_factory=list)
+
+    def forget(self) -> None:
+        self.refused.clear()
+        self.errors.clear()
 
 
 def executable() -> str | None:
@@ -45,29 +60,33 @@ def foreign(address: str) -> bool:
 
 
 @contextmanager
-def watched(browser: Browser, **options: object) -> Iterator[tuple[Page, list[str]]]:
-    """A page that reaches files and 127.0.0.1 only, and the addresses that it was refused."""
-    refused: list[str] = []
+def watched(browser: Browser, **options: object) -> Iterator[Watched]:
+    """A page that reaches files and 127.0.0.1 only."""
+    context = browser.new_context(**{"service_workers": "block", "viewport": SCREEN, **options})  # type: ignore[arg-type]
+    seen = Watched(context.new_page())
 
     def refuse(route: Route) -> None:
-        refused.append(route.request.url)
+        seen.refused.append(route.request.url)
         route.abort()
 
     def close(route: WebSocketRoute) -> None:
-        refused.append(route.url)
+        seen.refused.append(route.url)
         route.close()
 
-    context = browser.new_context(service_workers="block", **options)  # type: ignore[arg-type]
     context.route(foreign, refuse)
     context.route_web_socket(foreign, close)
-    yield context.new_page(), refused
+    seen.page.on("pageerror", lambda error: seen.errors.append(str(error)))
+    yield seen
     context.close()
 
 
 def violations(page: Page) -> list[dict[str, object]]:
     """What axe finds wrong on the page as it is shown now."""
-    page.evaluate(files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8"))
-    return page.evaluate("() => axe.run().then(found => found.violations)")  # type: ignore[no-any-return]
+    if not page.evaluate("() => 'axe' in window"):
+        page.evaluate(files("axe_playwright_python").joinpath("axe.min.js").read_text(encoding="utf-8"))
+    # of what is well one example will do
+    asked = "() => axe.run({ resultTypes: ['violations'] }).then(found => found.violations)"
+    return page.evaluate(asked)  # type: ignore[no-any-return]
 
 
 def serious(page: Page) -> list[str]:

@@ -1,5 +1,5 @@
-"""A page of a headless Chromium. Playwright's loop runs as long as its browser does, and other tests have loops of
-their own: so a browser lives for a module, not for all of them."""
+"""A page of a headless Chromium. A browser lives for the tests of this folder: Playwright's loop runs as long as its
+browser does, and other tests have loops of their own. A page lives for a module, for each is a process of its own."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from browser import chromium
+from browser.chromium import Watched
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="package")
 def browser() -> Iterator[Browser]:
     if chromium.executable() is None:
         pytest.skip(chromium.MISSING)
@@ -19,19 +20,32 @@ def browser() -> Iterator[Browser]:
         yield started
 
 
-@pytest.fixture
-def reached(browser: Browser) -> Iterator[tuple[Page, list[str]]]:
-    """A page, and the addresses that it asked for and was refused."""
-    with chromium.watched(browser) as both:
-        yield both
+@pytest.fixture(scope="module")
+def opened(browser: Browser) -> Iterator[Watched]:
+    with chromium.watched(browser) as seen:
+        yield seen
 
 
 @pytest.fixture
-def page(reached: tuple[Page, list[str]]) -> Iterator[Page]:
-    """A page that fails its test if it asks for anything but files and 127.0.0.1, or raises an error of its own."""
-    shown, refused = reached
-    errors: list[str] = []
-    shown.on("pageerror", lambda error: errors.append(str(error)))
-    yield shown
-    assert refused == []
-    assert errors == []
+def reached(opened: Watched) -> Iterator[Watched]:
+    """A page, and the addresses that it asked for and was refused; of a size and colours that no test left behind."""
+    opened.page.set_viewport_size(chromium.SCREEN)
+    opened.page.emulate_media(media="null", color_scheme="null")
+    yield opened
+    opened.forget()
+
+
+@pytest.fixture
+def still(reached: Watched) -> Iterator[Page]:
+    """What the last test left open; fails its test if it asks for anything but files and 127.0.0.1, or raises an error
+    of its own."""
+    yield reached.page
+    assert reached.refused == []
+    assert reached.errors == []
+
+
+@pytest.fixture
+def page(still: Page) -> Page:
+    """An empty page, watched alike."""
+    still.goto("about:blank")
+    return still

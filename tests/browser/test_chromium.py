@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Page
 
 from browser import chromium
-from browser.chromium import foreign, serious
+from browser.chromium import Watched, foreign, serious
 
 pytestmark = pytest.mark.slow
 GREY = '<html lang="en"><title>t</title><main><h1 style="color: #aaa; background: #fff">faint</h1></main>'
@@ -37,8 +37,8 @@ def address() -> object:
         thread.join()
 
 
-def test_only_files_and_this_machine_are_reached(reached: tuple[Page, list[str]], address: str, tmp_path: Path) -> None:
-    page, refused = reached
+def test_only_files_and_this_machine_are_reached(reached: Watched, address: str, tmp_path: Path) -> None:
+    page, refused = reached.page, reached.refused
     path = tmp_path / "page.html"
     asks = 'new WebSocket("ws://192.0.2.1/b"); fetch("http://192.0.2.2/c").catch(() => 0)'
     path.write_text(f'<img src="https://example.org/a.png"><script>{asks}</script>')

@@ -168,6 +168,7 @@ def test_a_link_is_the_design(solved: Page) -> None:
     # the same page with another link
     other.goto(link.partition("#")[0] + "#d=right.unbalance=0")
     expect(other.locator("[data-measure=objective]")).not_to_have_text(shown)
+    other.close()
 
 
 @pytest.mark.parametrize("wrong", ["#d=", "#d=left.unbalance=NaN", "#d=left.unbalance=1e9", "#d=%E0%A4%A", "#s3"])

@@ -8,7 +8,7 @@ import pytest
 from playwright.sync_api import Page
 
 from browser import pages
-from browser.chromium import serious
+from browser.chromium import Watched, serious
 
 pytestmark = pytest.mark.slow
 
@@ -30,11 +30,18 @@ COLOURS = """selector => {
 }"""
 
 
-@pytest.fixture(params=pages.MAKERS)
-def shown(request: pytest.FixtureRequest, page: Page) -> Page:
+@pytest.fixture(params=pages.MAKERS, scope="module")
+def loaded(request: pytest.FixtureRequest, opened: Watched) -> str:
     """A page of every kind that commands make."""
-    page.goto(pages.made(request.param).as_uri())
-    return page
+    opened.page.goto(pages.made(request.param).as_uri())
+    return opened.page.url
+
+
+@pytest.fixture
+def shown(loaded: str, still: Page) -> Page:
+    if still.url != loaded:
+        still.goto(loaded)
+    return still
 
 
 def test_reports_have_no_serious_finding(shown: Page) -> None:
@@ -86,7 +93,7 @@ def test_wide_tables_lie_on_paper_of_their_own(page: Page, tmp_path: Path) -> No
 @pytest.mark.parametrize("name", pages.SITE)
 def test_the_documentation_has_no_serious_finding(name: str, page: Page) -> None:
     pytest.importorskip("furo", reason="the tools of the documentation are not installed")
+    page.goto((pages.site() / f"{name}.html").as_uri())
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
-        page.goto((pages.site() / f"{name}.html").as_uri())
         assert serious(page) == [], scheme
