@@ -84,8 +84,7 @@ def automatic(problem: Problem, tolerance: float, scale: Scale | None = None) ->
     if not problem.load_terms or any(measure.channel.is_checked for measure in problem.measures):
         # nothing tells what run-ups lose with an order
         return problem.at(replace(problem.fidelity, tolerance=tolerance))
-    chosen = choose(problem, tolerance) if scale is None else chosen_by(scale, tolerance)
-    return problem.at(chosen.fidelity)
+    return problem.at(chosen_by(scale or Scale.of(problem), tolerance).fidelity)
 
 
 def ladder(scale: Scale) -> list[tuple[str, Problem]]:

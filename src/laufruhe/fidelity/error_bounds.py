@@ -15,7 +15,6 @@ from functools import cached_property
 import numpy as np
 
 from laufruhe.machine import Engine
-from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
@@ -23,7 +22,7 @@ from laufruhe.physics.runs import missed_share
 from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
-from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
 REFERENCE_SAMPLES = 5760
@@ -101,16 +100,14 @@ class Scale:
         for term in self.terms:
             pairs = zip(signals(term.measure, ours), signals(term.measure, theirs), strict=True)
             left_out = [x + y.each(np.negative) for x, y in pairs]
-            total += term.weight * term.measure.norm.above(left_out, self._shares(term))
+            # the weight of every operating point, zero where it does not count
+            shares = term.measure.shares([loads.point for loads in self.best.loads])
+            total += term.weight * term.measure.norm.above(left_out, shares)
         return total
 
     def missed(self, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
         """What the samples of an evaluation miss of the objective at most (F7, F8)."""
         return sum(term.weight * missed(term.measure, evaluation, finest) for term in self.terms)
-
-    def _shares(self, term: Term) -> Array:
-        """Weight of every operating point in a term, zero where it does not count."""
-        return term.measure.shares([loads.point for loads in self.best.loads])
 
     @cached_property
     def doubted(self) -> float:

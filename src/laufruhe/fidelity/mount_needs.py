@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -84,7 +85,8 @@ def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
         ("moments of inertia of the block", {"block": replace(block, inertia=inertia)}),
     ]
     if any(spring.loss_factor or any(spring.damping) or spring.lag for _, spring in every_spring(mounts)):
-        firm = tuple(mount.each(_undamped) for mount in mounts)
+        undamped = partial(replace, loss_factor=0.0, damping=(0.0, 0.0, 0.0), lag=0.0)
+        firm = tuple(mount.each(undamped) for mount in mounts)
         parts.append(("loss and damping of the mounts", {"mounts": firm}))
     for name, changed in parts:
         yield name, replace(problem, engine=replace(problem.engine, **changed))
@@ -93,10 +95,6 @@ def _of_the_block(problem: Problem) -> Iterator[tuple[str, Problem]]:
 def _turned_stiffer(spring: Mount) -> Mount:
     x, y, z = spring.stiffness
     return replace(spring, stiffness=(MORE * x, y, z / MORE))
-
-
-def _undamped(spring: Mount) -> Mount:
-    return replace(spring, loss_factor=0.0, damping=(0.0, 0.0, 0.0), lag=0.0)
 
 
 def _modes_of_the_sag(problem: Problem) -> list[LeftOut]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import Annotated, Any, Literal
 
@@ -84,7 +84,7 @@ def opened(
 
     def realise(candidate: Candidate) -> Problem:
         try:
-            return _without(assemble(_with(engine, count, candidate), candidate.without_gas), candidate.left_out)
+            return without_shafts(assemble(_with(engine, count, candidate), candidate.without_gas), candidate.left_out)
         except Refused as refusal:
             # a design that a search proposes, and nothing that the file says
             raise ModelError(str(refusal)) from refusal
@@ -301,7 +301,7 @@ def _with(engine: EngineTable, count: int, candidate: Candidate) -> EngineTable:
     return _closed(engine, count, candidate.bank_angle, candidate.split_pin, throws=throws, firing_order=order)
 
 
-def _without(problem: Problem, shafts: Sequence[str]) -> Problem:
+def without_shafts(problem: Problem, shafts: Collection[str]) -> Problem:
     """The problem without some shafts: their rotors and what decides on them."""
     if not shafts:
         return problem

@@ -177,10 +177,7 @@ def _curves(collected: _Collected, result: Result) -> tuple[Curve, ...]:
     """Forces on mounts and bearings, and what the block feels."""
     forces = [(places.title, places.channel) for places in places_of(result) if places.channel.feels_unbalances]
     block = [(name.capitalize(), CHANNELS[name]) for name in ON_BLOCK]
-    found = []
-    for title, channel in (*forces, *block):
-        found.append(Curve(title, collected.signal(Measure(channel))))
-    return tuple(found)
+    return tuple(Curve(title, collected.signal(Measure(channel))) for title, channel in (*forces, *block))
 
 
 def _slider(domain: Domain, problem: Problem) -> Slider:

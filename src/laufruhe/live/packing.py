@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import base64
 import zlib
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from laufruhe.live.signals import Bends, PointSignal, Signal, Waves
 from laufruhe.units import readable
 
 
@@ -42,37 +42,12 @@ def with_unit(unit: str) -> dict[str, Any]:
     return {"unit": unit, "shown": name, "factor": factor}
 
 
-def packed(signal: Signal, block: Block) -> dict[str, Any]:
-    """A signal whose numbers stand in the block."""
-    return {
-        "name": signal.name,
-        "places": signal.places,
-        "base": signal.base,
-        "samples": signal.samples,
-        "adds": signal.adds,
-        **with_unit(signal.unit),
-        "points": [_point(point, block) for point in signal.points],
-    }
-
-
-def _point(point: PointSignal, block: Block) -> dict[str, Any]:
-    return {
-        "share": point.share,
-        "series": _waves(point.series, block),
-        "bends": None if point.bends is None else _bends(point.bends, block),
-        "slope": _waves(point.slope, block),
-        "bent": [{"column": column, **_bends(bends, block)} for column, bends in point.bent],
-    }
-
-
-def _bends(bends: Bends, block: Block) -> dict[str, Any]:
-    return {
-        "smooth": _waves(bends.smooth, block),
-        "corners": block.add(bends.corners),
-        "pieces": block.add(bends.pieces),
-        "at": block.add(bends.at),
-    }
-
-
-def _waves(waves: Waves, block: Block) -> dict[str, Any]:
-    return {"orders": block.add(waves.orders), "coefficients": block.add(waves.coefficients)}
+def packed(part: Any, block: Block) -> Any:
+    """A part of a signal, field by field; its numbers stand in the block."""
+    if isinstance(part, np.ndarray):
+        return block.add(part)
+    if isinstance(part, tuple):
+        return [packed(one, block) for one in part]
+    if not is_dataclass(part):
+        return part
+    return {field.name: packed(getattr(part, field.name), block) for field in fields(part)}

@@ -168,39 +168,24 @@ class LiveModel:
     def _packed(self) -> tuple[list[dict[str, Any]], str]:
         """Signals, and the numbers that they point to."""
         block = Block()
-        return [packed(signal, block) for signal in self.signals], block.text()
+        return [{**packed(signal, block), **with_unit(signal.unit)} for signal in self.signals], block.text()
 
     def as_json(self) -> str:
         """What `show` of the page takes; safe inside an HTML element."""
         signals, data = self._packed
+        as_they_are = ("name", "title", "file", "points", "turns", "sliders", "curves", "proved", "save")
         plain = {
             "version": VERSION,
-            "name": self.name,
-            "title": self.title,
-            "file": self.file,
-            "points": self.points,
-            "turns": self.turns,
-            "sliders": [asdict(slider) for slider in self.sliders],
+            **{key: getattr(self, key) for key in as_they_are},
             "signals": signals,
-            "curves": [asdict(curve) for curve in self.curves],
-            "measures": [_measure(measure) for measure in self.measures],
-            "designs": {design.name: _design(design) for design in self.designs},
+            "measures": [{**asdict(one), "value": _told(one.value), **with_unit(one.unit)} for one in self.measures],
+            "designs": {one.name: {"x": one.x, "measured": [*map(_told, one.measured)]} for one in self.designs},
             "objective": {"name": self.objective, **with_unit(self.unit)},
-            "proved": asdict(self.proved) if self.proved else None,
             "unmoved": [{"name": name, "why": why} for name, why in self.unmoved],
             "whyNot": self.why_not,
-            "save": asdict(self.save),
             "data": data,
         }
-        return json.dumps(plain, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
-
-
-def _measure(shown: Shown) -> dict[str, Any]:
-    return {**asdict(shown), "value": _told(shown.value), **with_unit(shown.unit)}
-
-
-def _design(design: Design) -> dict[str, Any]:
-    return {"x": design.x, "measured": [_told(value) for value in design.measured]}
+        return json.dumps(plain, ensure_ascii=False, allow_nan=False, default=asdict).replace("<", "\\u003c")
 
 
 def _told(value: float | None) -> float | None:

@@ -37,9 +37,14 @@ CURVES = (
 PRINTED = ("weights", "reach", "assembly", "ranks", "robust", "torque", "torsion", "load_cases", "run_up")
 """Sections of the report whose tables are files as they are printed, and how many each may have."""
 MOST_PRINTED = 8
-PRINTED_SHEETS = tuple(
-    f"table-{name.replace('_', '-')}{f'-{k}' if k > 1 else ''}" for name in PRINTED for k in range(1, MOST_PRINTED + 1)
-)
+
+
+def printed_sheet(name: str, k: int) -> str:
+    """Name of the file of the k-th table of a section."""
+    return f"table-{name.replace('_', '-')}{f'-{k}' if k > 1 else ''}"
+
+
+PRINTED_SHEETS = tuple(printed_sheet(name, k) for name in PRINTED for k in range(1, MOST_PRINTED + 1))
 
 
 def rows_of(count: int, most: int) -> tuple[list[range], int]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 
@@ -20,17 +19,15 @@ from laufruhe.present.numbers import RPM
 from laufruhe.present.torsion import facts_of, is_twisted, speed_range, speeds_between, torque_over_speed
 from laufruhe.problem.curves import STEPS
 from laufruhe.report.part_curves import PART_CURVES
-from laufruhe.report.sheet import Sheet
+from laufruhe.report.sheet import Sheet, Sheets
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.tolerances.result import SHARES
 
 TURN = math.tau * np.arange(STEPS) / STEPS
 
 
-def _torque(result: Result) -> Sheet | None:
+def _torque(result: Result) -> Sheet:
     """Torque part by part, the work that it stores and the speed that it makes, of every design and point."""
-    if not (asks_torque(result) and has_loads(result)):
-        return None
     points, fidelity = result.problem.points, result.problem.fidelity
     angles = result.final.engine.cycle.angle * np.arange(STEPS) / STEPS
     found = [
@@ -62,10 +59,8 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, angles: 
     return columns
 
 
-def _twist_response(result: Result) -> Sheet | None:
+def _twist_response(result: Result) -> Sheet:
     """Half of the peak to peak torque in every section of the crankshaft, over its speed."""
-    if not is_twisted(result):
-        return None
     speeds = speeds_between(result.final, *speed_range(result))
     head, columns = ["speed [rpm]"], [RPM * speeds]
     for name, design in result.designs.items():
@@ -75,10 +70,8 @@ def _twist_response(result: Result) -> Sheet | None:
     return Sheet(head, np.column_stack(columns).tolist())
 
 
-def _twist_modes(result: Result) -> Sheet | None:
+def _twist_modes(result: Result) -> Sheet:
     """Swing of every disc in every natural mode of the crankshaft."""
-    if not is_twisted(result):
-        return None
     rows = []
     for name, design in result.designs.items():
         modes = facts_of(design, *speed_range(result)).modes
@@ -91,24 +84,19 @@ def _twist_modes(result: Result) -> Sheet | None:
     return Sheet(["design", "mode", "natural frequency [Hz]", "disc", "swing"], rows)
 
 
-def _critical_speeds(result: Result) -> Sheet | None:
+def _critical_speeds(result: Result) -> Sheet:
     """Where orders meet natural modes of the crankshaft: all of them."""
-    if not is_twisted(result):
-        return None
     rows = [
         [name, RPM * each.speed, each.order, each.mode, each.vector_sum, each.is_main,
          math.nan if each.torque is None else each.torque]
         for name, design in result.designs.items()
         for each in facts_of(design, *speed_range(result)).criticals
     ]  # fmt: skip
-    head = ["design", "speed [rpm]", "order", "mode", "vector sum", "main order", "torque [N m]"]
-    return Sheet(head, rows) if rows else None
+    return Sheet(["design", "speed [rpm]", "order", "mode", "vector sum", "main order", "torque [N m]"], rows)
 
 
-def _uneven_firing(result: Result) -> Sheet | None:
+def _uneven_firing(result: Result) -> Sheet:
     """What deviations from even firing buy, and what no design with them goes under."""
-    if not has_ranking(result) or not ranking_of(result).trade:
-        return None
     unit = objective_unit(result) or "-"
     rows = [
         [math.degrees(one.allowed), math.degrees(one.deviation), one.value, one.lower_bound]
@@ -117,7 +105,7 @@ def _uneven_firing(result: Result) -> Sheet | None:
     return Sheet(["allowed deviation [deg]", "deviation [deg]", f"objective [{unit}]", f"not under [{unit}]"], rows)
 
 
-def _shares(result: Result) -> Sheet | None:
+def _shares(result: Result) -> Sheet:
     """Share of engines built, or of assemblies, that stay below a value."""
     unit, columns = objective_unit(result) or "-", dict[str, list[float]]()
     if result.robust is not None:
@@ -126,10 +114,10 @@ def _shares(result: Result) -> Sheet | None:
     if result.assembly is not None:
         columns["assemblies at random"] = list(result.assembly.quantiles)
     rows = [[100.0 * share, *values] for share, *values in zip(SHARES, *columns.values(), strict=True)]
-    return Sheet(["below [%]", *(f"{name} [{unit}]" for name in columns)], rows) if columns else None
+    return Sheet(["below [%]", *(f"{name} [{unit}]" for name in columns)], rows)
 
 
-def _indicator(result: Result) -> Sheet | None:
+def _indicator(result: Result) -> Sheet:
     """Pressure in every chamber on both sides of pistons, and what drives the rods, of the final design."""
     parts, rows, named = result.final.engine.slider_cranks, [], dict[str, None]()
     found = [
@@ -147,10 +135,10 @@ def _indicator(result: Result) -> Sheet | None:
         rows += [[point, part, *row] for row in columns.tolist()]
     head = ["point", "cylinder", "angle from its dead centre [deg]", "part of the stroke", "force of the chambers [N]",
             "force that accelerates the rod [N]", *(f"pressure in {name} [Pa]" for name in named)]  # fmt: skip
-    return Sheet(head, rows) if rows else None
+    return Sheet(head, rows)
 
 
-def _chambers(result: Result) -> Sheet | None:
+def _chambers(result: Result) -> Sheet:
     """Volume, pressure and torque of every chamber of every rotor, of the final design."""
     rows = []
     for point in result.problem.points:
@@ -163,18 +151,17 @@ def _chambers(result: Result) -> Sheet | None:
                 rows += [[point.name, part.name, k + 1, *row] for row in values]
     head = ["point", "rotor", "chamber", "angle [deg]", "volume over the least [m^3]",
             "pressure over the crankcase [Pa]", "torque [N m]"]  # fmt: skip
-    return Sheet(head, rows) if rows else None
+    return Sheet(head, rows)
 
 
-CURVES: dict[str, Callable[[Result], Sheet | None]] = {
-    "torque": _torque,
-    "indicator": _indicator,
-    "chambers": _chambers,
-    "twist-response": _twist_response,
-    "twist-modes": _twist_modes,
-    "critical-speeds": _critical_speeds,
-    "uneven-firing": _uneven_firing,
-    "shares": _shares,
+CURVES: Sheets = {
+    "torque": (lambda result: asks_torque(result) and has_loads(result), _torque),
+    "indicator": (points_with_chambers, _indicator),
+    "chambers": (lambda result: rotors_of(result.final.engine), _chambers),
+    "twist-response": (is_twisted, _twist_response),
+    "twist-modes": (is_twisted, _twist_modes),
+    "critical-speeds": (is_twisted, _critical_speeds),
+    "uneven-firing": (has_ranking, _uneven_firing),
+    "shares": (lambda result: result.robust or result.assembly, _shares),
     **PART_CURVES,
 }
-"""By the name of the file."""

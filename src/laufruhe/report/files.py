@@ -15,13 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from laufruhe.errors import InputError, refused
+from laufruhe.numerics.locks import held
 from laufruhe.present.pictures import CURVES, PICTURES, PRINTED_SHEETS, SHEETS
-
-try:
-    import fcntl
-except ImportError:
-    # a system without locks: what a killed run leaves behind stays there
-    fcntl = None  # type: ignore[assignment]
 
 RESULT = "result.json"
 REPORT = "report.md"
@@ -73,7 +68,7 @@ class Set:
         if not self.folder.parent.is_dir():
             return self.checked()
         # not while another run swaps the folder
-        with _held(self.folder.parent):
+        with held(self.folder.parent):
             return self.checked()
 
     def checked(self) -> frozenset[str]:
@@ -123,7 +118,7 @@ def staged(wanted: Set) -> Iterator[Path]:
             with suppress(FileNotFoundError):
                 shutil.copymode(wanted.folder, stage)
         yield stage
-        with _held(wanted.folder.parent):
+        with held(wanted.folder.parent):
             made = wanted.checked()
             if wanted.adds:
                 for name in made - {entry.name for entry in stage.iterdir()}:
@@ -195,16 +190,16 @@ def _stage_for(place: Path) -> Iterator[Path]:
     with ExitStack() as undone:
         undone.callback(_remove_empty, missing)
         place.parent.mkdir(parents=True, exist_ok=True)
-        with _held(place.parent):
+        with held(place.parent):
             for left in place.parent.glob(f"{mark}*"):
-                with _held(left, wait=False) as ours:
+                with held(left, wait=False) as ours:
                     if ours:
                         _swept(left, place)
             stage = place.parent / f"{mark}{secrets.token_hex(4)}"
             stage.mkdir()
             undone.callback(_swept, stage, place)
             _note(stage, "", None)
-            undone.enter_context(_held(stage))
+            undone.enter_context(held(stage))
         yield stage
 
 
@@ -260,28 +255,6 @@ def _put(stage: Path, folder: Path) -> None:
     folder.rename(aside)
     stage.rename(folder)
     aside.rename(stage)
-
-
-@contextmanager
-def _held(folder: Path, wait: bool = True) -> Iterator[bool]:
-    """Keep a folder to this process; whether it could, which without waiting it may not."""
-    if fcntl is None:
-        yield wait
-        return
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        yield _locked(handle, wait)
-    finally:
-        os.close(handle)
-
-
-def _locked(handle: int, wait: bool) -> bool:
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except OSError:
-        # another process has it, or the file system has no locks
-        return wait
-    return True
 
 
 def _remove_empty(folders: list[Path]) -> None:

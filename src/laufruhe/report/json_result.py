@@ -41,11 +41,7 @@ def as_json(result: Result, series: bool = False) -> str:
 def as_dict(result: Result, series: bool = False) -> Record:
     """The contract as plain Python values; with loads over the cycle where `series` are wanted."""
     problem = result.problem
-    points = [
-        {**_of(point, "name speed weight"), **_by_place(result, k), "shaking": _shaking(result.final.loads[k].wrench),
-         "torque": asdict(torque_facts(result.final.engine, point, problem.fidelity))}
-        for k, point in enumerate(problem.points)
-    ]  # fmt: skip
+    points = [_point(result, k) for k in range(len(problem.points))]
     # one operating point stands at the top already
     places = {"mounts": None} | {places.key: None for places in places_of(result)}
     own = ("name", "speed", "weight", "torque", *((*places, "shaking") if len(points) > 1 else ()))
@@ -64,7 +60,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         },
         "constraints": _constraints(result),
         **{key: _all_points(result, [point[key] for point in points]) for key in places},
-        "shaking": _largest([point["shaking"] for point in points]),
+        "shaking": max((point["shaking"] for point in points), key=_hardness),
         "points": [{key: point[key] for key in own} for point in points],
         **(_on_mounts(result) if is_elastic(result) else {}),
         **({"torsion": _torsion(result)} if is_twisted(result) else {}),
@@ -133,9 +129,16 @@ def _constraints(result: Result) -> list[Record]:
     ]
 
 
-def _by_place(result: Result, k: int) -> Record:
-    """Mounts, main bearings and crank pins at one operating point; mounts are always there."""
-    return {"mounts": []} | {places.key: _places(result, k, places.channel) for places in places_of(result)}
+def _point(result: Result, k: int) -> Record:
+    """One operating point; mounts are always there."""
+    point, final = result.problem.points[k], result.final
+    return {
+        **_of(point, "name speed weight"),
+        "mounts": [],
+        **{places.key: _places(result, k, places.channel) for places in places_of(result)},
+        "shaking": _shaking(final.loads[k].wrench),
+        "torque": asdict(torque_facts(final.engine, point, result.problem.fidelity)),
+    }
 
 
 def _places(result: Result, k: int, channel: LoadChannel) -> list[Record]:
@@ -211,9 +214,9 @@ def _largest_orders(lists: list[list[dict[str, float]]]) -> list[dict[str, float
     return [{"order": order, "amplitude": found[order]} for order in sorted(found)]
 
 
-def _largest(shaking: list[Record]) -> Record:
-    """Shaking loads of the operating point with the largest force or, without any, moment."""
-    return max(shaking, key=lambda s: (max(s["force"], default=0.0), max(s["moment"], default=0.0)))
+def _hardness(shaking: Record) -> tuple[float, float]:
+    """Largest force of an operating point and, without any, moment."""
+    return max(shaking["force"], default=0.0), max(shaking["moment"], default=0.0)
 
 
 def _modes(design: Evaluation) -> Record:
@@ -251,25 +254,19 @@ def _torsion(result: Result) -> Record:
 
 
 def _on_mounts(result: Result) -> Record:
-    """Of a block on elastic mounts."""
-    cases = {"load_cases": _load_cases(result)} if result.final.engine.load_cases else {}
-    return {"modes": _modes(result.final), **cases, **({"run_up": _runs(result)} if runs_up(result) else {})}
-
-
-def _load_cases(result: Result) -> Record:
-    """Travel of every mount, and the force on it, in the axes of C2, under each load that is held."""
-    mounting = mounting_in(result.final.engine)
-    cases = {case.name: settled(mounting, case) for case in result.final.engine.load_cases}
-    return {name: _of(found, "motion travel force on_stops") for name, found in cases.items()}
+    """Of a block on elastic mounts; travel of every mount, and the force on it, under each load held (C2)."""
+    mounting, told = mounting_in(result.final.engine), "motion travel force on_stops"
+    cases = {case.name: _of(settled(mounting, case), told) for case in result.final.engine.load_cases}
+    found = {"modes": _modes(result.final), **({"load_cases": cases} if cases else {})}
+    return {**found, **({"run_up": _runs(result)} if runs_up(result) else {})}
 
 
 def _runs(result: Result) -> Record:
     """The most on any mount, and the largest roll, from rest to a speed and back; null on an endless resonance."""
     run = run_of(result)
-    shown = zip(("up", "down"), shown_runs(result, result.final), strict=True)
     most = {
-        f"{way}": {"time": getattr(run, way), **_of(found, "force=worst_force travel=worst_travel twist=worst_twist")}
-        for way, found in shown
+        way: {"time": getattr(run, way), **_of(found, "force=worst_force travel=worst_travel twist=worst_twist")}
+        for way, found in zip(("up", "down"), shown_runs(result, result.final), strict=True)
     }
     return {"up_to": run.speed, "point": run_point(result).name, **most}
 
@@ -279,14 +276,9 @@ def _phasing(result: Result) -> Record:
     if result.phasing is None:
         return {}
     points = [_of(p, "allowed deviation value lower_bound throws kkt_residual") for p in result.phasing.trade]
-    return {
-        "ranking": [{"rank": k, **_star(star)} for k, star in enumerate(result.phasing.ranking, 1)],
-        "phasing": {
-            **_of(result.phasing, "designs looked_at method even_value"),
-            "trade": points,
-            "why": why_star(result),
-        },
-    }
+    found = {**_of(result.phasing, "designs looked_at method even_value"), "trade": points, "why": why_star(result)}
+    return {"ranking": [{"rank": k, **_star(star)} for k, star in enumerate(result.phasing.ranking, 1)],
+            "phasing": found}  # fmt: skip
 
 
 def _star(star: RankedStar) -> Record:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -14,19 +14,19 @@ from laufruhe.present.measures import BEARINGS, as_crank_turns, bearing_paths, h
 from laufruhe.present.mounting import critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import RPM
 from laufruhe.present.twins import KINDS, is_twin, parts_of
-from laufruhe.report.sheet import Cells, Sheet
+from laufruhe.report.sheet import Cells, Sheet, Sheets
 from laufruhe.solvers.result import Result
 
 DIRECTIONS = 180
 """In which wear is told."""
 
 
-def _willans(result: Result) -> Sheet | None:
+def _willans(result: Result) -> Sheet:
     """Readings of friction tests, the line through them, what is asked of it, and the friction that it tells."""
     rows = [row for test in result.problem.friction for row in _of_test(test)]
     head = ["point", "what", "brake mean pressure [Pa]", "speed [rpm]", "fuel, as measured", "drag [Pa]",
             "least squares, as measured", "standard deviation [Pa]"]  # fmt: skip
-    return Sheet(head, rows) if rows else None
+    return Sheet(head, rows)
 
 
 def _of_test(test: FrictionTest) -> Iterator[Cells]:
@@ -41,10 +41,8 @@ def _of_test(test: FrictionTest) -> Iterator[Cells]:
     yield [test.at, "friction", *told, line if test.is_motored else 0.0, friction.deviation]
 
 
-def _on_crank(result: Result) -> Sheet | None:
+def _on_crank(result: Result) -> Sheet:
     """Forces on main bearings along and across the crank as it turns, of every design and point (B4)."""
-    if not has_bearings(result):
-        return None
     names, rows, heads = BEARINGS.channel.places(result.final.engine), [], []
     designs = loaded(result)
     for k, point in enumerate(result.problem.points):
@@ -61,10 +59,8 @@ def _on_crank(result: Result) -> Sheet | None:
     return Sheet(["point", "angle [deg]", *heads], rows)
 
 
-def _wear(result: Result) -> Sheet | None:
+def _wear(result: Result) -> Sheet:
     """Load that every direction of each main bearing takes over a cycle, over that of the most loaded (B10)."""
-    if not has_bearings(result):
-        return None
     names, angles = BEARINGS.channel.places(result.final.engine), math.tau * np.arange(DIRECTIONS) / DIRECTIONS
     rows = []
     for name, design in loaded(result).items():
@@ -75,10 +71,8 @@ def _wear(result: Result) -> Sheet | None:
     return Sheet(head, rows)
 
 
-def _turning(result: Result) -> Sheet | None:
+def _turning(result: Result) -> Sheet:
     """Forward and backward parts of force and couple of a twin, of every design and point."""
-    if not is_twin(result):
-        return None
     rows = [
         [name, point.name, kind, order, abs(forward), math.degrees(cmath.phase(forward)), abs(backward),
          math.degrees(cmath.phase(backward)), KINDS[kind][1]]
@@ -91,10 +85,8 @@ def _turning(result: Result) -> Sheet | None:
     return Sheet(head, rows)
 
 
-def _mount_criticals(result: Result) -> Sheet | None:
+def _mount_criticals(result: Result) -> Sheet:
     """Where the orders that load a block most meet its natural frequencies on its mounts."""
-    if not is_elastic(result):
-        return None
     rows = []
     for name, design in loaded(result).items():
         facts = facts_of(design)
@@ -104,14 +96,13 @@ def _mount_criticals(result: Result) -> Sheet | None:
                 for order in facts.orders
             ]
     head = ["design", "mode", "name", "natural frequency [Hz]", "excited", "order", "critical speed [rpm]"]
-    return Sheet(head, rows) if rows else None
+    return Sheet(head, rows)
 
 
-PART_CURVES: dict[str, Callable[[Result], Sheet | None]] = {
-    "willans": _willans,
-    "bearings-on-crank": _on_crank,
-    "wear": _wear,
-    "turning-parts": _turning,
-    "mount-critical-speeds": _mount_criticals,
+PART_CURVES: Sheets = {
+    "willans": (lambda result: result.problem.friction, _willans),
+    "bearings-on-crank": (has_bearings, _on_crank),
+    "wear": (has_bearings, _wear),
+    "turning-parts": (is_twin, _turning),
+    "mount-critical-speeds": (is_elastic, _mount_criticals),
 }
-"""By the name of the file."""

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from laufruhe.problem.curves import Fields
+from laufruhe.solvers.result import Result
 
 Cells: TypeAlias = list[Any]
 
@@ -23,3 +24,7 @@ class Sheet:
         """Of labelled fields."""
         head, rows = found.table()
         return cls(head, list(rows))
+
+
+Sheets: TypeAlias = Mapping[str, tuple[Callable[[Result], object], Callable[[Result], Sheet]]]
+"""By the names of their files: whether a result may have a sheet, and the sheet, which is none without rows."""

@@ -5,18 +5,19 @@ from __future__ import annotations
 import csv
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import astuple, fields
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
 from typing import Any
 
-from laufruhe.physics.run_up import RunUp
+import numpy as np
+
 from laufruhe.present.measures import has_loads, has_ranking, limits_of, loaded, places_of, ranking_of
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.present.numbers import DEGREE, RPM
-from laufruhe.present.pictures import MOST_PRINTED, PRINTED, SHEETS
+from laufruhe.present.pictures import MOST_PRINTED, PRINTED, printed_sheet
 from laufruhe.present.run_up import runs_up, shown_runs
 from laufruhe.present.speed_curves import speeds_of, transmissibility_of
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
@@ -24,7 +25,7 @@ from laufruhe.problem.evaluation import measured
 from laufruhe.report import files
 from laufruhe.report.curves import CURVES
 from laufruhe.report.sections import SECTIONS
-from laufruhe.report.sheet import Sheet
+from laufruhe.report.sheet import Sheet, Sheets
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result
 
 MOST_ROWS = 20 * STEPS
@@ -33,8 +34,8 @@ _WHENEVER = datetime(2000, 1, 1, tzinfo=UTC)
 
 def sheets_of(result: Result) -> dict[str, Sheet]:
     """All sheets that a result fills, by name: SI, but for degrees and rpm where their heads say so."""
-    found = {name: sheet for name, of in _SHEETS.items() if (sheet := of(result)) is not None}
-    return found | _printed(result)
+    made = {name: of(result) for name, (applies, of) in _SHEETS.items() if applies(result)}
+    return {name: sheet for name, sheet in made.items() if sheet.rows} | _printed(result)
 
 
 def _printed(result: Result) -> dict[str, Sheet]:
@@ -47,7 +48,7 @@ def _printed(result: Result) -> dict[str, Sheet]:
             for k, grid in enumerate(grids, 1):
                 rows = [[_number(cell) for cell in row] for row in grid.rows]
                 head = [f"{grid.title}: {grid.head[0]}", *grid.head[1:]]
-                found[f"table-{name.replace('_', '-')}{f'-{k}' if k > 1 else ''}"] = Sheet(head, rows)
+                found[printed_sheet(name, k)] = Sheet(head, rows)
     return found
 
 
@@ -58,17 +59,12 @@ def _number(cell: str) -> str | float:
         return cell
 
 
-def _decisions(result: Result) -> Sheet | None:
-    names = [field.name for field in fields(DecisionValue)]
-    return Sheet(names, [list(astuple(one)) for one in result.decisions]) if result.decisions else None
+def _values(found: Sequence[DecisionValue | LimitValue]) -> Sheet:
+    """All fields of some values."""
+    return Sheet([field.name for one in found[:1] for field in fields(one)], [list(astuple(one)) for one in found])
 
 
-def _limits(result: Result) -> Sheet | None:
-    names, found = [field.name for field in fields(LimitValue)], limits_of(result)
-    return Sheet(names, [list(astuple(one)) for one in found]) if found else None
-
-
-def _measures(result: Result) -> Sheet | None:
+def _measures(result: Result) -> Sheet:
     """Mean, maximum and RMS of every place, before and after."""
     rows = [
         [places.title, point.name, design, name, each.mean, each.max, each.rms, places.channel.unit]
@@ -79,28 +75,15 @@ def _measures(result: Result) -> Sheet | None:
             places.channel.places(found.engine), measured(found, k, places.channel), strict=True
         )
     ]  # fmt: skip
-    head = ["quantity", "point", "design", "place", "mean", "maximum", "rms", "unit"]
-    return Sheet(head, rows) if rows else None
+    return Sheet(["quantity", "point", "design", "place", "mean", "maximum", "rms", "unit"], rows)
 
 
-def _forces(result: Result) -> Sheet | None:
-    if not has_loads(result):
-        return None
+def _forces(result: Result) -> Sheet:
     steps = max(min(STEPS, MOST_ROWS // len(result.problem.points)), 36)
     return Sheet.of(forces_of(loaded(result), steps))
 
 
-def _orders(result: Result) -> Sheet | None:
-    return Sheet.of(orders_of(loaded(result))) if has_loads(result) else None
-
-
-def _modes(result: Result) -> Sheet | None:
-    return Sheet.of(modes_of(result.designs)) if is_elastic(result) else None
-
-
-def _transmissibility(result: Result) -> Sheet | None:
-    if not is_elastic(result):
-        return None
+def _transmissibility(result: Result) -> Sheet:
     speeds, orders = speeds_of(result), facts_of(result.final).orders
     columns = [
         (f"{design}, {point.name}: order {orders[k]:g}", curve.tolist())
@@ -109,17 +92,15 @@ def _transmissibility(result: Result) -> Sheet | None:
         for k, curve in transmissibility_of(found, point, speeds, orders)
     ]
     rows = zip((RPM * speeds).tolist(), *(values for _, values in columns), strict=True)
-    return Sheet(["speed [rpm]", *(head for head, _ in columns)], [list(row) for row in rows]) if columns else None
+    return Sheet(["speed [rpm]", *(head for head, _ in columns)], [list(row) for row in rows] if columns else [])
 
 
-def _run_up(result: Result) -> Sheet | None:
-    if not runs_up(result) or not has_loads(result):
-        return None
+def _run_up(result: Result) -> Sheet:
     rows = [
         [design, way, RPM * speed, force, travel, DEGREE * twist]
         for design, found in loaded(result).items()
         for way, run in zip(("run-up", "shut-down"), shown_runs(result, found), strict=True)
-        for speed, force, travel, twist in _columns(run)
+        for speed, force, travel, twist in np.column_stack([run.speeds, run.force, run.travel, run.twist]).tolist()
     ]
     return Sheet(
         ["design", "way", "speed [rpm]", "largest mount force [N]", "largest mount travel [m]", "largest roll [deg]"],
@@ -127,13 +108,7 @@ def _run_up(result: Result) -> Sheet | None:
     )
 
 
-def _columns(run: RunUp) -> Iterator[tuple[float, ...]]:
-    return zip(*(part.tolist() for part in (run.speeds, run.force, run.travel, run.twist)), strict=True)
-
-
-def _rankings(result: Result) -> Sheet | None:
-    if not has_ranking(result):
-        return None
+def _rankings(result: Result) -> Sheet:
     rows = [
         [rank, star.value, star.lower_bound, star.proven, _degrees(star.throws), ", ".join(star.shafts),
          "-".join(map(str, order.order)), _degrees(order.intervals), order.neighbours, order.roll_content,
@@ -154,10 +129,18 @@ def _degrees(angles: Iterable[float]) -> str:
     return " ".join(f"{math.degrees(angle):.6g}" for angle in angles)
 
 
-_FILLED = (
-    _decisions, _limits, _measures, _forces, _orders, _modes, _transmissibility, _run_up, _rankings,
-)  # fmt: skip
-_SHEETS = dict(zip(SHEETS, _FILLED, strict=True)) | CURVES
+_SHEETS: Sheets = {
+    "decisions": (lambda result: result.decisions, lambda result: _values(result.decisions)),
+    "limits": (limits_of, lambda result: _values(limits_of(result))),
+    "measures": (places_of, _measures),
+    "forces": (has_loads, _forces),
+    "orders": (has_loads, lambda result: Sheet.of(orders_of(loaded(result)))),
+    "modes": (is_elastic, lambda result: Sheet.of(modes_of(result.designs))),
+    "transmissibility": (is_elastic, _transmissibility),
+    "run-up": (lambda result: runs_up(result) and has_loads(result), _run_up),
+    "rankings": (has_ranking, _rankings),
+    **CURVES,
+}
 
 
 def write_tables(result: Result, folder: Path) -> None:
@@ -190,7 +173,9 @@ def write_book(sheets: Mapping[str, Sheet], path: Path) -> None:
             page.freeze_panes(1, 0)
             page.write_row(0, 0, [_text(head) for head in sheet.head])
             for k, row in enumerate(sheet.rows, 1):
-                page.write_row(k, 0, [_cell(cell) for cell in row])
+                page.write_row(
+                    k, 0, [_text(plain) if isinstance(plain := _plain(cell), str) else plain for cell in row]
+                )
 
 
 def _page_names(names: Iterable[str]) -> list[str]:
@@ -205,11 +190,6 @@ def _page_names(names: Iterable[str]) -> list[str]:
 
 def _plain(value: Any) -> Any:
     return "" if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _cell(value: Any) -> Any:
-    plain = _plain(value)
-    return _text(plain) if isinstance(plain, str) else plain
 
 
 def _text(text: str) -> str:

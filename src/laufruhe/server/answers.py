@@ -8,10 +8,10 @@ import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, wraps
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Concatenate, ParamSpec
 
 from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, SolverError, refused
 from laufruhe.files import edits
@@ -36,6 +36,8 @@ from laufruhe.solvers.conclusion import decision_values, limit_values
 from laufruhe.solvers.following import Followed
 from laufruhe.solvers.result import LimitValue, Result
 from laufruhe.units import readable
+
+P = ParamSpec("P")
 
 ROUNDING = 1e-5
 """Share of the objective that a program at few angles does not tell from nothing."""
@@ -67,39 +69,41 @@ def _asked_about(source: Source, asked: Asked, with_held: bool) -> tuple[dict[st
     return tables, load_tables(tables, Path(source.path))
 
 
-def _said(work: Callable[[], dict[str, Any]], source: Source) -> str:
+def _said(work: Callable[Concatenate[Source, P], dict[str, Any]]) -> Callable[Concatenate[Source, P], str]:
     """An answer as JSON, or the line that says why there is none."""
-    try:
-        found = work()
-    except InputError as error:
-        found = {"error": str(error)}
-    except ModelError as error:
-        found = {"error": str(InputError(source.path.name, (Complaint.of(error, error.where or "problem"),)))}
-    except (SolverError, LaufruheError) as error:
-        found = {"error": f"{source.path.name}: {error}"}
-    except MemoryError:
-        found = {"error": f"{source.path.name}: needs more memory than there is"}
-    return told.as_text(found)
+
+    @wraps(work)
+    def said(source: Source, /, *args: P.args, **kwargs: P.kwargs) -> str:
+        try:
+            found = work(source, *args, **kwargs)
+        except InputError as error:
+            found = {"error": str(error)}
+        except ModelError as error:
+            found = {"error": str(InputError(source.path.name, (Complaint.of(error, error.where or "problem"),)))}
+        except (SolverError, LaufruheError) as error:
+            found = {"error": f"{source.path.name}: {error}"}
+        except MemoryError:
+            found = {"error": f"{source.path.name}: needs more memory than there is"}
+        return told.as_text(found)
+
+    return said
 
 
-def begin(source: Source) -> str:
+@_said
+def begin(source: Source) -> dict[str, Any]:
     """What the page may change, and what the problem is."""
-
-    def found() -> dict[str, Any]:
-        problem = load_tables(source.tables, source.path)
-        ranks = [rank.terms[0].measure.name for rank in problem.ranks]
-        return {
-            "title": problem.title,
-            "file": source.path.name,
-            "summary": problem.summary,
-            "controls": as_json(controls_of(source.tables, problem)),
-            "objectives": ranks,
-            "crank": _opens(source),
-            "openCrank": problem.phasing is not None,
-            "doubts": [str(doubt) for doubt in problem.doubts],
-        }
-
-    return _said(found, source)
+    problem = load_tables(source.tables, source.path)
+    ranks = [rank.terms[0].measure.name for rank in problem.ranks]
+    return {
+        "title": problem.title,
+        "file": source.path.name,
+        "summary": problem.summary,
+        "controls": as_json(controls_of(source.tables, problem)),
+        "objectives": ranks,
+        "crank": _opens(source),
+        "openCrank": problem.phasing is not None,
+        "doubts": [str(doubt) for doubt in problem.doubts],
+    }
 
 
 def _opens(source: Source) -> bool:
@@ -111,31 +115,28 @@ def _opens(source: Source) -> bool:
     return True
 
 
-def follow(source: Source, asked: Asked) -> str:
+@_said
+def follow(source: Source, asked: Asked) -> dict[str, Any]:
     """The optimum of what loads are affine in, all else as it stands, in milliseconds."""
-
-    def found() -> dict[str, Any]:
-        began, spent = time.perf_counter(), time.process_time()
-        tables, problem = _asked_about(source, asked, with_held=True)
-        scene = scene_of(problem, tables)
-        follows = scene.follower.at(problem.limits) if scene.follower else None
-        own: dict[str, Any] = {"key": scene.key, "stage": "following" if follows else "given"}
-        own["but"] = list(scene.simplified(bool(asked.held)))
-        if asked.has not in (scene.key, LATER):
-            own |= scene.drawn(follows)
-        if follows is None or follows.conflict:
-            standing = () if scene.given.resonance else limit_values(problem, scene.given)
-            own |= {"optimum": None, "limits": told.limits(standing, problem)}
-        if follows is None and scene.value is not None:
-            own["given"] = told.figures(scene.value, problem)
-        elif follows is not None and follows.conflict:
-            own["conflict"] = list(follows.conflict)
-        elif follows is not None:
-            own |= _followed(follows, problem, scene)
-        took = {"wall": time.perf_counter() - began, "processor": time.process_time() - spent}
-        return {**own, "seconds": took}
-
-    return _said(found, source)
+    began, spent = time.perf_counter(), time.process_time()
+    tables, problem = _asked_about(source, asked, with_held=True)
+    scene = scene_of(problem, tables)
+    follows = scene.follower.at(problem.limits) if scene.follower else None
+    own: dict[str, Any] = {"key": scene.key, "stage": "following" if follows else "given"}
+    own["but"] = list(scene.simplified(bool(asked.held)))
+    if asked.has not in (scene.key, LATER):
+        own |= scene.drawn(follows)
+    if follows is None or follows.conflict:
+        standing = () if scene.given.resonance else limit_values(problem, scene.given)
+        own |= {"optimum": None, "limits": told.limits(standing, problem)}
+    if follows is None and scene.value is not None:
+        own["given"] = told.figures(scene.value, problem)
+    elif follows is not None and follows.conflict:
+        own["conflict"] = list(follows.conflict)
+    elif follows is not None:
+        own |= _followed(follows, problem, scene)
+    took = {"wall": time.perf_counter() - began, "processor": time.process_time() - spent}
+    return {**own, "seconds": took}
 
 
 def _followed(found: Followed, problem: Problem, scene: Scene) -> dict[str, Any]:
@@ -159,58 +160,49 @@ def _standing(limit: Limit, value: float, price: float, found: Followed, scene: 
     return replace(given, value=math.nan, active=False, shadow_price=math.nan) if moves else given
 
 
-def measure(source: Source, asked: Asked) -> str:
+@_said
+def measure(source: Source, asked: Asked) -> dict[str, Any]:
     """The design that is shown by the exact model: objective and limits, those too that do not follow sliders."""
-
-    def found() -> dict[str, Any]:
-        tables, whole = _asked_about(source, asked, with_held=True)
-        problem = replace(scene_of(whole, tables).problem, limits=whole.limits)
-        values = decided(problem, asked.design)
-        evaluation = evaluate(problem, problem.design([values[decision.name] for decision in problem.decisions]))
-        limits = {limit.name: limit.value for limit in limit_values(problem, evaluation)}
-        return {"objective": objective_value(problem, evaluation) if problem.objective else None, "limits": limits}
-
-    return _said(found, source)
+    tables, whole = _asked_about(source, asked, with_held=True)
+    problem = replace(scene_of(whole, tables).problem, limits=whole.limits)
+    values = decided(problem, asked.design)
+    evaluation = evaluate(problem, problem.design([values[decision.name] for decision in problem.decisions]))
+    limits = {limit.name: limit.value for limit in limit_values(problem, evaluation)}
+    return {"objective": objective_value(problem, evaluation) if problem.objective else None, "limits": limits}
 
 
-def settle(source: Source, asked: Asked, seconds: float) -> str:
+@_said
+def settle(source: Source, asked: Asked, seconds: float) -> dict[str, Any]:
     """The whole problem, solved and proven as `laufruhe solve` does."""
-
-    def found() -> dict[str, Any]:
-        began = time.perf_counter()
-        tables, problem = _asked_about(source, asked, with_held=False)
-        try:
-            result = solve(replace(problem, sharply=True), time_limit=seconds)
-        except SolverError as error:
-            return {"error": f"{source.path.name}: {error}"}
-        _solved.clear()
-        _solved[_state(asked)] = result
-        return {**_settled(result, tables), "seconds": time.perf_counter() - began}
-
-    return _said(found, source)
+    began = time.perf_counter()
+    tables, problem = _asked_about(source, asked, with_held=False)
+    try:
+        result = solve(replace(problem, sharply=True), time_limit=seconds)
+    except SolverError as error:
+        return {"error": f"{source.path.name}: {error}"}
+    _solved.clear()
+    _solved[_state(asked)] = result
+    return {**_settled(result, tables), "seconds": time.perf_counter() - began}
 
 
 def _state(asked: Asked) -> str:
     return repr(asked.edits)
 
 
-def picture(source: Source, asked: Asked, k: int) -> str:
+@_said
+def picture(_: Source, asked: Asked, k: int) -> dict[str, Any]:
     """A picture of what was solved last, as its report has it; nothing where there is none any more."""
+    from laufruhe import plots
+    from laufruhe.plots.style import as_svg
 
-    def found() -> dict[str, Any]:
-        from laufruhe import plots
-        from laufruhe.plots.style import as_svg
-
-        result = _solved.get(_state(asked))
-        names = [] if result is None else plots.names(result)
-        if result is None or k >= len(names):
-            return {"done": True}
-        svg = as_svg(plots.figure(result, names[k]))
-        data = base64.b64encode(svg.encode()).decode()
-        caption = PICTURES[names[k]]
-        return {"name": names[k], "caption": caption, "image": f"data:image/svg+xml;base64,{data}", "of": len(names)}
-
-    return _said(found, source)
+    result = _solved.get(_state(asked))
+    names = [] if result is None else plots.names(result)
+    if result is None or k >= len(names):
+        return {"done": True}
+    svg = as_svg(plots.figure(result, names[k]))
+    data = base64.b64encode(svg.encode()).decode()
+    caption = PICTURES[names[k]]
+    return {"name": names[k], "caption": caption, "image": f"data:image/svg+xml;base64,{data}", "of": len(names)}
 
 
 def _settled(result: Result, tables: Mapping[str, Any]) -> dict[str, Any]:
@@ -251,39 +243,33 @@ def _front(source: Source, asked: Asked, across: str) -> Front:
     return found
 
 
-def front(source: Source, asked: Asked, across: str, k: int) -> str:
+@_said
+def front(source: Source, asked: Asked, across: str, k: int) -> dict[str, Any]:
     """A point of the front against another measure; nothing where there is none any more."""
-
-    def found() -> dict[str, Any]:
-        own = _front(source, asked, across)
-        most = next(islice(places(*own.ends()), k, None), None)
-        if most is None:
-            return {"done": True}
-        point = own.at(most)
-        if point.conflict:
-            return {"skipped": True}
-        problem, unit = own.problem, own.across.unit
-        (shown_unit, factor), (of_unit, of_factor) = readable(unit), readable(problem.objective_unit or "")
-        axes = {"across": [shown_unit, factor], "value": [of_unit, of_factor]}
-        shown = told.optimum(problem, point.values, point.value, point.bound, point.gap, "")
-        return {**shown, "across": point.standing[-1], "axes": axes, "acrossText": figure(point.standing[-1], unit)}
-
-    return _said(found, source)
+    own = _front(source, asked, across)
+    most = next(islice(places(*own.ends()), k, None), None)
+    if most is None:
+        return {"done": True}
+    point = own.at(most)
+    if point.conflict:
+        return {"skipped": True}
+    problem, unit = own.problem, own.across.unit
+    (shown_unit, factor), (of_unit, of_factor) = readable(unit), readable(problem.objective_unit or "")
+    axes = {"across": [shown_unit, factor], "value": [of_unit, of_factor]}
+    shown = told.optimum(problem, point.values, point.value, point.bound, point.gap, "")
+    return {**shown, "across": point.standing[-1], "axes": axes, "acrossText": figure(point.standing[-1], unit)}
 
 
-def save(source: Source, asked: Asked) -> str:
+@_said
+def save(source: Source, asked: Asked) -> dict[str, Any]:
     """The whole state as a problem file: what was changed and is held, and the design where what is open starts."""
-
-    def found() -> dict[str, Any]:
-        tables, problem = _asked_about(source, asked, with_held=True)
-        units = {e.name: e.unit for d in problem.decisions for e in decision_values(d, d.start)}
-        with in_file(source.path.name):
-            for name, value in asked.design.items():
-                if name in units:
-                    unit, factor = typed(units[name])
-                    text = f"{factor * value!r} {unit}".rstrip()
-                    tables = edits.with_value(tables, name, text if unit else factor * value)
-        load_tables(tables, source.path)
-        return {"toml": toml_text(tables), "file": f"{source.path.stem}-page.toml"}
-
-    return _said(found, source)
+    tables, problem = _asked_about(source, asked, with_held=True)
+    units = {e.name: e.unit for d in problem.decisions for e in decision_values(d, d.start)}
+    with in_file(source.path.name):
+        for name, value in asked.design.items():
+            if name in units:
+                unit, factor = typed(units[name])
+                text = f"{factor * value!r} {unit}".rstrip()
+                tables = edits.with_value(tables, name, text if unit else factor * value)
+    load_tables(tables, source.path)
+    return {"toml": toml_text(tables), "file": f"{source.path.stem}-page.toml"}

@@ -135,13 +135,9 @@ def _first(tables: Tables, _: str, value: Any) -> dict[str, Any]:
     return {**tables, "objective": [*order[:-1], last]}
 
 
-def _fix(tables: Tables, name: str, value: Any) -> dict[str, Any]:
-    return edits.fixed(tables, name, value)
-
-
 _WAYS: Mapping[str, Callable[[Tables, str, Any], dict[str, Any]]] = {
     "set": edits.with_value,
-    "fix": _fix,
+    "fix": edits.fixed,
     "star": _star,
     "open crank": _open_crank,
     "first": _first,

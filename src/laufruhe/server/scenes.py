@@ -10,7 +10,7 @@ from typing import Any
 
 from laufruhe.errors import ModelError
 from laufruhe.live import live_model
-from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
@@ -21,7 +21,7 @@ from laufruhe.server.front import partners
 from laufruhe.solvers import kinds_of
 from laufruhe.solvers.conclusion import decision_values, limit_values
 from laufruhe.solvers.following import Followed, Follower, can_follow
-from laufruhe.solvers.result import ObjectiveValue, Result, Status
+from laufruhe.solvers.result import LimitValue, ObjectiveValue, Result, Status
 
 _SIDES = ("max", "min", "outside")
 _KEPT = 6
@@ -66,7 +66,10 @@ class Scene:
             return bare
         entries = [e for d, v in zip(problem.decisions, found.values, strict=True) for e in decision_values(d, v)]
         unread = [limit for limit in problem.limits if not self._reads(limit)]
-        limits = limit_values(problem.changed(limits=tuple(unread)), self._at(found)) if unread else ()
+        limits: tuple[LimitValue, ...] = ()
+        if unread:
+            design = evaluate(problem, problem.design(found.values))
+            limits = limit_values(problem.changed(limits=tuple(unread)), design)
         return replace(
             bare,
             objective=ObjectiveValue.of(problem, found.value, self.value or 0.0),
@@ -78,9 +81,6 @@ class Scene:
     def _reads(self, limit: Limit) -> bool:
         """Whether a limit stands still, or is one that follows."""
         return limit in self.problem.load_limits or not limit.measure.channel.is_moved_by(kinds_of(self.problem))
-
-    def _at(self, found: Followed) -> Evaluation:
-        return evaluate(self.problem, self.problem.design(found.values))
 
     def simplified(self, is_held: bool) -> Iterator[str]:
         """What of the whole problem is left out while sliders move: a bound holds for the rest alone."""

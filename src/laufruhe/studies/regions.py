@@ -7,10 +7,9 @@ or belongs to something else does not fit its checksum, counts as not done, and 
 from __future__ import annotations
 
 import hashlib
-import os
 import struct
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -19,13 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import refused
+from laufruhe.numerics.locks import held
 from laufruhe.studies.part import Record, Template
-
-try:
-    import fcntl
-except ImportError:
-    # a system without locks: two runs of one study at once are not told from each other
-    fcntl = None  # type: ignore[assignment]
 
 VALUES, COLUMNS, DONE = "values", "columns", "done"
 MADE_BY = "laufruhe study"
@@ -145,26 +139,14 @@ def kept_to_one(root: Path) -> Iterator[None]:
     except ImportError:
         rule = "needs Zarr, which is not installed"
         raise refused("results", str(root), rule, "pip install 'laufruhe[cluster]'") from None
-    try:
-        root.mkdir(parents=True, exist_ok=True)
-        handle = os.open(root, os.O_RDONLY)
-    except OSError as error:
-        rule = f"cannot be written ({error.strerror})"
-        raise refused("results", str(root), rule, "name another place by --out") from None
-    try:
-        if fcntl is not None:
-            _lock(handle, root)
+    with ExitStack() as until_then:
+        try:
+            root.mkdir(parents=True, exist_ok=True)
+            ours = until_then.enter_context(held(root, wait=False))
+        except OSError as error:
+            rule = f"cannot be written ({error.strerror})"
+            raise refused("results", str(root), rule, "name another place by --out") from None
+        if ours is False:
+            rule = "is being written by another run"
+            raise refused("results", str(root), rule, "wait for it, or name another --out")
         yield
-    finally:
-        os.close(handle)
-
-
-def _lock(handle: int, root: Path) -> None:
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        rule = "is being written by another run"
-        raise refused("results", str(root), rule, "wait for it, or name another --out") from None
-    except OSError:
-        # a file system without locks
-        return

@@ -6,17 +6,17 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from laufruhe.errors import Complaint, InputError, ModelError, refused
 from laufruhe.files.complaints import beside, in_file, nearest
+from laufruhe.files.phasing import without_shafts
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.files.study_tables import CaseTable, changed
 from laufruhe.machine import Role
-from laufruhe.problem.decision import without_rotors
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.equal_power import at_equal_power
 
@@ -143,7 +143,4 @@ def with_shafts(problem: Problem, kept: Sequence[str]) -> Problem:
     unknown = set(kept) - set(shafts_of(problem))
     if unknown:
         raise ModelError(f"'{min(unknown)}' is no balancer shaft of this engine; name one that is")
-    rotors = tuple(r for r in problem.engine.rotors if r.role is not Role.BALANCER or r.shaft.name in kept)
-    gone = {rotor.name for rotor in problem.engine.rotors} - {rotor.name for rotor in rotors}
-    decisions = without_rotors(problem.decisions, gone)
-    return replace(problem, engine=replace(problem.engine, rotors=rotors), decisions=decisions)
+    return without_shafts(problem, set(shafts_of(problem)) - set(kept))

@@ -296,10 +296,8 @@ def coordinates(axes: Sequence[Axis], points: Sequence[Point]) -> dict[str, Any]
     for axis in axes:
         values = [point.changes[axis.quantity] for point in points]
         number = axis.by_value()
-        shown = [_label(value) for value in values] if axis.numbers is None else [number[value] for value in values]
+        # labels as a problem file has them
+        labels = [str(value).lower() if isinstance(value, bool) else str(value) for value in values]
+        shown = labels if axis.numbers is None else [number[value] for value in values]
         found[axis.quantity] = ("point", shown, {"units": axis.unit, "long_name": axis.name, "swept": 1})
     return found
-
-
-def _label(value: Any) -> str:
-    return str(value).lower() if isinstance(value, bool) else str(value)

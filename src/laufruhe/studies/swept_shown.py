@@ -81,17 +81,14 @@ def _row(row: xr.Dataset, columns: Sequence[str]) -> list[str]:
     proof, status = str(row["proof"].item()), str(row["status"].item())
     decided = proof != "as given"
     change = percent(best / given - 1.0) if decided and given and best == best else NOTHING
-    cells = [_cell(row[name].item()) for name in columns]
+    named = (row[name].item() for name in columns)
+    cells = [number(value) if isinstance(value, float) else str(value) for value in named]
     cells += [number(given), number(best) if decided else NOTHING, number(bound), change]
     if row.sizes["mount"]:
         cells.append(number(float(row["maximum"].max())))
     cells.append("as given" if not decided else _PROOFS[proof] if status in ("optimal", "feasible") else status)
     optimum = bool(row["optimum"].item()) if "optimum" in row.coords else False
     return [f"**{cell}**" for cell in cells] if optimum else cells
-
-
-def _cell(value: Any) -> str:
-    return number(value) if isinstance(value, float) else str(value)
 
 
 def over_sweep(data: xr.Dataset, told_apart: Sequence[str], words: str) -> p.Picture:
@@ -170,11 +167,12 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
     plain = alone | (np.zeros(count, dtype=bool) if once is None else once)
     given, best = data["objective_given"].values, data["objective"].values
     most = max(np.nanmax(given, initial=0.0), np.nanmax(best, initial=0.0))
-    marks: list[p.Mark] = []
+    marks: list[tuple[float, p.Mark]] = []
     for k in range(count):
         one = [(k + 0.0, best[k], "before" if plain[k] else "after")]
         pair = [(k - 0.2, given[k], "before"), (k + 0.2, best[k], "after")]
-        marks += [_bar(*bar, 0.5 if single.all() else 0.36, most) for bar in (one if single[k] else pair)]
+        width = 0.5 if single.all() else 0.36
+        marks += [(bar[0], _bar(*bar, width, most)) for bar in (one if single[k] else pair)]
     labels = ["\n".join(part for line in str(label).split("\n") for part in wrap(line, LETTERS)) for label in labels]
     widest = max(len(line) for label in labels for line in str(label).split("\n"))
     each = max(1.15, 0.2 + LETTER * widest)
@@ -183,7 +181,7 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
     ticks = [(float(k), str(label)) for k, label in enumerate(labels)]
     panels = [
         p.Panel(
-            [mark for mark in marks if row[0] - 0.5 < _place(mark) < row[-1] + 0.5],
+            [mark for place, mark in marks if row[0] - 0.5 < place < row[-1] + 0.5],
             p.Axis(ends=(row[0] - 0.6, row[0] + side - 0.4), ticks=ticks[row[0] : row[-1] + 1], grid=False),
             up,
         )
@@ -196,11 +194,6 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
     size = (max(p.WIDE, side * each), p.HIGH if len(rows) == 1 else 0.7 * p.HIGH)
     gap = 0.42 + 0.16 * lines
     return p.Picture(data.attrs["title"], words, panels, p.credit(data), size=size, gap=gap, legend=legend)
-
-
-def _place(mark: p.Mark) -> float:
-    """Of one bar, or of the words in its place."""
-    return float(mark.places[0] if isinstance(mark, p.Bars) else mark.x)
 
 
 def _bar(place: float, value: float, colour: str, width: float, most: float) -> p.Mark:

@@ -56,10 +56,8 @@ def said(found: Sequence[Verdict]) -> list[Text]:
     """What a source says, confirmed or not; nothing where it says nothing."""
     if not found:
         return []
-    rows = [[v.statement, v.paper, _ours(v), "yes" if v.agrees else "**no**", v.why] for v in found]
+    ours = [f"{v.ours:{'+' if '%' in v.unit else ''}.3g} {v.unit}" for v in found]
+    rows = [
+        [v.statement, v.paper, own, "yes" if v.agrees else "**no**", v.why] for v, own in zip(found, ours, strict=True)
+    ]
     return [Rows(["what was said of", "said", "here", "confirmed", "why"], rows)]
-
-
-def _ours(verdict: Verdict) -> str:
-    signed = "+" if "%" in verdict.unit else ""
-    return f"{verdict.ours:{signed}.3g} {verdict.unit}"

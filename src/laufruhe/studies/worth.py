@@ -106,7 +106,8 @@ def worths(data: xr.Dataset) -> tuple[Worth, ...]:
 
 def _worth(data: xr.Dataset, build: str) -> Worth:
     own, plain = _optimum(data, build), _optimum(data, _named(data, PLAIN)[0])
-    fewer = min(_optimum(data, rival) for rival in _fewer(data, build))
+    same, shafts = data["standing"].values != NEXT, data["shafts"].values
+    fewer = float(data["optimum"].values[same & (shafts < _shafts(data, build))].min())
     following = _named(data, NEXT)[0]
     further, beside = 1.0 - own / fewer, own / _optimum(data, following)
     if further < 0.0:
@@ -156,12 +157,6 @@ def _judged(data: xr.Dataset, build: str, against: str, says: str) -> tuple[bool
         return better, "its force lies under the other's lower bound"
     found = _worth(data, build)
     return found.worth == (says == "worth building"), f"W3: {found.why}"
-
-
-def _fewer(data: xr.Dataset, build: str) -> list[str]:
-    """Builds of the same engine with fewer shafts."""
-    same = data["standing"].values != NEXT
-    return [str(b) for b in data["build"].values[same & (data["shafts"].values < _shafts(data, build))]]
 
 
 def _named(data: xr.Dataset, standing: str) -> list[str]:

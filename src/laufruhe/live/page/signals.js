@@ -44,7 +44,7 @@ function decoded(signal, block) {
     series: wavesOf(block, point.series),
     slope: wavesOf(block, point.slope),
     bends: point.bends && bendsOf(block, point.bends),
-    bent: point.bent.map((bends) => ({ column: bends.column, ...bendsOf(block, bends) })),
+    bent: point.bent.map(([column, bends]) => ({ column, ...bendsOf(block, bends) })),
   }));
   const [, places, parts, columns] = points[0].slope.shape;
   return { ...signal, points, places: signal.places, count: places, parts, columns, grids: new Map() };

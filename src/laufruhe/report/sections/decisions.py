@@ -24,12 +24,8 @@ def _free(result: Result) -> str:
     """What of the optimum is not unique."""
     if not result.free:
         return ""
-    ends = (
-        f"{found.name} from {with_unit(found.low, found.unit)} to {with_unit(found.high, found.unit)}"
-        for found in result.free
-    )
-    share = f"{trimmed(100.0 * result.problem.tolerance, 1)} %"
-    found = ", ".join(ends)
+    ends = (f"{d.name} from {with_unit(d.low, d.unit)} to {with_unit(d.high, d.unit)}" for d in result.free)
+    share, found = f"{trimmed(100.0 * result.problem.tolerance, 1)} %", ", ".join(ends)
     return f"The optimum is not unique. As good within {share}, with other decisions to match, at least: {found}."
 
 

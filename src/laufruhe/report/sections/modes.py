@@ -17,11 +17,10 @@ def tables(result: Result) -> list[Grid]:
     """Modes before and after, and the mounts as they are now; none for rigid mounts."""
     if not is_elastic(result):
         return []
-    before = facts_of(result.initial)
-    if not changed(result):
-        return [_modes(before, "Natural modes"), _mounts(result, before)]
-    after = facts_of(result.final)
-    return [_modes(before, "Natural modes as given"), _modes(after, "Natural modes as decided"), _mounts(result, after)]
+    found = [facts_of(design) for design in result.designs.values()]
+    words = (" as given", " as decided") if changed(result) else ("",)
+    modes = [_modes(facts, f"Natural modes{which}") for facts, which in zip(found, words, strict=True)]
+    return [*modes, _mounts(result, found[-1])]
 
 
 def _modes(facts: MountingFacts, title: str) -> Grid:

@@ -29,9 +29,8 @@ def tables(result: Result) -> list[Grid]:
     if not has_loads(result):
         return []
     k, designs = hardest_point(result), load_designs(result)
-    series = [
-        column for pair in zip(*(_columns(design.loads[k]) for design in designs), strict=True) for column in pair
-    ]
+    pairs = zip(*(_columns(design.loads[k]) for design in designs), strict=True)
+    series = [column for pair in pairs for column in pair]
     length = max(len(column) for column in series)
     table = np.stack([padded(column, length) for column in series], axis=1)
     # a quantity has one scale, before and after

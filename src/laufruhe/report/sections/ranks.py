@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from laufruhe.present.numbers import DASH, figure, price_of, trimmed
 from laufruhe.report.grid import Grid
-from laufruhe.solvers.result import DecisionRange, RankValue, Result
+from laufruhe.solvers.result import RankValue, Result
 from laufruhe.units import readable
 
 HEAD = ("objective", "as given", "least", "proven not under", "proof", "in the design", "price")
@@ -42,17 +42,9 @@ def _ends(rank: RankValue, name: str) -> str:
     if found is None:
         return DASH
     unit, factor = readable(found.unit)
-    low, middle, high = (
-        trimmed(factor * _plain(value, rank), 3) for value in (found.low, 0.5 * (found.low + found.high), found.high)
-    )
-    return f"{low} to {high} {unit}".rstrip() if _is_open(found, rank) else f"{middle} {unit}".rstrip()
-
-
-def _is_open(found: DecisionRange, rank: RankValue) -> bool:
-    return any(found is each for each in rank.equal)
-
-
-def _plain(value: float, rank: RankValue) -> float:
-    """Zero for what is a rounding beside the largest decision."""
-    most = max((abs(each.high) for each in rank.designs), default=0.0)
-    return 0.0 if abs(value) <= 1e-3 * most else value
+    is_open = any(found is each for each in rank.equal)
+    # a rounding beside the largest decision is nothing
+    least = 1e-3 * max(abs(each.high) for each in rank.designs)
+    shown = (found.low, found.high) if is_open else (0.5 * (found.low + found.high),)
+    ends = (trimmed(0.0 if abs(value) <= least else factor * value, 3) for value in shown)
+    return f"{' to '.join(ends)} {unit}".rstrip()

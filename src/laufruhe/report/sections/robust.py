@@ -15,38 +15,21 @@ def tables(result: Result) -> list[Grid]:
     if found is None:
         return []
     worst = "worst case" if found.exact else "worst drawn"
-    head = (
-        "design",
-        "as drawn",
-        worst,
-        f"{100.0 * found.share:g} % of engines below",
-        f"{100.0 * CONFIDENCE:g} % sure",
-    )
+    below, sure = f"{100.0 * found.share:g} % of engines below", f"{100.0 * CONFIDENCE:g} % sure"
+    head = ("design", "as drawn", worst, below, sure)
     rows = [_design(design, unit) for design in (found.nominal, found.robust)]
-    rows.append(("price", *(percent(b / a - 1.0) if a else "-" for a, b in _pairs(found)), ""))
+    pairs = ((getattr(found.nominal, key), getattr(found.robust, key)) for key in ("drawing", "worst", "share"))
+    rows.append(("price", *(percent(b / a - 1.0) if a else "-" for a, b in pairs), ""))
     told = ("tolerance, dearest first", "is", "errors", "shadow price", "costs")
     own = [_tolerance(tolerance, unit) for tolerance in found.tolerances]
-    return [
-        Grid("Under tolerance", head, rows, note=_checked(found)),
-        Grid(
-            "Tolerances",
-            told,
-            own,
-            2,
-            note="Costs: shadow price times tolerance, an estimate of what removing the tolerance would save.",
-        ),
-    ]
+    note = "Costs: shadow price times tolerance, an estimate of what removing the tolerance would save."
+    return [Grid("Under tolerance", head, rows, note=_checked(found)), Grid("Tolerances", told, own, 2, note=note)]
 
 
 def _design(design: BuiltDesign, unit: str) -> tuple[str, ...]:
     low, high = (number(value, 5) for value in (design.low, design.high))
     values = (figure(value, unit, 5) for value in (design.drawing, design.worst, design.share))
     return (design.name, *values, f"{low} to {high}")
-
-
-def _pairs(found: RobustResult) -> list[tuple[float, float]]:
-    a, b = found.nominal, found.robust
-    return [(a.drawing, b.drawing), (a.worst, b.worst), (a.share, b.share)]
 
 
 def _tolerance(tolerance: PricedTolerance, unit: str) -> tuple[str, ...]:

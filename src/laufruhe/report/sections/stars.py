@@ -55,8 +55,7 @@ def _angles(star: RankedStar, decided: Container[str]) -> str:
     text = " ".join(_degrees(angle, 5) for angle in star.throws)
     named = (("bank", "bank angle", star.bank_angle), ("split", "split pin angle", star.split_pin))
     told = [f"{word} {_degrees(value)}" for word, name, value in named if value is not None and name in decided]
-    told = [name_of_crank(star.throws), *told]
-    extra = ", ".join(filter(None, told))
+    extra = ", ".join(filter(None, [name_of_crank(star.throws), *told]))
     return text + (f" ({extra})" if extra else "")
 
 

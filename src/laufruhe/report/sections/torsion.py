@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from laufruhe.physics.torsion import chain_of
 from laufruhe.present.measures import changed
 from laufruhe.present.numbers import DASH, RPM, number
 from laufruhe.present.torsion import TorsionFacts, barred_ranges, facts_of, is_twisted, speed_range
@@ -17,24 +18,15 @@ def tables(result: Result) -> list[Grid]:
         return []
     reach = speed_range(result)
     before, after = facts_of(result.initial, *reach), facts_of(result.final, *reach)
-    grids = [_modes(result, after)]
-    if changed(result):
-        return [*grids, _criticals(before, "as given"), _criticals(after, "as decided"), _barred(result)]
-    return [*grids, _criticals(after, "as given"), _barred(result)]
+    criticals = [_criticals(before, "as given"), *([_criticals(after, "as decided")] if changed(result) else [])]
+    return [_modes(result, after), *criticals, _barred(result)]
 
 
 def _modes(result: Result, facts: TorsionFacts) -> Grid:
-    chain = result.final.engine.torsion
-    names = [disc.name for disc in chain.discs] if chain is not None else []
+    names = [disc.name for disc in chain_of(result.final.engine).discs]
     shown = range(min(MOST_MODES, len(facts.modes.frequencies)))
-    rows = tuple(
-        (
-            f"{m + 1}",
-            number(float(facts.modes.frequencies[m])),
-            *(f"{swing:+.3f}" for swing in facts.modes.shapes[:, m]),
-        )
-        for m in shown
-    )
+    swings = [[f"{swing:+.3f}" for swing in shape] for shape in facts.modes.shapes.T]
+    rows = tuple((f"{m + 1}", number(float(facts.modes.frequencies[m])), *swings[m]) for m in shown)
     rest = len(facts.modes.frequencies) - len(shown)
     more = f" {rest} higher one(s) are in result.json." if rest else ""
     note = f"Undamped. Angle of every disc, the largest of each mode one.{more}"

@@ -53,7 +53,8 @@ class RandomDesigns(Sampled):
             problem = scenes.problem(Point(case))
             columns["objective"] = Column(problem.objective_unit or "", problem.objective_name)
             columns[WITHIN] = Column("1", "1 where a design keeps all limits")
-            columns |= {name: Column(unit, name) for name, unit in _names(problem).items()}
+            told = [one for d in problem.unbalances for one in decision_values(d, d.start, None)]
+            columns |= {one.name: Column(one.unit, one.name) for one in told}
         return columns
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
@@ -132,12 +133,6 @@ class RandomDesigns(Sampled):
         panel = p.Panel(marks, x, p.Axis("designs below [%]", (0.0, 100.0)))
         words = f"{data.sizes['draw']:,} designs a case, drawn even between the bounds; those within all limits."
         return p.Picture(data.attrs["title"], words, [panel], p.credit(data, f"Seed {data.attrs['seed']}. "))
-
-
-def _names(problem: Problem) -> dict[str, str]:
-    """Open numbers with their units, as results name them."""
-    told = [one for decision in problem.unbalances for one in decision_values(decision, decision.start, None)]
-    return {one.name: one.unit for one in told}
 
 
 def _kept(data: xr.Dataset, objective: Array, k: int) -> Array:

@@ -1,0 +1,38 @@
+"""Folders that one process keeps to itself while it writes there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+try:
+    import fcntl
+except ImportError:
+    # a system without locks: what a killed run leaves behind stays, and two runs at once are not told apart
+    fcntl = None  # type: ignore[assignment]
+
+
+@contextmanager
+def held(folder: Path, wait: bool = True) -> Iterator[bool | None]:
+    """Keep a folder to this process; False where another has it, which is not waited for, None where nothing tells."""
+    if fcntl is None:
+        yield None
+        return
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        yield _locked(handle, wait)
+    finally:
+        os.close(handle)
+
+
+def _locked(handle: int, wait: bool) -> bool | None:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except BlockingIOError:
+        return False
+    except OSError:
+        # a file system without locks
+        return None
+    return True
