@@ -121,11 +121,12 @@ class Division(Generic[P]):
 
 
 class Box(NamedTuple):
-    """Open numbers between bounds, and the side that is worth halving."""
+    """Open numbers between bounds, the side that is worth halving, and whether its halves are worth narrowing."""
 
     lower: Array
     upper: Array
     side: int
+    narrows: bool = True
 
 
 def halves(box: Box, at: float | None = None) -> tuple[tuple[Array, Array], tuple[Array, Array]]:

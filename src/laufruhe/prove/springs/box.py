@@ -28,6 +28,8 @@ from laufruhe.prove.springs.program import Stated, proposed
 NEAR, ROUGH = 0.9995, 0.97
 # rounds that the roots of a mean narrow each other in, and share of it under which one is left as it is
 ROUNDS, SMALL = 2, 0.03
+# share of a mean that is worth narrowing what hides it, and by which a root has to rise where nothing does
+LARGE, RISEN = 0.03, 1e-3
 # of what a box lacks, what is told too high of odd multiples and is worth halving it for
 WORTH = 0.25
 
@@ -143,16 +145,24 @@ class SpringBox:
         return found
 
     def _together_again(self, heads: Sequence[Head], known: Array) -> Array:
-        """What every root is at least with the others in what is left of the norm (E58)."""
-        least, units = known.copy(), np.array([head.unit for head in heads])
+        """What every root is at least with the others in what is left of the norm (E58).
+
+        Where no odd multiples hide the norm, a root that does not rise so tells that the others leave room for all.
+        """
+        least, units, hidden = known.copy(), np.array([head.unit for head in heads]), self.is_hidden(heads)
+        if len(heads) == 1 and not hidden:
+            return least
         for _ in range(ROUNDS):
             for k in range(len(heads)):
-                mean = self._mean(heads, least)
+                mean, before = self._mean(heads, least), least[k]
                 if mean.floor >= self.most:
                     return least
                 if _matter(mean.prices)[k] and not passed():
-                    least[k] = max(least[k], units[k] * self._together(heads, mean.prices, mean, k)[0])
-                    self._narrow(heads, heads[k], least)
+                    least[k] = max(before, units[k] * self._together(heads, mean.prices, mean, k)[0])
+                    if hidden:
+                        self._narrow(heads, heads[k], least)
+                    elif least[k] <= (1.0 + RISEN) * before:
+                        return least
         return least
 
     def _narrow(self, heads: Sequence[Head], head: Head, least: Array) -> None:
@@ -174,11 +184,11 @@ class SpringBox:
             self._taken[key] = [self._of_head(head) for head in heads]
         return mean_of(heads, self._taken[key], least, self.most, self.mounts.numbers)
 
-    def taken_off(self, heads: Sequence[Head]) -> float:
-        """Share of the mean that odd multiples of its orders may hide."""
+    def is_hidden(self, heads: Sequence[Head]) -> bool:
+        """Whether odd multiples of its orders may hide so much of the mean that narrowing them is worth it."""
         size = sum(head.share * head.unit for head in heads)
         mean = self._mean(heads, np.array([head.unit for head in heads]))
-        return 1.0 - (float(mean.prices.sum()) + mean.constant) / size
+        return float(mean.prices.sum()) + mean.constant < (1.0 - LARGE) * size
 
     def _of_head(self, head: Head) -> list[AtMost]:
         """What is felt of odd multiples at most, in the mean over mounts (E62)."""

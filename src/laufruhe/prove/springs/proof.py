@@ -1,9 +1,10 @@
-"""What boxes of mounts prove by the forces of their springs: halved, or narrowed first where modes count (E59)."""
+"""What boxes of mounts prove by the forces of their springs: narrowed as far as that pays, then halved (E59)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import NEARLY, Box, Divided, Halving, Parts, Waiting, divide, halves
+from laufruhe.prove.best_first import NEARLY, Box, Divided, Halving, Parts, Waiting, halves
 from laufruhe.prove.springs.open_mounts import is_lifted
 from laufruhe.prove.springs.program import Stated
 from laufruhe.prove.springs.search import SpringBoxes
@@ -22,13 +23,17 @@ LEVELS = (0.1, 0.05, 0.02, 0.01, 0.003, 0.0)
 MOST_RELAXED, AHEAD = 100, 3
 # the same where odd multiples hide a mean: whole boxes alone are worth it
 FIRST, FEW_RELAXED = (0.3, 0.2, 0.15), 45
+# of a design that is one of many, what is shown first, because the others have to come to it too
+OF_MANY = 0.04
 # of the largest, pulls of sides that are not narrowed; of what is to be shown, what a round of these has to bring
 LITTLE, PROGRESS = 0.1, 0.1
 # share of a side from its end in which a design of the relaxation leaves nothing to win there
 WON = 0.3
 
 
-def spring_bound(problem: Problem, value: float, room: float, near: Sequence[Value]) -> Divided:
+def spring_bound(
+    problem: Problem, value: float, room: float, near: Sequence[Value], of_many: bool = False
+) -> Divided:  # fmt: skip
     """Divide the bounds until no design is more than `room` better than `value`, or as often as is worth it.
 
     Parameters
@@ -39,21 +44,19 @@ def spring_bound(problem: Problem, value: float, room: float, near: Sequence[Val
         Difference that counts as none [SI].
     near
         Decisions of a design near which most boxes will be.
+    of_many
+        Whether the same will be asked of other problems, so that a bound that is nearly as good comes first.
     """
     if not is_bounded(problem) or not 0.0 < value < math.inf:
         return Divided(0.0, 0)
     try:
         boxes = SpringBoxes(problem, value, room, near)
-        most = boxes.most_boxes
-        if not most or not boxes.is_sampled_fully:
+        if not boxes.most_boxes or not boxes.is_sampled_fully:
             return Divided(0.0, 0)
-        if boxes.modes or boxes.takes_off:
-            return _by_levels(boxes, room)
-        found = divide(boxes, boxes.lower, boxes.upper, value, room, most)
+        return _by_levels(boxes, room, _ladder(boxes, of_many))
     except np.linalg.LinAlgError:
         # a middle on a resonance that nothing damps
         return Divided(0.0, 0)
-    return Divided(found.bound, found.boxes, (*boxes.places, *found.places) if found.places else ())
 
 
 def is_bounded(problem: Problem) -> bool:
@@ -62,31 +65,57 @@ def is_bounded(problem: Problem) -> bool:
     return on_mounts and not problem.mount_terms and is_lifted(problem)
 
 
-def _by_levels(boxes: SpringBoxes, room: float) -> Divided:
+@dataclass(frozen=True)
+class _Ladder:
+    """Shares of the value that are shown one after the other to be out of reach.
+
+    Attributes
+    ----------
+    look
+        With which the whole is looked at before all.
+    most
+        Relaxations.
+    """
+
+    shares: tuple[float, ...]
+    look: float
+    most: int
+
+
+def _ladder(boxes: SpringBoxes, of_many: bool) -> _Ladder:
+    """Straight for the value, but where a box tells little of it: where modes count, or odd multiples hide a mean."""
+    asked_for = boxes.problem.search.boxes
+    if boxes.modes:
+        return _Ladder(LEVELS, LEVELS[0], MOST_RELAXED if asked_for is None else asked_for)
+    if boxes.takes_off:
+        return _Ladder((*FIRST, *LEVELS), LEVELS[0], FEW_RELAXED if asked_for is None else asked_for)
+    shares = (OF_MANY, 0.0) if of_many else (0.0,)
+    return _Ladder(shares, shares[0], boxes.most_boxes)
+
+
+def _by_levels(boxes: SpringBoxes, room: float, ladder: _Ladder) -> Divided:
     """Show that no design is under a value, and then under one that is nearer to that of the best (E59)."""
-    asked_for, few = boxes.problem.search.boxes, not boxes.modes
-    most = (FEW_RELAXED if few else MOST_RELAXED) if asked_for is None else asked_for
-    first = boxes.under(_level(boxes, LEVELS[0], room))
+    first = boxes.under(_level(boxes, ladder.look, room))
     looked = first.look(boxes.lower, boxes.upper)
     bound, spent, places = looked[0], 1, tuple[Array, ...]()
-    for share in (*(FIRST if few else ()), *LEVELS):
-        shown = _level(boxes, share, room)
+    for share in ladder.shares:
+        shown, left = _level(boxes, share, room), ladder.most - spent
         if shown <= bound:
             continue
-        if AHEAD * spent > most or passed():
+        if (spent > 1 and AHEAD * spent > ladder.most) or passed():
             break
-        narrowing = _Narrowing(first if share == LEVELS[0] else boxes.under(shown), most - spent)
-        if share == LEVELS[0]:
+        narrowing = _Narrowing(first if share == ladder.look else boxes.under(shown), left)
+        if share == ladder.look:
             narrowing.looked = looked
-        found = narrowing.run(narrowing.looked_at(boxes.lower, boxes.upper), most - spent)
+        found = narrowing.run(narrowing.looked_at(boxes.lower, boxes.upper), left)
         spent += narrowing.spent
         bound = max(bound, found.bound)
         if found.bound < shown:
             places = found.places
             break
     count = len(boxes.problem.mount_decisions)
-    left = bound < boxes.enough
-    return Divided(bound, spent, tuple(place[:count] for place in (*boxes.places, *places)) if left else ())
+    kept = (*boxes.places, *places) if bound < boxes.enough else ()
+    return Divided(bound, spent, tuple(place[:count] for place in kept))
 
 
 def _level(boxes: SpringBoxes, share: float, room: float) -> float:
@@ -112,8 +141,8 @@ class _Narrowing(Halving):
         self._search, self._most, self.spent = search, most, 0
         self.looked: tuple[float, Array] | None = None
 
-    def looked_at(self, lower: Array, upper: Array) -> tuple[float, Box] | None:
-        """A box as small as it becomes, and its bound; None where it holds no better design."""
+    def looked_at(self, lower: Array, upper: Array, narrows: bool = True) -> tuple[float, Box] | None:
+        """A box as small as it becomes where it narrows, and its bound; None where it holds no better design."""
         before = best = -math.inf
         while True:
             kept = self._search.kept(lower, upper)
@@ -126,8 +155,10 @@ class _Narrowing(Halving):
             if best >= self.enough:
                 return None
             over = self.spent >= self._most or passed()
-            if over or not pull.any() or best - before < PROGRESS * (self.enough - before):
-                return best, Box(lower, upper, int(np.argmax(pull)))
+            if before > -math.inf:
+                narrows = best - before >= PROGRESS * (self.enough - before)
+            if over or not pull.any() or not narrows:
+                return best, Box(lower, upper, int(np.argmax(pull)), narrows)
             found, solved = narrowed(self._search, lower, upper, pull)
             self.spent += solved
             if found is None:
@@ -135,8 +166,8 @@ class _Narrowing(Halving):
             lower, upper = found
 
     def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
-        """Halves, each looked at by itself."""
-        return [self.looked_at(*half) for box in boxes for half in halves(box)]
+        """Halves, each looked at by itself, and narrowed where that paid for the whole."""
+        return [self.looked_at(*half, box.narrows) for box in boxes for half in halves(box)]
 
     def parts(self, taken: Sequence[Waiting[Box]]) -> Parts[Box]:
         """Halves; what counts are the relaxations."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.load_models.affine import AffineModel
-from laufruhe.numerics.arrays import Array, Indices
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure
@@ -37,8 +36,6 @@ WORK, MOST_BOXES = 6e7, 100
 EFFORT = 5
 # of what is to be shown, the share that small orders may take
 NEEDED = 0.3
-# share of a mean that is worth narrowing what hides it
-LARGE = 0.03
 # share of the bounds of unbalances that says what is large beside the best design
 WIDE = 0.3
 
@@ -58,8 +55,6 @@ class SpringBoxes:
     places
         Where the first relaxation stands.
     """
-
-    what = "boxes of mounts, by spring forces"
 
     def __init__(self, problem: Problem, value: float, room: float, near: Sequence[Value]) -> None:
         self.problem, self.value, self.enough = problem, value, value - NEARLY * room
@@ -155,12 +150,7 @@ class SpringBoxes:
             return False
         weight, each = self._terms[0]
         box = SpringBox(self, each, self._ends(weight), self.lower, self.upper)
-        return box.taken_off(self._heads[0]) > LARGE
-
-    @property
-    def at_once(self) -> int:
-        """Boxes of one round."""
-        return 2
+        return box.is_hidden(self._heads[0])
 
     @property
     def is_sampled_fully(self) -> bool:
@@ -175,22 +165,6 @@ class SpringBoxes:
         cost = sum((1 + self.columns.count + 2 * self._parts[k].products) ** EFFORT for k in parts)
         asked_for = self.problem.search.boxes
         return int(min(WORK / max(cost, 1), MOST_BOXES)) if asked_for is None else asked_for
-
-    def bounds(self, lower: Array, upper: Array) -> tuple[Array, Indices]:
-        """The better of both bounds; and the side worth halving."""
-        if self._plain is None:
-            known, sides = np.zeros(len(lower)), np.zeros(len(lower), dtype=np.intp)
-        else:
-            known, sides = self._plain.bounds(
-                *(side[:, : len(self.problem.mount_decisions)] for side in (lower, upper))
-            )
-        for k in np.flatnonzero(np.isfinite(known)):
-            if known[k] < self.enough:
-                kept = self.kept(lower[k], upper[k])
-                bound, pull = (math.inf, np.zeros(0)) if kept is None else self.relaxed(*kept)
-                known[k] = max(known[k], bound)
-                sides[k] = int(np.argmax(pull)) if pull.max(initial=0.0) > 0.0 else sides[k]
-        return known, sides
 
     def look(self, lower: Array, upper: Array) -> tuple[float, Array]:
         """The better of both bounds of one box, and the pull of its sides."""

@@ -59,17 +59,17 @@ def _by_boxes(problem: Problem, value: float, room: float, near: Sequence[Value]
     return Divided(max(few.bound, many.bound), few.boxes + many.boxes, many.places or few.places)
 
 
-def bounded_under(result: Result, value: float, enough: float = math.inf) -> Result:
+def bounded_under(result: Result, value: float, enough: float = math.inf, of_many: bool = False) -> Result:
     """A result with what boxes prove of its mounts, designs worse than a value known from elsewhere left out.
 
-    No more is proven than is enough.
+    No more is proven than is enough, and of the first of many what is worth proving of them all.
     """
     problem, certificate = result.problem, result.certificate
     if certificate is None or result.objective is None or divides(problem) or problem.phasing is not None:
         return result
     nothing = nothing_of(problem, result.final.engine)
     room = max(room_of(value, problem.tolerance, nothing), (value - min(enough, value)) / NEARLY)
-    found = spring_bound(problem, value, room, values_of(problem, result))
+    found = spring_bound(problem, value, room, values_of(problem, result), of_many)
     if found.bound <= certificate.lower_bound:
         return result
     text = f"{certificate.method}; bounds of mounts looked at in {found.boxes} box{'es' if found.boxes > 1 else ''}"

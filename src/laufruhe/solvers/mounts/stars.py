@@ -190,7 +190,7 @@ def _bounded(found: list[StarDesign], phasing: Phasing, designs: int) -> list[St
     least = _least(found)
     if len(found) < designs or phasing.continuous or not 0.0 < least < math.inf:
         return found
-    first = bounded_under(found[0].result, least)
+    first = bounded_under(found[0].result, least, of_many=len(found) > 1)
     out = [replace(found[0], result=first), *found[1:]]
     # what of all stars is known is what is known of the one with the least bound
     enough = first.certificate.lower_bound if first.certificate is not None else least
