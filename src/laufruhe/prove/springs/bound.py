@@ -22,8 +22,8 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.prove.springs.conditions import Held
 from laufruhe.prove.springs.modes import Shapes
 
-# shifts that make a matrix convex, in parts of its largest eigenvalue
-_SHIFTS = np.concatenate([[0.0], 10.0 ** np.arange(-14.0, 0.1, 0.25)])
+# shifts that make a matrix convex, in parts of its largest eigenvalue, be that under zero too
+_SHIFTS = np.concatenate([[0.0], 10.0 ** np.arange(-14.0, 1.1, 0.25)])
 _FLAT = 1e-13
 
 
@@ -195,7 +195,7 @@ class Priced:
 
 @dataclass(frozen=True, eq=False)
 class Proposed:
-    """What a solver says: multipliers, s, the moments of orders and of modes, and what it takes the least value for."""
+    """What a solver says: multipliers, s, moments of orders and modes, and the least value; infinite where none is."""
 
     multipliers: Multipliers
     middle: Array

@@ -11,16 +11,18 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from laufruhe.numerics.arrays import Array, Indices
-from laufruhe.prove.quadratics import column, matrix_of, solver_of, triangle
+from laufruhe.prove.quadratics import column, matrix_of, triangle
 from laufruhe.prove.springs.bound import Cap, Multipliers, Priced, Program, Proposed, Root, follows
 from laufruhe.prove.springs.conditions import Held
+from laufruhe.prove.springs.dual import Cone, Dual
 from laufruhe.prove.springs.modes import Shapes
 
 # what a solver leaves of a price of one for every square, so that what its multipliers leave over is convex
 ASIDE = 3e-7
 # how far multipliers may be off, and from what is allowed; of what narrows a box
-FINE, ROUGH = (1e-5, 1e-7), (2e-2, 2e-5)
-# equations are solved once and not refined, more regular instead: bounds are as good in two thirds of the time
+FINE, ROUGH = (1e-5, 1e-7), (2e-2, 5e-6)
+# equations are solved once and not refined, more regular instead, and steps kept from the ends of cones: bounds are as
+# good in less time
 _SETTINGS = {
     "verbose": False,
     "tol_gap_abs": 1e-6,
@@ -30,6 +32,7 @@ _SETTINGS = {
     "chordal_decomposition_enable": False,
     "iterative_refinement_enable": False,
     "static_regularization_constant": 1e-7,
+    "max_step_fraction": 0.95,
 }
 
 ZERO, SIDES, LENGTH, MATRIX = "zero", "not under zero", "a length and its vector", "nowhere indefinite"
@@ -51,7 +54,7 @@ class Stated:
         self.rows: list[Any] = []
         self.right: list[Array] = []
         self.cones: list[tuple[str, Hashable]] = []
-        self._solvers: dict[tuple[bool, tuple[float, float]], Any] = {}
+        self._solvers: dict[tuple[bool, tuple[float, float]], Dual] = {}
         blocks = [_entries(size) for cap in program.caps for size in cap.blocks]
         heads = len(program.prices)
         self.blocks = np.cumsum([heads, *blocks])
@@ -64,7 +67,6 @@ class Stated:
         self._whole()
         self._linked()
         self._linear()
-        self._moments()
         at = 0
         for cap in program.caps:
             self._cap(cap, at)
@@ -166,12 +168,6 @@ class Stated:
     def _moment(self, order: int) -> Indices:
         return np.arange(self.ends[order], self.ends[order + 1])
 
-    def _moments(self) -> None:
-        """No moment matrix is indefinite."""
-        for order in range(len(self.program.sizes)):
-            columns = self._moment(order)
-            self._add(-np.eye(len(columns)), columns, MATRIX)
-
     def _cap(self, cap: Cap, at: int) -> None:
         """S - F(M)."""
         i, j, factor = triangle(cap.size)
@@ -258,8 +254,7 @@ class Stated:
     def answer(self, program: Program, scaled: bool, enough: tuple[float, float] = FINE) -> Proposed:
         """As multipliers and moments of a program with the same conditions."""
         first, cost = self.first, self._cost(program)
-        found = self._solved(cost, scaled, enough)
-        z, x = np.nan_to_num(np.array(found.z)), np.nan_to_num(np.array(found.x))
+        x, z, least = self._solved(cost, scaled, enough)
         parts: _Parts = defaultdict(list)
         for (_, name), part in zip(self.cones, np.split(z, np.cumsum([*map(len, self.right)])[:-1]), strict=True):
             parts[name].append(part)
@@ -276,34 +271,38 @@ class Stated:
         )
         moments = [matrix_of(x[self._moment(k)], size) for k, size in enumerate(program.sizes)]
         middle = np.clip(x[first : first + program.numbers], -1.0, 1.0)
-        return Proposed(
-            multipliers, middle, moments, float(cost @ x), [self._found(x, k) for k in range(len(program.shapes))]
-        )
+        return Proposed(multipliers, middle, moments, least, [self._found(x, k) for k in range(len(program.shapes))])
 
-    def _solved(self, cost: Array, scaled: bool, enough: tuple[float, float]) -> Any:
+    def _solved(self, cost: Array, scaled: bool, enough: tuple[float, float]) -> tuple[Array, Array, float]:
         """By one solver for all that is minimised under the same conditions."""
-        from scipy.sparse import csc_array, vstack
+        import clarabel
+        from scipy.sparse import vstack
 
         solver = self._solvers.get((scaled, enough))
         if solver is None:
             off = dict(zip(("tol_gap_rel", "tol_feas"), enough, strict=True))
-            settings = {**_SETTINGS, **off, "equilibrate_enable": scaled}
-            rows, right = csc_array(vstack(self.rows)), np.concatenate(self.right)
-            solver = self._solvers[scaled, enough] = solver_of(cost, rows, right, self._kinds(), settings)
-        else:
-            solver.update(q=cost)
-        return solver.solve()
+            moments = [
+                (self._moment(order), clarabel.PSDTriangleConeT(size)) for order, size in enumerate(self.program.sizes)
+            ]
+            rows, right = vstack(self.rows, format="coo"), np.concatenate(self.right)
+            solver = Dual(rows, right, self._kinds(), moments, scaled, {**_SETTINGS, **off})
+            self._solvers[scaled, enough] = solver
+        return solver.solved(cost)
 
-    def _kinds(self) -> list[Any]:
-        """Clarabel's cones."""
+    def _kinds(self) -> list[Cone]:
+        """Of the rows."""
         import clarabel
 
-        kinds = {ZERO: clarabel.ZeroConeT, SIDES: clarabel.NonnegativeConeT, LENGTH: clarabel.SecondOrderConeT}
-        return [
-            # a matrix by the size that has a triangle of so many entries
-            clarabel.PSDTriangleConeT(math.isqrt(2 * len(right))) if cone == MATRIX else kinds[cone](len(right))
-            for (cone, _), right in zip(self.cones, self.right, strict=True)
-        ]
+        kinds = {SIDES: clarabel.NonnegativeConeT, LENGTH: clarabel.SecondOrderConeT}
+        found = []
+        for (cone, _), right in zip(self.cones, self.right, strict=True):
+            size = len(right)
+            if cone == MATRIX:
+                # a matrix by the size that has a triangle of so many entries
+                found.append(Cone(size, clarabel.PSDTriangleConeT(math.isqrt(2 * size)), True))
+            else:
+                found.append(Cone(size, None if cone == ZERO else kinds[cone](size), cone == LENGTH))
+        return found
 
     def _found(self, x: Array, number: int) -> Array:
         """Z, Z_1 ... of a mode."""

@@ -1,0 +1,144 @@
+"""A program over cones by its dual, which is solved sooner where most variables are entries of matrices in cones.
+
+    least q'x   with   b - A x in K,   the matrices X_k of x nowhere indefinite
+    least b'z   with   A_o' z = -q_o,   q_k + A_k' z nowhere indefinite for every X_k,   z in the dual of K
+
+with A_k the columns of X_k and A_o all others: X_k and x_o are multipliers of the second program. As the first is told
+to a solver, an entry of X_k is a column and a row, and both are eliminated; as the second, it is a row. Their steps are
+the same, so both are scaled as the first one is: rows and columns by the roots of their largest entries again and
+again (Ruiz, RAL-TR-2001-034), those of a cone alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array, Indices
+from laufruhe.prove.quadratics import solver_of
+
+# rounds of the scaling, and what no scale is outside of
+_ROUNDS, _LEAST, _MOST = 10, 1e-4, 1e4
+
+
+@dataclass(frozen=True, eq=False)
+class Cone:
+    """Rows that stand together.
+
+    Attributes
+    ----------
+    size
+        Of its rows.
+    kind
+        As the solver has it; None where the rows are equations.
+    is_alike
+        Whether its rows have one scale.
+    """
+
+    size: int
+    kind: Any
+    is_alike: bool
+
+
+class Dual:
+    """A solver of one program for any cost.
+
+    Parameters
+    ----------
+    rows, right
+        A and b.
+    cones
+        K, row by row.
+    matrices
+        Columns of every X_k, of which there is one at least, and their cone.
+    scaled
+        Whether the program is scaled.
+    settings
+        Of the solver.
+    """
+
+    def __init__(
+        self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]], scaled: bool,
+        settings: Mapping[str, Any],
+    ) -> None:  # fmt: skip
+        from scipy.sparse import csc_array, diags_array, eye_array, vstack
+
+        count, width = rows.shape
+        own = np.concatenate([columns for columns, _ in matrices])
+        self._order, free = np.concatenate([np.setdiff1d(np.arange(width), own), own]), width - len(own)
+        self._signs = np.where(np.arange(width) < free, 1.0, -1.0)
+        self._scaled, self._settings = scaled, {**settings, "equilibrate_enable": False}
+        self._along: Array = np.ones(count)
+        self._across: Array = np.ones(width)
+        if scaled:
+            self._along, self._across = _scales(rows, cones, matrices)
+        turned = csc_array(diags_array(self._along) @ rows @ diags_array(self._across))[:, self._order].T
+        held = np.flatnonzero(np.repeat([cone.kind is not None for cone in cones], [cone.size for cone in cones]))
+        self._aside = np.zeros(len(held))
+        self._rows = csc_array(vstack([diags_array(self._signs) @ turned, -eye_array(count, format="csr")[held]]))
+        self._cost = self._along * right
+        self._kinds = [_zero(free), *(kind for _, kind in matrices), *(c.kind for c in cones if c.kind is not None)]
+        self._solver: Any = None
+
+    def solved(self, cost: Array) -> tuple[Array, Array, float]:
+        """x and z, whatever the solver says of them, and q'x; infinite where it takes that for unbounded."""
+        import clarabel
+
+        scaled = (self._across * cost)[self._order]
+        size = float(np.abs(scaled).max(initial=0.0))
+        factor = float(np.clip(1.0 / size, _LEAST, _MOST)) if self._scaled and size > 0.0 else 1.0
+        right = np.append(-factor * self._signs * scaled, self._aside)
+        if self._solver is None:
+            self._solver = solver_of(self._cost, self._rows, right, self._kinds, self._settings)
+        else:
+            self._solver.update(b=right)
+        found = self._solver.solve()
+        x = np.empty(len(cost))
+        x[self._order] = -self._signs * np.nan_to_num(np.array(found.z))[: len(cost)]
+        x *= self._across
+        lost = (clarabel.SolverStatus.PrimalInfeasible, clarabel.SolverStatus.AlmostPrimalInfeasible)
+        least = math.inf if found.status in lost else float(cost @ x)
+        return x, self._along * np.nan_to_num(np.array(found.x)) / factor, least
+
+
+def _zero(size: int) -> Any:
+    import clarabel
+
+    return clarabel.ZeroConeT(size)
+
+
+def _scales(rows: Any, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]]) -> tuple[Array, Array]:
+    """Of rows and columns, as if every entry of a matrix had a row too."""
+    count, width = rows.shape
+    own = np.concatenate([columns for columns, _ in matrices])
+    row, column = (np.append(a, b) for a, b in ((rows.row, count + np.arange(len(own))), (rows.col, own)))
+    sizes = np.append(np.abs(rows.data), np.ones(len(own)))
+    along, across = np.ones(count + len(own)), np.ones(width)
+    by = [_grouped(place) for place in (row, column)]
+    for _ in range(_ROUNDS):
+        left = along[row] * sizes * across[column]
+        along, across = (_nearer(scales, left, *order) for scales, order in zip((along, across), by, strict=True))
+    at = 0
+    for size, is_alike in [*((cone.size, cone.is_alike) for cone in cones), *((len(k), True) for k, _ in matrices)]:
+        if is_alike:
+            along[at : at + size] = along[at : at + size].mean()
+        at += size
+    across[own] = 1.0 / along[count:]
+    return along[:count], across
+
+
+def _grouped(place: Indices) -> tuple[Indices, Indices, Indices]:
+    """An order in which what has the same place stands together; the places, and where each of them begins."""
+    order = np.argsort(place, kind="stable")
+    return order, *np.unique(place[order], return_index=True)
+
+
+def _nearer(scales: Array, sizes: Array, order: Indices, there: Indices, first: Indices) -> Array:
+    """Scales that bring the largest of the sizes at every place nearer to one."""
+    found, largest = scales.copy(), np.maximum.reduceat(sizes[order], first)
+    found[there] /= np.sqrt(np.where(largest > 0.0, largest, 1.0))
+    return np.clip(found, _LEAST, _MOST)

@@ -1,0 +1,84 @@
+"""A program over cones by its dual: x and z that keep the conditions and meet, whatever was solved before."""
+
+import clarabel
+import numpy as np
+import pytest
+from scipy.sparse import coo_array
+
+from laufruhe.prove.quadratics import column, matrix_of
+from laufruhe.prove.springs.dual import Cone, Dual
+
+SETTINGS = {"verbose": False, "max_threads": 1, "presolve_enable": False, "chordal_decomposition_enable": False}
+SIZE, COUNT = 3, 4
+ENTRIES = SIZE * (SIZE + 1) // 2
+
+
+class Program:
+    """Numbers between -1 and 1, two matrices of trace one that equations bind, and a length under a number."""
+
+    def __init__(self, seed: int) -> None:
+        generator = np.random.default_rng(seed)
+        self.matrices = [COUNT + k * ENTRIES + np.arange(ENTRIES) for k in range(2)]
+        width = COUNT + 2 * ENTRIES
+        traces = np.zeros((2, width))
+        for row, own in zip(traces, self.matrices, strict=True):
+            row[own] = column(np.eye(SIZE))
+        inside = np.append(generator.uniform(-0.5, 0.5, COUNT), np.tile(column(np.eye(SIZE) / SIZE), 2))
+        bound = generator.normal(size=(1, width))
+        sides = np.zeros((2 * COUNT, width))
+        sides[:, :COUNT] = np.concatenate([np.eye(COUNT), -np.eye(COUNT)])
+        # sizes that are far apart are what scaling is for
+        length = 1e3 * np.concatenate([np.zeros((1, width)), generator.normal(size=(3, width))])
+        slack = 1e3 * np.array([3.0, 0.0, 0.0, 0.0])
+        self.rows = np.concatenate([traces, bound, sides, length])
+        right = [np.ones(2), bound @ inside, np.ones(2 * COUNT), slack + length @ inside]
+        self.right = np.concatenate(right)
+        self.cones = [
+            Cone(3, None, False),
+            Cone(2 * COUNT, clarabel.NonnegativeConeT(2 * COUNT), False),
+            Cone(4, clarabel.SecondOrderConeT(4), True),
+        ]
+        self.costs = generator.normal(size=(3, width))
+
+    def dual(self, scaled: bool) -> Dual:
+        """Solved by its dual."""
+        kinds = [(own, clarabel.PSDTriangleConeT(SIZE)) for own in self.matrices]
+        return Dual(coo_array(self.rows), self.right, self.cones, kinds, scaled, SETTINGS)
+
+
+@pytest.mark.parametrize("scaled", [True, False])
+@pytest.mark.parametrize("seed", range(4))
+def test_both_keep_their_conditions_and_meet(seed: int, scaled: bool) -> None:
+    program = Program(seed)
+    for cost in program.costs:
+        x, z, least = program.dual(scaled).solved(cost)
+        slack = program.right - program.rows @ x
+        assert np.abs(slack[:3]).max() < 1e-6
+        assert slack[3 : 3 + 2 * COUNT].min() > -1e-6
+        assert slack[-4] - np.linalg.norm(slack[-3:]) > -1e-3
+        left = cost + program.rows.T @ z
+        assert np.abs(left[:COUNT]).max() < 1e-6
+        for own in program.matrices:
+            assert np.linalg.eigvalsh(matrix_of(x[own], SIZE)).min() > -1e-6
+            assert np.linalg.eigvalsh(matrix_of(left[own], SIZE)).min() > -1e-6
+        assert z[3 : 3 + 2 * COUNT].min() > -1e-6
+        assert z[-4] - np.linalg.norm(z[-3:]) > -1e-6
+        assert least == cost @ x == pytest.approx(-program.right @ z, abs=1e-5)
+
+
+def test_an_answer_does_not_depend_on_those_before() -> None:
+    program = Program(7)
+    several = program.dual(True)
+    for cost in (*program.costs, *program.costs[::-1]):
+        for told, alone in zip(several.solved(cost), program.dual(True).solved(cost), strict=True):
+            assert np.array_equal(told, alone)
+
+
+def test_what_has_no_least_value_is_told() -> None:
+    program = Program(3)
+    # nothing holds an entry that no row has
+    rows, width = np.column_stack([program.rows, np.zeros(len(program.rows))]), program.rows.shape[1] + 1
+    kinds = [(own, clarabel.PSDTriangleConeT(SIZE)) for own in program.matrices]
+    unbounded = Dual(coo_array(rows), program.right, program.cones, kinds, True, SETTINGS)
+    assert unbounded.solved(np.eye(width)[-1])[2] == np.inf
+    assert np.isfinite(unbounded.solved(np.append(program.costs[0], 0.0))[2])
