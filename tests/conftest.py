@@ -3,9 +3,11 @@
 import gc
 import os
 import tempfile
+from functools import cache
 from pathlib import Path
 
 import pytest
+import typer.testing
 from hypothesis import settings
 from hypothesis.configuration import set_hypothesis_home_dir
 
@@ -18,6 +20,9 @@ if "PYTEST_XDIST_WORKER" in os.environ and hasattr(os, "sched_getaffinity"):
 
 # Set before any test module can import matplotlib: no test has a display.
 os.environ["MPLBACKEND"] = "Agg"
+
+# Typer makes all commands anew for every call of one, which takes as long as many a command.
+typer.testing._get_command = cache(typer.testing._get_command)
 
 # Derandomised: a failure repeats on the next machine, and no example database is needed.
 settings.register_profile("laufruhe", derandomize=True, deadline=None, database=None, max_examples=20)
