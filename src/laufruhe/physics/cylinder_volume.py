@@ -86,10 +86,16 @@ class ChargedCylinder:
         return self.smallest + swept_volume(self.part, angles)
 
     def pressure(self, closed: Callable[[Array], Array], angles: Array) -> Array:
-        """Pressure over the cycle from that of the closed period, the mean of both sides at a jump [Pa]."""
-        before = self._one_sided(closed, angles - JUMP_WIDTH)
-        after = self._one_sided(closed, angles + JUMP_WIDTH)
-        return 0.5 * (before + after)
+        """Pressure over the cycle from that of the closed period, the mean of both sides at a jump [Pa].
+
+        There is none but at a dead centre: valves open and close there, and heat is added there at once.
+        """
+        found = self._one_sided(closed, angles)
+        ends = (np.mod(angles - centre + math.pi, math.tau) - math.pi for centre in dead_centres(self.part))
+        jumps = np.any([np.abs(since) <= JUMP_WIDTH for since in ends], axis=0)
+        before, after = (self._one_sided(closed, angles[jumps] + by) for by in (-JUMP_WIDTH, JUMP_WIDTH))
+        found[jumps] = 0.5 * (before + after)
+        return found
 
     def _one_sided(self, closed: Callable[[Array], Array], angles: Array) -> Array:
         top, bottom = dead_centres(self.part)
