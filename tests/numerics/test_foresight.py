@@ -6,11 +6,12 @@ import heapq
 import random
 import time
 from collections.abc import Callable
-from concurrent.futures import Executor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from itertools import count
 
 import pytest
 
+from laufruhe.numerics.budget import left, limited
 from laufruhe.numerics.foresight import foresight
 from laufruhe.numerics.progress import listening
 from laufruhe.numerics.workers import HERE, in_turn, working_on
@@ -79,3 +80,40 @@ def test_in_turn_keeps_the_order_whoever_works() -> None:
     with ThreadPoolExecutor(3) as pool, working_on(pool), listening(lambda step: told.append(step.done)):
         assert in_turn(abs, [-3, -1, -2], "numbers") == [3, 1, 2]
     assert told == [0, 1, 2]
+
+
+def until_of(_: int) -> float:
+    """Seconds that are left where a step is worked out."""
+    return left()
+
+
+def test_steps_have_the_time_that_is_left() -> None:
+    with ThreadPoolExecutor(2) as pool, working_on(pool), limited(60.0), foresight(until_of) as ahead:
+        ahead.likely([("a", 1)])
+        assert 0.0 < ahead.wanted("a", 1) <= 60.0
+        assert ahead.foreseen == 1
+
+
+class Starting(Executor):
+    """Two workers that never get ready."""
+
+    count = 2
+
+    def submit(self, fn: Callable[..., object], /, *args: object, **kwargs: object):  # type: ignore[override, no-untyped-def]
+        asked.append(fn)
+        return Future()
+
+
+asked: list[Callable[..., object]] = []
+
+
+def test_processes_that_start_are_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("laufruhe.numerics.foresight.executor_for", Starting)
+    monkeypatch.setattr("laufruhe.numerics.foresight.count_of", lambda _=None: 2)
+    asked.clear()
+    with working_on(None), foresight(abs, worth=0.0) as ahead:
+        ahead.likely([("a", -1)])
+        assert len(asked) == 2
+        assert ahead.wanted("a", -1) == 1
+        assert ahead.foreseen == 0
+    assert len(asked) == 2

@@ -21,30 +21,38 @@ A = TypeVar("A")
 
 
 class Foresight(Generic[T, A]):
-    """Answers of one kind of step; processes are started once a search has taken longer than that takes."""
+    """Answers of one kind of step; processes are started once a search has taken longer than that is worth."""
 
-    def __init__(self, work: Callable[[T], A], held: ExitStack) -> None:
-        self._work, self._held = work, held
+    def __init__(self, work: Callable[[T], A], held: ExitStack, worth: float) -> None:
+        self._work, self._held, self._worth = work, held, worth
         self._began = time.perf_counter()
         self._executor: Executor | None = None
+        self._starting: list[Future[None]] = []
         self._asked: dict[Hashable, Future[A]] = {}
         self.foreseen = 0
 
     def likely(self, steps: Iterable[tuple[Hashable, T]]) -> None:
         """Steps that may be wanted next, the likeliest first; as many are begun as can be worked at once."""
-        if self._executor is None:
-            waited = time.perf_counter() - self._began > WORTH_PROCESSES
-            if count_of() == 1 or not (waited or given() is not None):
-                return
-            self._executor = self._held.enter_context(executor_for())
-            self._held.callback(self.forget)
-        room = count_of(self._executor) - sum(not future.done() for future in self._asked.values())
+        room = self._ready - sum(not future.done() for future in self._asked.values())
         for key, step in steps:
-            if room <= 0:
+            if room <= 0 or self._executor is None:
                 return
             if key not in self._asked:
-                self._asked[key] = self._executor.submit(worked, left(), self._work, step)
+                self._asked[key] = self._executor.submit(worked, time.time() + left(), self._work, step)
                 room -= 1
+
+    @property
+    def _ready(self) -> int:
+        """How many work; those that are started here are not waited for."""
+        if self._executor is None:
+            waited = time.perf_counter() - self._began > self._worth
+            if count_of() == 1 or not (waited or given() is not None):
+                return 0
+            self._executor = self._held.enter_context(executor_for())
+            self._held.callback(self._end)
+            if given() is None:
+                self._starting = [self._executor.submit(_started, self._work) for _ in range(count_of(self._executor))]
+        return count_of(self._executor) - sum(not future.done() for future in self._starting)
 
     def wanted(self, key: Hashable, step: T) -> A:
         """The answer to a step: the one foreseen, or worked out now."""
@@ -64,13 +72,26 @@ class Foresight(Generic[T, A]):
         for future in self._asked.values():
             future.cancel()
         self._asked.clear()
+
+    def _end(self) -> None:
+        self.forget()
         if self._executor is not None and given() is None:
             # nobody waits for what is at work
             self._executor.shutdown(cancel_futures=True)
 
 
+def _started(work: Callable[..., object]) -> None:
+    """Nothing more than to have imported what works."""
+
+
 @contextmanager
-def foresight(work: Callable[[T], A]) -> Iterator[Foresight[T, A]]:
-    """Of one search; workers are let go with it."""
+def foresight(work: Callable[[T], A], worth: float = WORTH_PROCESSES) -> Iterator[Foresight[T, A]]:
+    """Of one search; workers are let go with it.
+
+    Parameters
+    ----------
+    worth
+        Seconds that a search has taken when processes are started for it.
+    """
     with ExitStack() as held:
-        yield Foresight(work, held)
+        yield Foresight(work, held, worth)

@@ -13,8 +13,8 @@ from laufruhe.numerics.budget import passed
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import NEARLY, Box, Divided, Halving, Parts, Waiting, halves
+from laufruhe.prove.springs.ends import Aims, ends_ahead
 from laufruhe.prove.springs.open_mounts import is_lifted
-from laufruhe.prove.springs.program import Stated
 from laufruhe.prove.springs.search import SpringBoxes
 
 # shares of the value that are shown one after the other to be out of reach
@@ -50,10 +50,11 @@ def spring_bound(
     if not is_bounded(problem) or not 0.0 < value < math.inf:
         return Divided(0.0, 0)
     try:
-        boxes = SpringBoxes(problem, value, room, near)
-        if not boxes.most_boxes or not boxes.is_sampled_fully:
-            return Divided(0.0, 0)
-        return _by_levels(boxes, room, _ladder(boxes, of_many))
+        with ends_ahead() as ahead:
+            boxes = SpringBoxes(problem, value, room, near, ahead)
+            if not boxes.most_boxes or not boxes.is_sampled_fully:
+                return Divided(0.0, 0)
+            return _by_levels(boxes, room, _ladder(boxes, of_many))
     except np.linalg.LinAlgError:
         # a middle on a resonance that nothing damps
         return Divided(0.0, 0)
@@ -194,20 +195,26 @@ def narrowed(boxes: SpringBoxes, lower: Array, upper: Array, pull: Array) -> tup
     sides = [(j, side) for j, side in enumerate(mounts.straight) if side is not None]
     sides += [(numbers + k, count + k) for k in range(len(lower) - count)]
     own, along = np.array(sides, dtype=np.intp).reshape(-1, 2).T
-    stated, aims, solved = Stated(program), np.eye(numbers + len(lower) - count), 0
+    aims, units, solved = Aims(program, boxes.ahead), np.eye(numbers + len(lower) - count), 0
     # lower ends and upper ones, these with the other sign; and the nearest to them that designs of the relaxation have
     whole, seen = np.array([lower, -upper]), np.array([upper, -lower])
     ends = whole.copy()
-    for number, side in sides:
-        for k, sign in enumerate((1.0, -1.0)) if pull[side] > LITTLE * pull.max() else ():
-            near = seen[k, side] - whole[k, side] < WON * (upper[side] - lower[side])
-            if near or boxes.is_at(lower, upper, side, sign):
-                continue
-            share, stands = stated.least(sign * aims[number])
-            solved += 1
-            ends[k, side] = max(ends[k, side], sign * middle[side] + half[side] * share)
-            if ends[:, side].sum() > 0.0:
-                return None, solved
-            at = middle[along] + half[along] * stands[own]
-            seen[:, along] = np.minimum(seen[:, along], [at, -at])
+    asked = [(*each, k) for each in sides if pull[each[1]] > LITTLE * pull.max() for k in (0, 1)]
+    signs = (1.0, -1.0)
+
+    def pays(side: int, k: int) -> bool:
+        near = seen[k, side] - whole[k, side] < WON * (upper[side] - lower[side])
+        return not near and not boxes.is_at(lower, upper, side, signs[k])
+
+    for first, (number, side, k) in enumerate(asked):
+        if not pays(side, k):
+            continue
+        aims.likely(((n, end), signs[end] * units[n]) for n, j, end in asked[first:] if pays(j, end))
+        share, stands = aims.least((number, k), signs[k] * units[number])
+        solved += 1
+        ends[k, side] = max(ends[k, side], signs[k] * middle[side] + half[side] * share)
+        if ends[:, side].sum() > 0.0:
+            return None, solved
+        at = middle[along] + half[along] * stands[own]
+        seen[:, along] = np.minimum(seen[:, along], [at, -at])
     return (ends[0], -ends[1]), solved

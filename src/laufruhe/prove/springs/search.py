@@ -23,6 +23,7 @@ from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divides
 from laufruhe.prove.springs.bound import Program
 from laufruhe.prove.springs.box import SpringBox
 from laufruhe.prove.springs.columns import columns_of
+from laufruhe.prove.springs.ends import Ahead
 from laufruhe.prove.springs.limits import limits_of
 from laufruhe.prove.springs.lines import Felt, Line, line_of
 from laufruhe.prove.springs.mirrored import mirrored_parts
@@ -54,10 +55,14 @@ class SpringBoxes:
         Of the best design.
     places
         Where the first relaxation stands.
+    ahead
+        Who works relaxations out before they are wanted; nobody when None.
     """
 
-    def __init__(self, problem: Problem, value: float, room: float, near: Sequence[Value]) -> None:
-        self.problem, self.value, self.enough = problem, value, value - NEARLY * room
+    def __init__(
+        self, problem: Problem, value: float, room: float, near: Sequence[Value], ahead: Ahead | None = None
+    ) -> None:
+        self.problem, self.value, self.enough, self.ahead = problem, value, value - NEARLY * room, ahead
         decisions = problem.mount_decisions
         lower, upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
         self._near = np.array([v for v, d in zip(near, problem.decisions, strict=True) if not d.is_affine], dtype=float)
