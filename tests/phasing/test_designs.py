@@ -240,7 +240,7 @@ def test_an_order_that_every_star_cancels_asks_for_nothing(tmp_path, cylinders, 
     terms = f'[[objective.terms]]\nquantity = "{names[0]}"\norders = [{order}]\n'
     terms += "".join(f'[[objective.terms]]\nquantity = "{name}"\n' for name in names[1:])
     half = engines.WEIGHTS.replace("360", "180", 1)
-    problem = engines.problem(tmp_path, cylinders, rest=engines.MOUNTS + half + "[objective]\n" + terms, samples=720)
+    problem = engines.problem(tmp_path, cylinders, rest=engines.MOUNTS + half + "[objective]\n" + terms, samples=240)
     result = solve(problem)
     assert result.certificate.kind is Proof.GLOBAL
     assert result.objective.value <= result.objective.initial * (1.0 + 1e-9)

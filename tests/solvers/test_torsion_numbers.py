@@ -20,7 +20,7 @@ from laufruhe.solvers.result import Result, Status
 from problem_files import PROBLEMS
 
 READY = PROBLEMS / "inline-five-damper.toml"
-QUICK = {"fidelity": {"samples": 180}, "tolerance": 1e-2, "search": {"starts": 2}}
+QUICK = {"fidelity": {"samples": 120, "orders": 24}, "tolerance": 1e-2, "search": {"starts": 2}}
 STIFF = {"between": ["3e5 N m/rad", "6e5 N m/rad"], "start": "4e5 N m/rad"}
 
 

@@ -158,7 +158,7 @@ class SizeModel:
     def with_masses(self, masses: Array) -> Engine:
         """The engine as given, with these in place of what its running gear adds."""
         given = self.problem.engine
-        bare = given.moving.weighed(-1.0)
+        bare = given.moving.bare
         return _heavier(replace(given, slider_cranks=bare.parts, rotors=bare.rotors), masses)
 
     def factors(self, piece: Piece, measure: Measure, engine: Engine) -> list[Array]:
@@ -256,7 +256,7 @@ class SizeModel:
             given = problem.design([0.0] * len(unbalances), unbalances)
             sizes = given.moving.sizes
             given = given if length == sizes[ROD_LENGTH] else given.resized({**sizes, ROD_LENGTH: length})
-            bare = given.moving.weighed(-1.0)
+            bare = given.moving.bare
             weightless = replace(given, slider_cranks=bare.parts, rotors=bare.rotors)
             engines = [weightless, *(_heavier(weightless, unit) for unit in np.eye(MASSES))]
             engines += [_moved(weightless, d, direction) for d in unbalances for direction in d.set.directions]

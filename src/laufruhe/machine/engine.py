@@ -144,7 +144,7 @@ class Engine:
                 f"{math.degrees(math.remainder(crank_angle, math.tau)):g} deg from its dead centre"
             )
 
-    @property
+    @cached_property
     def moving(self) -> Moving:
         """What sizes move."""
         return Moving(self.gear, self.slider_cranks, self.rotors, self.bearings)

@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import TypeAlias
+from functools import cached_property
+from typing import Any, TypeAlias
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.bearing import Bearing
@@ -215,6 +216,11 @@ class Moving:
         )
         return replace(self, parts=tuple(_heavier(gear, part, sense) for part in self.parts), rotors=tuple(rotors))
 
+    @cached_property
+    def bare(self) -> Moving:
+        """Without the masses of the running gear (Z2)."""
+        return self.weighed(-1.0)
+
     @property
     def throw_unbalance(self) -> float:
         """Of crank pin and webs of every throw [kg m] (Z2)."""
@@ -241,13 +247,16 @@ class Moving:
 
     def resized(self, sizes: Mapping[Size, float]) -> Moving:
         """With sizes in place of its own, and the masses of these."""
-        bare = self.weighed(-1.0)
+        bare = self.bare
         parts, gear = bare.parts, bare.gear
         length, end = sizes.get(ROD_LENGTH), tuple(sizes.get((BIG_END, key)) for key in _ACROSS)
+        moved: dict[str, Any] = {}
         if parts and length is not None and length != parts[0].rod_length:
-            parts = tuple(replace(part, rod_length=length) for part in parts)
+            moved["rod_length"] = length
         if end[0] is not None and end[1] is not None:
-            parts = tuple(replace(part, big_end=(end[0], end[1])) for part in parts)
+            moved["big_end"] = end
+        if moved:
+            parts = tuple(replace(part, **moved) for part in parts)
         bearings = tuple(
             replace(b, **{key: sizes.get((on(b), key), getattr(b, key)) for key in _ACROSS}) for b in bare.bearings
         )

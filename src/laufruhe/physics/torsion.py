@@ -125,13 +125,28 @@ def throw_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     """
     if fidelity.is_uneven:
         raise ModelError("twist is modelled about an even crank speed; leave crank_inertia out")
-    base, turns, chain = engine.cycle.base_order, engine.cycle.turns, chain_of(engine)
-    driving = [(k, part) for k, disc in enumerate(chain.discs) for part in _driving(engine, disc.cylinders)]
-    series = [(k, part, cylinder_torque(engine.cycle, part, point, fidelity)) for k, part in driving]
-    total = np.zeros((max((len(own) for *_, own in series), default=1), len(chain.discs)), dtype=complex)
+    driven = tuple(disc.cylinders for disc in chain_of(engine).discs)
+    return _throw_torques(engine.cycle, engine.slider_cranks, driven, point, fidelity)
+
+
+@lru_cache(maxsize=64)
+def _throw_torques(
+    cycle: Cycle,
+    parts: tuple[SliderCrank, ...],
+    driven: tuple[tuple[str, ...], ...],
+    point: OperatingPoint,
+    fidelity: Fidelity,
+) -> Spectrum:
+    """On discs that so many cylinders drive: whatever else is open of a chain moves none of it."""
+    series = [
+        (k, part, cylinder_torque(cycle, part, point, fidelity))
+        for k, names in enumerate(driven) for part in parts if part.name in names
+    ]  # fmt: skip
+    total = np.zeros((max((len(own) for *_, own in series), default=1), len(driven)), dtype=complex)
     for k, part, own in series:
-        total[: len(own), k] += own * phasors([-as_turn(part.firing_angle) / turns], np.arange(len(own)))[:, 0]
-    return Spectrum(base, total)
+        total[: len(own), k] += own * phasors([-as_turn(part.firing_angle) / cycle.turns], np.arange(len(own)))[:, 0]
+    total.setflags(write=False)
+    return Spectrum(cycle.base_order, total)
 
 
 def cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity = EXACT) -> ComplexArray:
@@ -295,8 +310,10 @@ def _linked(chain: Torsion, links: Sequence[tuple[int, int, complex]]) -> Comple
     count = len(chain.discs) + len(chain.absorbers)
     out = np.zeros((count, count), dtype=complex)
     for a, b, value in links:
-        out[[a, b], [a, b]] += value
-        out[[a, b], [b, a]] -= value
+        out[a, a] += value
+        out[b, b] += value
+        out[a, b] -= value
+        out[b, a] -= value
     return out
 
 

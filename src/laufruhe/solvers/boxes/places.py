@@ -115,9 +115,12 @@ class _Search(HeldDesigns[_Box]):
 
     def _spans(self, lower: Array, upper: Array) -> Iterator[tuple[Limit, float, float]]:
         """Least and largest of each distance that is limited, with its places in a box."""
-        ends = [self.problem.design([float(x) for x in end], self.places) for end in (lower, upper)]
+        if not self._envelope:
+            return
+        low = self.problem.design(lower.tolist(), self.places)
+        high = low if np.array_equal(lower, upper) else self.problem.design(upper.tolist(), self.places)
         for limit in self._envelope:
-            for least, most in limit.measure.channel.span(limit.measure, *ends):
+            for least, most in limit.measure.channel.span(limit.measure, low, high):
                 yield limit, least, most
 
     def _beyond(self, lower: Array, upper: Array) -> tuple[str, ...]:
@@ -164,10 +167,13 @@ class _Search(HeldDesigns[_Box]):
         def away(places: Array) -> float:
             return float(np.square((places - middle) / width).sum())
 
+        def slope(places: Array) -> Array:
+            return np.asarray(2.0 * (places - middle) / width**2)
+
         corners = [np.array(corner) for corner in islice(product(*sides), MOST_CORNERS)]
         found = []
         for start in (middle, *corners):
-            pushed = minimize(away, start, method="SLSQP", bounds=sides, constraints=[kept])
+            pushed = minimize(away, start, jac=slope, method="SLSQP", bounds=sides, constraints=[kept])
             found += [at for at in (np.clip(pushed.x, lower, upper), start) if room(at).min() >= -REACH]
         return min(found, key=away, default=None)
 
