@@ -112,6 +112,25 @@ def test_cuts_never_exceed_an_optimum(tmp_path, name):
         assert cut.least(model.space) <= min(s.value for s, _ in answers) * (1.0 + 1e-9)
 
 
+@pytest.mark.slow
+def test_limits_that_contradict_each_other_at_one_star_exclude_others(tmp_path):
+    """By what each star has when it is solved alone: a star with a design is excluded by none."""
+    couple = '[[constraints]]\nlimit = "rms rocking couple"\nmax = "850 N m"\n'
+    problem = engines.problem(tmp_path, 5, rest=CASES["limited"] + couple)
+    model, stars = model_of(problem)
+    owners = owners_of(model)
+    answers = [solve_design(model, tuple(star), (), owners, 1e-4) for star in stars.tolist()]
+    without = np.array([solved is None for solved, _ in answers])
+    assert without.sum() == 12
+    excluded = np.array([cut.excludes(stars, [()], owners)[:, 0] for solved, cut in answers if solved is None])
+    assert not excluded[:, ~without].any()
+    assert excluded[:, without].sum() > 2 * without.sum()
+    found = search_designs(model, stars, 10**9, 1e-4)
+    assert len(found.solved) == (~without).sum()
+    assert 0 < found.infeasible < without.sum()
+    assert found.solved[0].value == pytest.approx(min(solved.value for solved, _ in answers if solved), rel=2e-4)
+
+
 @pytest.mark.parametrize("cylinders", [3, 4, 5, 6, 7, pytest.param(8, marks=pytest.mark.slow)])
 def test_program_and_search_agree_on_couples(tmp_path, cylinders):
     by = {}

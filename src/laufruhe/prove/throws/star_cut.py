@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.load_models.star_model import StarProblem
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Domain
-from laufruhe.prove.certificate import Multipliers
+from laufruhe.prove.certificate import ROUNDING, Multipliers
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +27,8 @@ class Cut:
         g and G, shapes (n,) and (throws, steps, n); no G where g is the same for every star.
     domains
         Of the decisions.
+    rounding
+        That sums of what is in it may be off by.
     """
 
     constant: float
@@ -34,9 +36,17 @@ class Cut:
     gradient: Array
     turns: Array | None
     domains: tuple[Domain, ...]
+    rounding: float
 
     def bounds(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Array:
         """Lower bounds of stars with sets of shafts, shape (stars, sets); never under zero."""
+        return np.maximum(self._sums(stars, sets, owners), 0.0)
+
+    def excludes(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Mask:
+        """Where no design keeps the limits, by dual rows of these alone (S45), shape (stars, sets)."""
+        return np.asarray(self._sums(stars, sets, owners) > self.rounding)
+
+    def _sums(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Array:
         total = np.full(len(stars), self.constant)
         for k in range(stars.shape[1]):
             total += self.moves[k, stars[:, k]]
@@ -45,7 +55,7 @@ class Cut:
         for column, built in enumerate(sets):
             chosen = [d for d, own in enumerate(owners) if own < 0 or own in built]
             out[:, column] = total + (least[:, chosen].sum(axis=1) if chosen else 0.0)
-        return np.maximum(out, 0.0)
+        return out
 
     def least(self, space: StarSpace) -> float:
         """A bound of every star: the best assignment of throws to steps; never under zero."""
@@ -78,20 +88,24 @@ def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
     """What dual rows prove of every star (S14)."""
     throws, steps = fine.terms[0][1].moves.shape[:2]
     size = fine.terms[0][1].slope.shape[-1]
-    constant, moves = 0.0, np.zeros((throws, steps))
+    constant, moves, whole = 0.0, np.zeros((throws, steps)), 0.0
     gradient, turns, turning = np.zeros(size), np.zeros((throws, steps, size)), False
     parts = []
     for (weight, norm), given in zip(fine.terms, multipliers.terms, strict=True):
         parts.append((weight * norm.norm.dual_feasible(norm.grid, given), norm))
     for (maximum, norm), given in zip(fine.limits, multipliers.limits, strict=True):
         z = norm.norm.balanced(norm.grid, given)
-        constant -= norm.norm.dual_norm(norm.grid, z) * maximum
+        most = norm.norm.dual_norm(norm.grid, z) * maximum
+        constant -= most
+        whole += most
         parts.append((z, norm))
     for z, norm in parts:
+        reach = np.abs(norm.constant) + np.abs(norm.moves).max(axis=1).sum(axis=0)
+        whole += float(np.vdot(np.abs(z), reach))
         constant += float(np.vdot(z, norm.constant))
         moves += np.einsum("kd,tpkd->tp", z, norm.moves)
         gradient += np.einsum("kd,kdn->n", z, norm.slope)
         if norm.turns is not None:
             turning = True
             turns += np.einsum("kd,tpkdn->tpn", z, norm.turns)
-    return Cut(constant, moves, gradient, turns if turning else None, fine.domains)
+    return Cut(constant, moves, gradient, turns if turning else None, fine.domains, ROUNDING * whole)

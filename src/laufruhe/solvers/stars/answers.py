@@ -173,11 +173,10 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         star = family.first if program.star is None else program.star
         # what few angles and the solver's own tolerance do not tell apart, exchanges do
         star = improved(model, star, program.built, owners, program.bound * (1.0 + problem.tolerance))
-        again = solve_design(model, star, program.built, owners, problem.tolerance, nothing)
-        if again is None:
+        found, cut = solve_design(model, star, program.built, owners, problem.tolerance, nothing)
+        if found is None or cut is None:
             answers.append(Answer((), 0.0, False, 1, "SCIP"))
             continue
-        found, cut = again
         bound = max(program.bound if exact else 0.0, cut.least(space))
         done = program.status == "optimal" and gap_of(found.value, bound, nothing) <= 2.0 * problem.tolerance
         method = f"mixed-integer cone program (SCIP: {program.status}) at {samples} angles, design solved again"

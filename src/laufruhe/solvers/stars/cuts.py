@@ -1,7 +1,7 @@
 """Exact search over stars and sets of shafts with everything else at its own optimum (S13-S15).
 
 Whoever solves the cone program of one star gets dual rows Z. The bound that they prove
-is affine in the star, so one solve bounds every star from below: least first, the next
+is affine in the star, so one solve bounds every star from below, or shows that others keep the limits as little: least first, the next
 star is solved only while its bound lies under the best value known. It ends with a
 proof, because each star is solved at most once.
 """
@@ -22,6 +22,7 @@ from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Domain
 from laufruhe.problem.phasing import ShaftChoice
 from laufruhe.prove.certificate import room_of
+from laufruhe.prove.throws.star_cut import Cut
 from laufruhe.solvers.stars.program import Solved, owners_of, solve_design
 
 _CHUNK = 1 << 17
@@ -149,19 +150,24 @@ class _Search:
     def solve(self, row: int, column: int) -> None:
         """One design, and what it proves of all others."""
         star, built = tuple(int(p) for p in self._stars[row]), self._sets[column]
-        answer = solve_design(self._model, star, built, self._owners, self._tolerance, self._nothing)
+        found, cut = solve_design(self._model, star, built, self._owners, self._tolerance, self._nothing)
         self._open[row, column] = False
-        if answer is None:
+        if cut is not None:
+            self._prove(cut, found is None)
+        self.bounds[row, column] = np.inf if found is None else max(found.bound, self.bounds[row, column])
+        self._open &= np.isfinite(self.bounds)
+        if found is None:
             self.infeasible += 1
-            self.bounds[row, column] = np.inf
-            return
-        found, cut = answer
-        self.solved.append(found)
+        else:
+            self.solved.append(found)
+
+    def _prove(self, cut: Cut, excludes: bool) -> None:
+        """Bounds of all designs by a cut; without end where it shows that none keeps the limits (S45)."""
         for start in range(0, len(self._stars), _CHUNK):
             part = slice(start, start + _CHUNK)
-            proven = cut.bounds(self._stars[part], self._sets, self._owners)
+            told = self._stars[part], self._sets, self._owners
+            proven = np.where(cut.excludes(*told), np.inf, 0.0) if excludes else cut.bounds(*told)
             np.maximum(self.bounds[part], proven, out=self.bounds[part])
-        self.bounds[row, column] = max(found.bound, self.bounds[row, column])
 
 
 def distinct_values(space: StarSpace, solved: Sequence[Solved]) -> list[float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
@@ -35,7 +34,7 @@ class StarDesign:
     kkt_residual: float = 0.0
     moved: bool = False
 
-    @cached_property
+    @property
     def is_met(self) -> bool:
         """Whether it is a design within its limits."""
         return self.result.status.has_design and self.result.final.excess(self.result.problem.limits) <= KEPT

@@ -266,8 +266,8 @@ def _needed(problem: Problem, phasing: Phasing, best: Decided) -> tuple[int, ...
     nothing = nothing_of(problem)
     for k in sorted(best.built, key=lambda k: -phasing.shafts.masses[k]):
         fewer = tuple(j for j in kept if j != k)
-        again = solve_design(model, best.steps, fewer, owners, _share(problem), nothing)
-        if again is not None and again[0].value <= best.value + room_of(best.value, _share(problem), nothing):
+        again, _ = solve_design(model, best.steps, fewer, owners, _share(problem), nothing)
+        if again is not None and again.value <= best.value + room_of(best.value, _share(problem), nothing):
             kept = fewer
     return kept
 

@@ -14,6 +14,7 @@ from laufruhe.prove.certificate import Multipliers, best_bound, gap_of
 from laufruhe.prove.throws.star_cut import Cut, cut_of
 from laufruhe.solvers.conclusion import KEPT
 from laufruhe.solvers.cones.conic import solve_cones
+from laufruhe.solvers.cones.program import ConicSolution
 
 COARSE = 48
 # times as many angles, where a limit is nearly at its edge
@@ -58,16 +59,21 @@ def solve_design(
     owners: Sequence[int],
     tolerance: float,
     nothing: float = 0.0,
-) -> tuple[Solved, Cut] | None:
-    """The optimum of one star with one set of shafts, and what it proves of all others; None if there is none."""
-    full = model.samples
+) -> tuple[Solved | None, Cut | None]:
+    """The optimum of one star with one set of shafts, and what it proves of all others.
+
+    Returns
+    -------
+    None where no design of this star keeps the limits, with what shows that of others too (S45), if anything does.
+    """
+    full, proves = model.samples, model.problem.search.proves
     # what bounds means that are averaged bounds the whole cycle (P7)
     fine, sound = model.at(full), model.at(full, averaged=True)
     kept = tuple(own < 0 or own in built for own in owners)
     whole, averaged = _only(fine.at(star), kept), _only(sound.at(star), kept)
     idle = [not norm.slope.any() for _, norm in whole.limits]
     if _broken(model, star, whole, idle):
-        return None
+        return None, None
     if not any(kept):
         return _fixed(sound, whole, star, built)
     best: tuple[Solved, Multipliers] | None = None
@@ -75,26 +81,22 @@ def solve_design(
         solution = solve_cones(_acting(_only(model.at(samples).at(star), kept), idle))
         if solution.x is None:
             # a mean at a few angles may be more than over the cycle, averages never are (P7)
-            rough = _acting(_only(model.at(samples, averaged=True).at(star), kept), idle)
-            solution = solve_cones(replace(rough, limits=tuple((m * (1.0 + KEPT), n) for m, n in rough.limits)))
+            rough = model.at(samples, averaged=True)
+            solution, cut = _by_averages(rough, star, built, owners, idle, solution)
             if solution.x is None:
-                return None
+                return None, cut
             if samples < full:
                 continue
-        judged = _acting(whole, idle)
         bound = best_bound(_acting(averaged, idle), solution.x, solution.multipliers)
-        value, excess = judged.objective(solution.x), judged.excess(solution.x)
+        value, excess = whole.objective(solution.x), _acting(whole, idle).excess(solution.x)
         # where the angles forbid what averages allow, what is proven at the angles is too much
         least = bound.value if excess <= FEASIBLE else min(bound.value, value)
-        found = Solved(star, built, value, least)
-        best = (found, _with_idle(bound.multipliers, whole, idle))
-        # what averages fall short by, no grid of this fidelity gains
-        if excess <= FEASIBLE and gap_of(averaged.objective(solution.x), least, nothing) <= 0.25 * tolerance:
+        best = (Solved(star, built, value, least), _with_idle(bound.multipliers, sound, idle))
+        # what averages fall short by, no grid of this fidelity gains; a design alone is as good at few angles
+        enough = gap_of(averaged.objective(solution.x), least, nothing) <= 0.25 * tolerance or not proves
+        if enough and excess <= FEASIBLE:
             break
-    if best is None:
-        return None
-    found, multipliers = best
-    return found, cut_of(sound, multipliers)
+    return (None, None) if best is None else (best[0], cut_of(sound, best[1]))
 
 
 def coarse_value(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int]) -> float:
@@ -127,13 +129,32 @@ def _acting(affine: AffineProblem, idle: Sequence[bool]) -> AffineProblem:
     return replace(affine, limits=tuple(limit for limit, out in zip(affine.limits, idle, strict=True) if not out))
 
 
-def _with_idle(multipliers: Multipliers, whole: AffineProblem, idle: Sequence[bool]) -> Multipliers:
+def _with_idle(multipliers: Multipliers, rows_of: StarProblem, idle: Sequence[bool]) -> Multipliers:
     """No price on the limits that were left out."""
     rows = iter(multipliers.limits)
     limits = tuple(
-        np.zeros_like(norm.constant) if out else next(rows) for (_, norm), out in zip(whole.limits, idle, strict=True)
+        np.zeros_like(norm.constant) if out else next(rows) for (_, norm), out in zip(rows_of.limits, idle, strict=True)
     )
     return replace(multipliers, limits=limits)
+
+
+def _by_averages(
+    averaged: StarProblem, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int], idle: Sequence[bool],
+    found: ConicSolution,
+) -> tuple[ConicSolution, Cut]:  # fmt: skip
+    """The design of a star that has none at the angles, by averages; and what dual rows prove of others (S45).
+
+    Limits are wider by what a design may exceed them by. Where dual rows of the angles show that averages have none
+    either, these are not asked.
+    """
+    wide = replace(averaged, limits=tuple((maximum * (1.0 + KEPT), norm) for maximum, norm in averaged.limits))
+    none = tuple(np.zeros_like(norm.constant) for _, norm in wide.terms)
+    cut = cut_of(wide, Multipliers(none, _with_idle(found.multipliers, wide, idle).limits))
+    if cut.excludes(np.array([star]), [built], owners).all():
+        return found, cut
+    kept = tuple(own < 0 or own in built for own in owners)
+    found = solve_cones(_acting(_only(wide.at(star), kept), idle))
+    return found, cut_of(wide, Multipliers(none, _with_idle(found.multipliers, wide, idle).limits))
 
 
 def _fixed(
