@@ -24,7 +24,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.report import explain, files
 from laufruhe.report import trade as report
 from laufruhe.report.web_page import as_html
-from laufruhe.studies.trade import Trade, seconds, trade, traded_part
+from laufruhe.studies.trade import Trade, effort, seconds, trade, traded_part
 
 Pages = dict[str, bytes]
 """What is written, by the names of the files."""
@@ -100,14 +100,16 @@ def _measured(
         one = trade(problems[0], lambda text: say(f"{problems[0].name}: {text}"))
         yield 0, one, _pages(paths[0], one)
         return
-    pieces = [(path, tables_of(path)) for path in paths]
+    # what takes long comes first, so that the last to end are short
+    order = sorted(range(len(problems)), key=lambda k: effort(problems[k]), reverse=True)
+    pieces = [(paths[k], tables_of(paths[k])) for k in order]
     with (
         executor_for(min(len(pieces), count_of())) as executor,
         closing(each(_measured_there, pieces, executor, patient=True)) as answers,
     ):
-        for k, answer in answers:
+        for place, answer in answers:
             if answer is not None:
-                one, pages = answer
+                k, (one, pages) = order[place], answer
                 say(f"{problems[k].name} is measured")
                 yield k, replace(one, problem=traded_part(problems[k])), pages
 

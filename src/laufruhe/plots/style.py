@@ -242,7 +242,7 @@ def as_png(figure: Figure) -> bytes:
         canvas.draw()
     drawn = io.BytesIO()
     # all of it is opaque
-    image = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
+    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
     image.save(drawn, format="png", compress_level=3, dpi=(DPI, DPI))
     return drawn.getvalue()
 

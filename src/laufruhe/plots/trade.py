@@ -21,6 +21,8 @@ PANEL, DOT = (5.4, 4.4), 0.13
 """Width and height of the panel, and room of a dot [inch]."""
 NAME_HEIGHT = 0.036
 """Of a name, over the panel."""
+_NAMES = 1.03
+"""Where names begin, over the panel."""
 _FEW_DECADES = 30.0
 _PLAIN = FuncFormatter(lambda value, _: _power(value))
 
@@ -119,12 +121,11 @@ def _front(rows: tuple[Row, ...]) -> list[Row]:
 
 def _name(axes: Axes, rows: tuple[Row, ...], times: Array, errors: Array) -> None:
     """Names in a column beside the panel, each joined to its dot."""
-    low, high = np.log10(axes.get_ylim())
+    (left, right), (low, high) = (np.log10(side) for side in (axes.get_xlim(), axes.get_ylim()))
     # of dots at one height the nearest to the names is named lowest: no line crosses another dot's name
     heights = (np.log10(errors) - low) / (high - low) - 1e-6 * np.argsort(np.argsort(times))
-    for row, time, error, height in zip(rows, times, errors, spread(heights, NAME_HEIGHT), strict=True):
-        axes.annotate(
-            row.name, (time, error), xytext=(1.03, height), textcoords="axes fraction", fontsize=SMALL, va="center",
-            ha="left", color=INK, annotation_clip=False, zorder=1,
-            arrowprops={"arrowstyle": "-", "color": "#c4c4c4", "lw": 0.6, "shrinkA": 0.0, "shrinkB": 3.0},
-        )  # fmt: skip
+    across = (np.log10(times) - left) / (right - left)
+    for row, x, y, height in zip(rows, across, heights, spread(heights, NAME_HEIGHT), strict=True):
+        axes.plot([x, _NAMES - 0.005], [y, height], transform=axes.transAxes, color="#c4c4c4", lw=0.6, zorder=1,
+                  clip_on=False)  # fmt: skip
+        axes.text(_NAMES, height, row.name, transform=axes.transAxes, size=SMALL, va="center", color=INK, zorder=1)

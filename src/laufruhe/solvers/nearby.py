@@ -27,8 +27,8 @@ from laufruhe.solvers.stars.ranking import candidates_of
 
 STARTS, STARS, STARS_THAT_MOVE = 3, 3, 2
 """Of a first search where mounts are open, and stars that are ranked; fewer of them where mounts or throws move too."""
-BOXES = 100
-"""Of places and leads at most, each of which has a design in its middle."""
+BOXES, NEAR_BOXES = 100, 30
+"""Of places and leads at most, each of which has a design in its middle; fewer where a design is known."""
 LIKE = 0.1
 """Share by which what is minimised of a design known may differ where searches from it are enough."""
 STEPS = 96
@@ -59,7 +59,8 @@ def first_of(problem: Problem) -> Result | None:
         moves = phasing.continuous or bool(problem.mount_decisions)
         few = min(phasing.best, STARS_THAT_MOVE if moves else STARS)
         problem = replace(problem, phasing=replace(phasing, best=few, thorough=False))
-    result = solve(replace(problem, search=_unproven(problem, STARTS)))
+    # what is made of each star is not proven either
+    result = solve(problem.changed(search=_unproven(problem, STARTS, BOXES)))
     return result if result.status.has_design else None
 
 
@@ -141,15 +142,15 @@ def _begun(problem: Problem, known: Result) -> Problem:
     numbers = problem.numbers(values)
     decisions = tuple(replace(d, start=value) for d, value in zip(problem.decisions, values, strict=True))
     return replace(
-        problem, engine=numbers.engine(problem.engine), decisions=decisions, search=_unproven(problem, 1),
+        problem, engine=numbers.engine(problem.engine), decisions=decisions, search=_unproven(problem, 1, NEAR_BOXES),
         mount_numbers=tuple(tuple(row) for row in numbers.mounts) or problem.mount_numbers,
     )  # fmt: skip
 
 
-def _unproven(problem: Problem, starts: int) -> Search:
+def _unproven(problem: Problem, starts: int, few: int) -> Search:
     """With so many starts at most, and a few boxes where these find designs."""
-    most = problem.search.boxes if problem.search.boxes is not None else BOXES
-    boxes = min(most, BOXES) if kinds_of(problem) & {Kind.PLACE, Kind.LEAD} else 0
+    most = problem.search.boxes if problem.search.boxes is not None else few
+    boxes = min(most, few) if kinds_of(problem) & {Kind.PLACE, Kind.LEAD} else 0
     return replace(problem.search, starts=min(problem.search.starts, starts), boxes=boxes, proves=False)
 
 

@@ -178,6 +178,11 @@ def is_local(problem: Problem) -> bool:
     return is_open(problem) and not is_convex(problem)
 
 
+def effort(problem: Problem) -> tuple[bool, int]:
+    """By which problems rank in how long their trade takes: those searched for above others, then by what is open."""
+    return is_local(problem), len(problem.decisions)
+
+
 class _Decided:
     """What the reference decides, and each fidelity from there (F14).
 

@@ -103,7 +103,8 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optim
             continue
         best = found
         rows = max(len(norm.grid.weights) for _, norm in best.problem.terms)
-        if (best.gap <= problem.tolerance and best.excess <= FEASIBLE) or rows > MOST_ROWS:
+        enough = best.gap <= problem.tolerance or not problem.search.proves
+        if (enough and best.excess <= FEASIBLE) or rows > MOST_ROWS:
             break
         samples *= 2
     return best, samples

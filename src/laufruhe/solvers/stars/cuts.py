@@ -1,8 +1,8 @@
 """Exact search over stars and sets of shafts with everything else at its own optimum (S13-S15).
 
 Whoever solves the cone program of one star gets dual rows Z. The bound that they prove
-is affine in the star, so one solve bounds every star from below, or shows that others keep the limits as little: least first, the next
-star is solved only while its bound lies under the best value known. It ends with a
+is affine in the star, so one solve bounds every star from below, or shows that others keep the limits as
+little: least first, the next star is solved only while its bound lies under the best value known. It ends with a
 proof, because each star is solved at most once.
 """
 
