@@ -288,3 +288,17 @@ def test_a_limit_that_is_left_out_at_first_comes_back_where_it_is_felt(tmp_path,
     assert wide.objective.value == pytest.approx(free.objective.value, rel=1e-6)
     assert wide.objective.value < 0.9 * felt.objective.value
     assert wide.limits[0].shadow_price == 0.0
+
+
+def test_what_nothing_open_moves_is_a_number_of_the_program(tmp_path):
+    """The roll moment of the block beside open mounts has no rows: hundreds of them would be carried along."""
+    problem = joint_problem(tmp_path, "rms", '[[constraints]]\nlimit = "static sag"\nmax = "3 mm"\n')
+    alone = replace(problem, decisions=problem.mount_decisions)
+    roll = Term(Measure(channels.ROLL_MOMENT, NORMS["peak to peak"]), 2.0)
+    plain, mixed = (SmoothProgram(replace(alone, objective=terms), 1.0) for terms in
+                    (alone.objective, (*alone.objective, roll)))  # fmt: skip
+    assert mixed.program.x.numel() == plain.program.x.numel()
+    start = plain.start([d.start for d in alone.decisions], np.zeros(0))
+    own = 2.0 * evaluate(alone).value(roll.measure)
+    assert own > 0.0
+    assert at(mixed, start)[0] == pytest.approx(at(plain, start)[0] + own, rel=1e-9)

@@ -59,6 +59,15 @@ def test_no_time_for_any_design_is_a_failure(tmp_path):
     assert "phasing.time_limit = 1e-09 s" in result.message
 
 
+def test_a_failure_names_the_limit_of_time_that_ended_it(tmp_path):
+    rest = engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE
+    rest += '[[constraints]]\nlimit = "rms rocking couple"\norders = [2]\nmax = "1 N m"\n'
+    result = solve(engines.problem(tmp_path, 5, rest=rest), time_limit=1e-9)
+    assert result.status is Status.FAILED
+    assert "found in the time limit" in result.message
+    assert "phasing.time_limit" not in result.message
+
+
 def test_a_search_cut_short_names_its_gap(tmp_path):
     result = solve(engines.problem(tmp_path, 10, phasing='time_limit = "1e-9 s"'))
     assert result.status is Status.FEASIBLE

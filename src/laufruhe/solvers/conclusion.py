@@ -225,6 +225,12 @@ def none_within(problem: Problem, initial: Evaluation, conflict: tuple[str, ...]
     )
 
 
+def not_found(problem: Problem, initial: Evaluation, names: Sequence[str], timing: dict[str, float]) -> Result:
+    """No design was found within limits that nothing excludes."""
+    why = f"no design was found that keeps {quoted(tuple(names))}, and none is excluded; relax it, or give more time"
+    return replace(none_within(problem, initial, (), timing), status=Status.FAILED, message=why)
+
+
 def broken_limits(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[str, ...]:
     """Names of those that a design breaks."""
     return tuple(limit.name for limit in limits if evaluation.standing(limit).excess > KEPT)

@@ -37,7 +37,7 @@ def solve_run_cones(
     steps = _Steps(problem, limits, terms, rows)
     if not steps.found():
         names = [limit.name for limit in steps.problem.load_limits]
-        return none_within(problem, evaluate(problem), conflict_of(steps.affine(), names), {})
+        return none_within(problem, evaluate(problem), conflict_of(steps.affine(averaged=True), names), {})
     for _ in in_time(range(_AGAIN)):
         result = decide(steps.problem)
         x = vector_of(domains_of(problem.decisions), unbalances_of(problem, result)) if result.decisions else None
@@ -70,10 +70,10 @@ class _Steps:
         kept = (x for x in self._whole.limits if not x.measure.channel.is_checked or x.measure in known)
         return replace(self._whole, known_rows=known, limits=tuple(kept))
 
-    def affine(self, samples: int = _COARSE) -> AffineProblem:
-        """At so many angles at most, few by default."""
+    def affine(self, samples: int = _COARSE, averaged: bool = False) -> AffineProblem:
+        """At so many angles at most, few by default; means averaged about them exclude no design (P7)."""
         model = AffineModel(self.problem)
-        return model.at(min(samples, model.full_samples))
+        return model.at(min(samples, model.full_samples), averaged)
 
     def add(self, x: Array) -> None:
         """Those that a design brings near the limits, and its largest."""
@@ -101,10 +101,12 @@ class _Steps:
         for _ in in_time(range(_ROUNDS)):
             self.add(x)
             tell("steps of the run-up", sum(map(len, self._places.values())))
-            solution = solve_cones(self.affine())
-            if solution.x is None:
+            found = solve_cones(self.affine()).x
+            if found is None:
+                found = solve_cones(self.affine(averaged=True)).x
+            if found is None:
                 return False
-            x = solution.x
+            x = found
             if self.has_all(x):
                 break
         return True

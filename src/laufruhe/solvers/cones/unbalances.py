@@ -19,7 +19,7 @@ from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.nothing import ROUNDING, nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, broken_limits, concluded, judged, none_within
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, broken_limits, concluded, judged, none_within, not_found
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import on_grid
 from laufruhe.solvers.cones.lightest import SAME_LOAD, lightest
@@ -71,8 +71,12 @@ def solve_unbalances(problem: Problem, sharply: bool = False) -> Result:
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
     if optimum is None:
-        conflict = conflict_of(tightened(model.at(samples), 0.0), [limit.name for limit in model.problem.load_limits])
-        return none_within(problem, initial, conflict, timing)
+        # means averaged, as what was proven of all limits together was (P7)
+        sound = model.at(samples, averaged=True)
+        names = [limit.name for limit in model.problem.load_limits]
+        if not is_empty(sound):
+            return not_found(problem, initial, names, timing)
+        return none_within(problem, initial, conflict_of(sound, names), timing)
     if sharply:
         optimum = sharpened(model, optimum)
     values = [domain.complex_value(optimum.x) for domain in model.domains]

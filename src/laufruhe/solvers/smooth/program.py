@@ -39,6 +39,7 @@ from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import domains_of
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
@@ -206,7 +207,9 @@ class SmoothProgram:
         return self._loads.rows(measure)
 
     def _least(self, measure: Measure) -> Any:
-        """A measure to be minimised, softened by a share of the objective (N3)."""
+        """A measure to be minimised, softened by a share of the objective (N3); a number where nothing moves it."""
+        if self.moves is None and not measure.channel.is_moved_by({d.kind for d in self.problem.decisions}):
+            return evaluate(off_resonance(self.problem)).value(measure)
         if measure.is_mounting:
             return self._mount_number(measure)
         if measure.channel.is_checked:

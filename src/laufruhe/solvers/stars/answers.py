@@ -5,16 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.amplitudes import AmplitudeObjective, amplitude_objective
 from laufruhe.load_models.pair_tables import PairObjective
+from laufruhe.load_models.star_model import StarModel
+from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
+from laufruhe.solvers.conclusion import KEPT
 from laufruhe.solvers.stars.cuts import CutsFound, search_designs
 from laufruhe.solvers.stars.exchange import improved
 from laufruhe.solvers.stars.families import Family, FiringFamily
@@ -22,6 +26,9 @@ from laufruhe.solvers.stars.firing_search import MOST_SLOTS, enumerate_orders
 from laufruhe.solvers.stars.program import owners_of, solve_design
 from laufruhe.solvers.stars.ranking import RankedStar, ranked_star
 from laufruhe.solvers.stars.search import StarsFound, enumerate_stars, search_stars
+
+if TYPE_CHECKING:
+    from laufruhe.solvers.stars.mixed_conic import ProgramFound
 
 MOST_LISTED = 1_000_000
 # looking at every star is as quick as a search up to here
@@ -152,10 +159,22 @@ def _is_closed(found: CutsFound, tolerance: float, nothing: float) -> bool:
     return bool(found.solved) and gap_of(found.solved[0].value, found.lower_bound, nothing) <= tolerance
 
 
-def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
-    """The mixed-integer program by SCIP, its design solved again and bounded by the exact model."""
+def _programmed(
+    model: StarModel, samples: int, space: StarSpace, owners: Sequence[int], phasing: Phasing
+) -> ProgramFound:  # fmt: skip
+    """What SCIP finds; that it allows no star is taken from means averaged about its few angles alone (P7)."""
     from laufruhe.solvers.stars.mixed_conic import solve_program
 
+    found = solve_program(model.at(samples), space, owners, phasing.shafts, phasing.time_limit)
+    if found.status != "infeasible":
+        return found
+    sound = model.at(samples, averaged=True)
+    lenient = replace(sound, limits=tuple((most * (1.0 + KEPT), norm) for most, norm in sound.limits))
+    return solve_program(lenient, space, owners, phasing.shafts, phasing.time_limit)
+
+
+def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+    """The mixed-integer program by SCIP, its design solved again and bounded by the exact model."""
     nothing = nothing_of(problem)
     answers = []
     for family in families:
@@ -165,7 +184,7 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         exact = all(term.measure.norm.is_euclidean for term in problem.objective) and not problem.limits
         samples = model.samples if exact else PROGRAM_SAMPLES
         owners = owners_of(model)
-        program = solve_program(model.at(samples), space, owners, phasing.shafts, phasing.time_limit)
+        program = _programmed(model, samples, space, owners, phasing)
         if program.status == "infeasible":
             answers.append(Answer((), math.inf, True, 0, "SCIP"))
             continue

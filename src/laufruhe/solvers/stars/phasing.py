@@ -100,7 +100,8 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
             return _uneven(problem, phasing, None)
         if answer.complete:
             return _none(problem, answer.infeasible)
-        why = f"no feasible design was found in phasing.time_limit = {phasing.time_limit:g} s; raise it"
+        given = "the time limit" if passed() else f"phasing.time_limit = {phasing.time_limit:g} s"
+        why = f"no feasible design was found in {given}; raise it"
         return no_star(problem, why, Status.FAILED)
     result = _best_of(problem, phasing, answer)
     if answer.complete and problem.search.proves:

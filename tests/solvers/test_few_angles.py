@@ -1,0 +1,104 @@
+"""Means at few angles may be more than over the cycle: what they forbid is no proof that there is no design (P7)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import laufruhe
+from laufruhe.files.reader import load_tables
+from laufruhe.load_models.affine import AffineModel
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers import Status, solve
+from laufruhe.solvers.cones.conic import solve_cones
+from laufruhe.solvers.cones.unbalances import is_empty
+
+SINGLE: dict[str, Any] = {
+    "title": "single with two shafts",
+    "engine": {
+        "layout": "inline", "cycle": "two-stroke", "stroke": "100 mm", "rod_ratio": 0.3, "reciprocating_mass": "1 kg",
+        "throws": [0],
+    },
+    "operating_points": [{"speed": "3000 rpm"}],
+    "balancer_shafts": [
+        {"name": "left", "ratio": 1, "position": ["0 mm", "0 mm"],
+         "unbalances": [{"x": "0 mm", "unbalance": {"between": ["0 kg m", "0.02 kg m"]}, "angle": 180}]},
+        {"name": "right", "ratio": -1, "position": ["0 mm", "0 mm"],
+         "unbalances": [{"x": "0 mm", "coupled": {"to": "left", "as": "mirrored"}}]},
+    ],
+    "objective": {"minimise": "mean shaking force"},
+    "fidelity": {"samples": 48},
+}  # fmt: skip
+QUIET = {"name": "quiet", "limit": "mean shaking force", "max": "1072.5 N"}
+IMPOSSIBLE = {"name": "impossible", "limit": "rms shaking force", "max": "1200 N"}
+
+
+def single(*limits: dict[str, str]) -> Problem:
+    return load_tables({**SINGLE, "constraints": list(limits)}, Path("single.toml"))
+
+
+def test_few_angles_forbid_what_the_cycle_allows() -> None:
+    """Of the problem below: a force that is kept over the cycle, and at no 48 angles."""
+    model = AffineModel(single(QUIET))
+    assert is_empty(model.at(48))
+    fine = model.at(5760)
+    x = solve_cones(fine).x
+    assert x is not None
+    assert fine.objective(x) < 1071.7
+
+
+def test_a_limit_that_can_be_kept_is_not_named_as_one_that_cannot() -> None:
+    result = laufruhe.solve(single(IMPOSSIBLE, QUIET))
+    assert result.status is Status.INFEASIBLE
+    assert result.conflict == ("impossible",)
+
+
+def test_time_that_ran_out_is_no_proof() -> None:
+    result = laufruhe.solve(single(QUIET), time_limit=1e-9)
+    assert result.status is not Status.INFEASIBLE
+    assert laufruhe.solve(single(QUIET)).status is Status.OPTIMAL
+
+
+def test_a_run_up_is_designed_for_where_few_angles_forbid_a_mean() -> None:
+    """Steps of a run are gathered at 48 angles, at which no design keeps this force; over the cycle 7.073 N is kept."""
+    corners = [(200, 200), (200, -200), (-200, 200), (-200, -200)]
+    places = [
+        {"name": f"mount {k}", "position": [f"{x} mm", f"{y} mm", "0 mm"], "stiffness": ["100 N/mm"] * 3}
+        for k, (x, y) in enumerate(corners)
+    ]
+    left, right = SINGLE["balancer_shafts"]
+    turned = {**left, "unbalances": [{**left["unbalances"][0], "angle": 183}]}
+    told = {
+        **SINGLE, "engine": {**SINGLE["engine"], "throws": [3]}, "balancer_shafts": [turned, right],
+        "block": {"mass": "100 kg", "centre_of_gravity": ["0 mm"] * 3, "inertia": ["5 kg m^2", "6 kg m^2", "7 kg m^2"]},
+        "mounts": {"kind": "elastic", "loss_factor": 0.1, "places": places},
+        "run_up": {"up_to": "3000 rpm", "time": "0.5 s"},
+        "objective": {"minimise": "run-up travel"},
+        "constraints": [{"limit": "mean mount force", "max": "7.0745 N"}],
+    }  # fmt: skip
+    result = laufruhe.solve(load_tables(told, Path("mounted.toml")))
+    assert result.status is Status.OPTIMAL
+
+
+@pytest.mark.slow
+def test_stars_are_not_excluded_by_means_at_the_few_angles_of_a_program() -> None:
+    """The mixed-integer program has 24 angles, at which no star keeps this couple; over the cycle 470.2 N m is."""
+    told = {
+        **SINGLE,
+        "engine": {
+            "layout": "inline", "cycle": "two-stroke", "stroke": "100 mm", "rod_ratio": 0.28, "cylinders": 5,
+            "reciprocating_mass": "1 kg", "rotating_mass": "0.3 kg", "cylinder_spacing": "100 mm", "throws": "open",
+        },
+        "balancer_shafts": [{
+            "name": "s", "ratio": -1, "position": ["0 mm", "0 mm"],
+            "unbalances": [{"x": "60 mm", "unbalance": {"between": ["0 kg m", "0.01 kg m"]},
+                            "angle": {"between": [0, 360]}}],
+        }],
+        "phasing": {"method": "program"},
+        "fidelity": {"samples": 720},
+        "objective": {"minimise": "rms rocking couple"},
+        "constraints": [{"limit": "mean rocking couple", "max": "470.277 N m"}],
+    }  # fmt: skip
+    assert solve(load_tables(told, Path("five.toml"))).status is not Status.INFEASIBLE
