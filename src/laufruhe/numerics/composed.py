@@ -62,6 +62,10 @@ class Mapped(Composed):
         """That of its source: what a map leaves of it repeats as often."""
         return self.source.step
 
+    def repeats(self, also: tuple[Fraction, ...] = ()) -> Fraction:
+        """As its source."""
+        return self.source.repeats(also)
+
     @property
     def series(self) -> Spectrum:
         """Its orders alone."""
@@ -87,7 +91,7 @@ class Held(Spectrum):
     def once(self, what: str, asked: Any, made: Callable[[Spectrum], T]) -> T:
         """What is made of it; kept until something else is asked for by the same name."""
         known, found = self._last.get(what, (None, None))
-        if known is None or known != asked:
+        if known is not asked and (known is None or known != asked):
             found = made(self)
             self._last[what] = asked, found
         return cast(T, found)
@@ -99,7 +103,9 @@ class Held(Spectrum):
 
     def over(self, base: Fraction) -> Spectrum:
         """The same over another period of its own."""
-        return self if base == self.base else self.once("over", base, lambda _: held(super(Held, self).over(base)))
+        if base is self.base or base == self.base:
+            return self
+        return self.once("over", base, lambda _: held(super(Held, self).over(base)))
 
     def sample(self, samples: int) -> NDArray[np.float64]:
         """Values at equal steps, which nobody may change."""
@@ -148,6 +154,10 @@ class Summed(Composed):
     def step(self) -> int:
         """Of both: what cancels in the sum repeats as often."""
         return math.gcd(self.held.step, self.own.step)
+
+    def repeats(self, also: tuple[Fraction, ...] = ()) -> Fraction:
+        """As of any other; most parts of one's own repeat as the one before did."""
+        return self.held.once("repeats", (self.step, also), lambda _: super(Summed, self).repeats(also))
 
     @property
     def series(self) -> Spectrum:

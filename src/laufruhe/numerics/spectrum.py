@@ -215,7 +215,7 @@ class Spectrum:
 
     def over(self, base: Fraction) -> Spectrum:
         """The same signal over another period of its own, that of the lowest order `base`."""
-        if base == self.base:
+        if base is self.base or base == self.base:
             return self
         fine, step = self, times(base, self.base)
         if not step:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
@@ -229,12 +230,18 @@ def lengths(rows: Array) -> Array:
     # BLAS warns of nothing
     if not np.vdot(rows, rows) < _MOST**2:
         return _scaled_lengths(rows)
-    size = np.sqrt((rows * rows) @ np.ones(rows.shape[-1]))
-    if size.min(initial=_MOST) < _LEAST:
+    size = np.sqrt((rows * rows) @ _ones(rows.shape[-1]))
+    if np.minimum.reduce(size, axis=None, initial=_MOST) < _LEAST:
         small = size < _LEAST
         if (short := rows[small]).any():
             size[small] = _scaled_lengths(short)
     return np.asarray(size)
+
+
+@lru_cache(maxsize=16)
+def _ones(count: int) -> Array:
+    """So many ones: a sum as a product with them takes a fifth of the time."""
+    return np.ones(count)
 
 
 def _scaled_lengths(rows: Array) -> Array:
