@@ -170,21 +170,13 @@ def _check_once(limits: Sequence[Limit]) -> None:
     """Refuse two limits of one side of one measure, unless names tell them apart: of several bands each is its own."""
     given: dict[tuple[Any, ...], int] = {}
     for k, limit in enumerate(limits):
-        sides = {
-            "max": limit.maximum < math.inf,
-            "min": limit.minimum > -math.inf,
-            "outside": limit.outside is not None,
-        }
-        for side in (side for side, is_given in sides.items() if is_given):
+        sides = (("max", limit.maximum < math.inf), ("min", limit.minimum > -math.inf), ("outside", limit.outside))
+        for side in (side for side, is_given in sides if is_given):
             other = given.setdefault((limit.measure, limit.name, side, limit.outside if side == "outside" else None), k)
             if other != k:
-                names = f"constraints[{other + 1}] ('{limits[other].name}')"
-                raise Refused(
-                    f"constraints[{k + 1}].{side}",
-                    None,
-                    f"limits '{limit.name}' once more, beside {names}",
-                    "keep the tighter one, or give each a name",
-                )
+                beside = f"beside constraints[{other + 1}] ('{limits[other].name}')"
+                rule, remedy = f"limits '{limit.name}' once more, {beside}", "keep the tighter one, or give each a name"
+                raise Refused(f"constraints[{k + 1}].{side}", None, rule, remedy)
 
 
 def _check_together(limits: Sequence[Limit]) -> None:

@@ -21,7 +21,10 @@ MOST_COMPLAINTS = 20
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _CLOSE = 0.6
 _FEW = 3
-_COUNTED = {"too_short": ("at least", "min_length"), "too_long": ("at most", "max_length")}
+_COUNTED = {
+    "too_short": ("at least", "min_length", "add what is missing"),
+    "too_long": ("at most", "max_length", "take some out"),
+}
 _RULES = {
     "int_type": "must be a whole number",
     "int_from_float": "must be a whole number",
@@ -133,11 +136,8 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], home: s
     kind, where = detail["type"], key_path(loc)
     if kind == "extra_forbidden":
         keys = [field.alias or name for table in tables[:1] for name, field in table.model_fields.items()]
-        remedy = (
-            'a unit stands beside its number, as in "120 mm"'
-            if loc[-1] == "unit"
-            else nearest(str(loc[-1]), keys, home)
-        )
+        of_unit = 'a unit stands beside its number, as in "120 mm"'
+        remedy = of_unit if loc[-1] == "unit" else nearest(str(loc[-1]), keys, home)
         return Complaint(where, short(detail["input"]), "is not a key here", remedy)
     if kind == "missing":
         return Complaint(where, "", "is missing", "add it")
@@ -155,11 +155,9 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], home: s
         remedy = nearest(str(value), words) if len(words) > _FEW else "use one of: " + ", ".join(words)
         return Complaint(where, short(value), "is not allowed", remedy)
     if kind in _COUNTED:
-        needed = detail["ctx"][_COUNTED[kind][1]]
-        rule = f"has {detail['ctx']['actual_length']} entries, and {_COUNTED[kind][0]} {needed} belong there"
-        return Complaint(
-            where, short(detail["input"]), rule, "add what is missing" if "least" in rule else "take some out"
-        )
+        sense, key, remedy = _COUNTED[kind]
+        rule = f"has {detail['ctx']['actual_length']} entries, and {sense} {detail['ctx'][key]} belong there"
+        return Complaint(where, short(detail["input"]), rule, remedy)
     message = (detail["msg"][:1].lower() + detail["msg"][1:]).replace("input should", "must")
     rule, _, remedy = _RULES.get(kind, message).partition("; ")
     return Complaint(where, short(detail["input"]), rule, remedy or "correct it")

@@ -90,8 +90,8 @@ class Scene:
         found = Measure(
             channel, norm, self._places(channel, table, at), as_tuple(table.operating_points), as_tuple(of),
             as_tuple(table.orders), None if weights is None else (weights[0], weights[1], weights[2]),
-            as_tuple(table.motions), _band(table.frequency), 1.0 if table.wanted is None else table.wanted,
-            as_tuple(table.load_cases),
+            as_tuple(table.motions), (0.0, math.inf) if table.frequency is None else Open.of(table.frequency).bounds,
+            1.0 if table.wanted is None else table.wanted, as_tuple(table.load_cases),
         )  # fmt: skip
         if found.is_mass:
             self._counts(found, of, at)
@@ -205,8 +205,3 @@ def _known(names: list[str] | None, known: Sequence[str], where: str, what: str)
 def as_tuple(entries: Sequence[T] | None) -> tuple[T, ...] | None:
     """Entries of a list; all count where there is none."""
     return None if entries is None else tuple(entries)
-
-
-def _band(frequency: float | Open | None) -> tuple[float, float]:
-    """Frequencies that count; all where none is named."""
-    return (0.0, math.inf) if frequency is None else Open.of(frequency).bounds

@@ -95,9 +95,8 @@ def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
     for k, part in enumerate(parts):
         options = _options(here)
         if part not in options:
-            raise Refused(
-                ".".join(parts[: k + 1]), None, "is no quantity of this problem", _remedy(tables, here, parts, k)
-            )
+            remedy = _remedy(tables, here, parts, k)
+            raise Refused(".".join(parts[: k + 1]), None, "is no quantity of this problem", remedy)
         keys.append(options[part])
         here = here[options[part]]
     return tuple(keys)
@@ -135,15 +134,12 @@ def _options(here: Any) -> dict[str, Any]:
     if isinstance(here, dict):
         return {key: key for key in here}
     if isinstance(here, list):
-        names = [_name_of(entry) if isinstance(entry, dict) else None for entry in here]
+        # limits have a name, told or not
+        tables = [entry if isinstance(entry, dict) else {} for entry in here]
+        names = [one.get("name") or (limit_name(one) if "limit" in one else None) for one in tables]
         named = {name: k for k, name in enumerate(names) if isinstance(name, str) and names.count(name) == 1}
         return {**{str(k + 1): k for k in range(len(here))}, **named}
     return {}
-
-
-def _name_of(entry: dict[str, Any]) -> object:
-    """By which an entry of a list is spoken of: limits have one, told or not."""
-    return entry.get("name") or (limit_name(entry) if "limit" in entry else None)
 
 
 def field_at(where: str) -> f.Number | None:
@@ -236,9 +232,8 @@ class Span:
 
     def numbers(self, shares: Any) -> Any:
         """From shares of the way, 0 to 1."""
-        return (
-            self.low * (self.high / self.low) ** shares if self.is_log else self.low + (self.high - self.low) * shares
-        )
+        low, high = self.low, self.high
+        return low * (high / low) ** shares if self.is_log else low + (high - low) * shares
 
     def value(self, number: float) -> Value:
         """A number as a problem file has it."""
@@ -307,7 +302,8 @@ def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str
     if not all(map(math.isfinite, plain)):
         raise Refused(given, list(values), "is not finite", "give numbers")
     texts = [value for value in values if isinstance(value, str)]
-    wanted = field.unit if field is not None else _limited_unit(quantity, texts)
+    limited = units.dimension_of(texts[0]) if texts and _is_limit(quantity) else None
+    wanted = limited if field is None else field.unit
     if wanted is None or len(plain) + len(texts) < len(values):
         return ("1", tuple(plain)) if len(plain) == len(values) else ("", None)
     if not texts:
@@ -324,7 +320,3 @@ def _is_limit(quantity: str) -> bool:
     """Whether a path is that of a side of a limit, whose dimension is told by its text alone."""
     parts = parts_of(quantity)
     return parts[0] == "constraints" and parts[-1] in _SIDES
-
-
-def _limited_unit(quantity: str, texts: Sequence[str]) -> str | None:
-    return units.dimension_of(texts[0]) if texts and _is_limit(quantity) else None

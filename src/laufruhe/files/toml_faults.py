@@ -18,7 +18,11 @@ _HEAD = re.compile(r"\s*\[+ *([A-Za-z_][\w.-]*) *\]+\s*(?:#|$)")
 _CLOSING = {"[": "]", "{": "}"}
 _QUOTES = re.compile("[“”„‟‘’‚‛«»″]")
 _UNQUOTED = re.compile(r'[+-]?[\d.]+(?:[eE][+-]?\d+)? *[A-Za-z°%][^"=]*"?$')
+_OPEN_QUOTE = ("the text is not closed", "end it with the quote that it begins with")
 _STATEMENTS = {
+    "Illegal character '\\n'": _OPEN_QUOTE,
+    "Unterminated": _OPEN_QUOTE,
+    'Expected "': _OPEN_QUOTE,
     "Expected '='": ("no = follows the key", "write key = value"),
     "Expected newline": ("more stands behind the value", "take it out, or begin a new line"),
     "Invalid statement": (
@@ -77,6 +81,10 @@ class _Break:
         lines = self.text[: self.begin].split("\n")[:-1]
         return zip(range(len(lines), 0, -1), reversed(lines), strict=True)
 
+    def lines_of(self, form: re.Pattern[str], name: str) -> list[int]:
+        """Numbers of the lines before it of this form that give this name, the nearest first."""
+        return [number for number, line in self.before() if (one := form.match(line)) and one.group(1) == name]
+
     def opened(self) -> int | None:
         """Where the last bracket stands that is open here; None where none is."""
         left: list[int] = []
@@ -132,27 +140,19 @@ def _twice(here: _Break) -> _Told:
     if not here.message.startswith(("Cannot", "Duplicate")):
         return None
     if head := _HEAD.match(here.line):
-        name, form, remedy = (
-            f"[{head.group(1)}]",
-            _HEAD,
-            f"join the two, or write [[{head.group(1)}]] for each of several",
-        )
+        remedy = f"join the two, or write [[{head.group(1)}]] for each of several"
+        name, form = f"[{head.group(1)}]", _HEAD
     else:
-        entry = next(
-            filter(None, (_ENTRY.match(line) for line in (here.line, *(line for _, line in here.before())))), None
-        )
+        entries = map(_ENTRY.match, (here.line, *(line for _, line in here.before())))
+        entry = next(filter(None, entries), None)
         name, form, remedy = entry.group(1) if entry else "a key", _ENTRY, "keep one of them"
     if here.message.startswith("Duplicate"):
         return here, f"{here.message.rpartition('key ')[2]} stands twice in one table", remedy
     own = name.strip("[]")
-    others = [number for number, line in here.before() if (one := form.match(line)) and one.group(1) == own]
+    others = here.lines_of(form, own)
     if not others and form is _HEAD:
-        entries = [number for number, line in here.before() if (one := _ENTRY.match(line)) and one.group(1) == own]
-        return (
-            here,
-            f"{own} is a value" + (f" in line {entries[-1]}" if entries else "") + " and a table here",
-            "keep one",
-        )
+        first = here.lines_of(_ENTRY, own)[-1:]
+        return here, f"{own} is a value{f' in line {first[0]}' if first else ''} and a table here", "keep one"
     # a value of several lines is read to its end
     others = others[1:] if form is _ENTRY and not _ENTRY.match(here.line) else others
     return here, f"{name} is given twice" + (f", before in line {others[0]}" if others else ""), remedy
@@ -161,11 +161,8 @@ def _twice(here: _Break) -> _Told:
 def _comma(here: _Break) -> _Told:
     if not units.DECIMAL_COMMA.match(here.value):
         return None
-    return (
-        here,
-        "a comma divides the number",
-        f"decimals follow a point, as in {printed(here.value.replace(',', '.', 1), 40)}",
-    )
+    text = printed(here.value.replace(",", ".", 1), 40)
+    return here, "a comma divides the number", f"decimals follow a point, as in {text}"
 
 
 def _unit(here: _Break) -> _Told:
@@ -189,12 +186,6 @@ def _bracket(here: _Break) -> _Told:
     return None
 
 
-def _open_quote(here: _Break) -> _Told:
-    if not here.message.startswith(("Illegal character '\\n'", "Unterminated", 'Expected "')):
-        return None
-    return here, "the text is not closed", "end it with the quote that it begins with"
-
-
 def _statement(here: _Break) -> _Told:
     for begin, told in _STATEMENTS.items():
         if here.message.startswith(begin):
@@ -216,5 +207,5 @@ def _bare(here: _Break) -> _Told:
 
 
 _LOOKS: tuple[Callable[[_Break], _Told], ...] = (
-    _quotes, _backslash, _twice, _comma, _unit, _bracket, _open_quote, _statement, _bare,
+    _quotes, _backslash, _twice, _comma, _unit, _bracket, _statement, _bare,
 )  # fmt: skip

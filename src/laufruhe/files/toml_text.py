@@ -17,24 +17,19 @@ def toml_text(tables: Mapping[str, Any]) -> str:
 
 def _lines(table: Mapping[str, Any], above: tuple[str, ...]) -> Iterator[str]:
     """Values first, then tables, then lists of tables."""
-    inner = {key: value for key, value in table.items() if _is_table(value) or _is_list_of_tables(value)}
+    lists = {key: value if isinstance(value, list) else [value] for key, value in table.items()}
+    inner = {key: tables for key, tables in lists.items() if tables and all(map(_is_table, tables))}
     yield from (f"{_key(key)} = {toml_value(value)}" for key, value in table.items() if key not in inner)
-    for key, value in inner.items():
+    for key, tables in inner.items():
         path = (*above, key)
         name = ".".join(map(_key, path))
-        for one in [value] if _is_table(value) else value:
-            yield ""
-            yield f"[{name}]" if _is_table(value) else f"[[{name}]]"
-            yield from _lines(one, path)
+        for one in tables:
+            yield from ("", f"[[{name}]]" if isinstance(table[key], list) else f"[{name}]", *_lines(one, path))
 
 
 def _is_table(value: Any) -> bool:
     """Whether a value has lines of its own; an open number stays on one."""
     return isinstance(value, Mapping) and "between" not in value
-
-
-def _is_list_of_tables(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(map(_is_table, value))
 
 
 def _key(key: str) -> str:

@@ -127,7 +127,11 @@ def torsion_of(
     throws = [throw for throw in throws if throw.shaft == CRANKSHAFT]
     opened, own = _Opened(), _throw_discs(table, parts, throws)
     ends = {end: [(k, disc) for k, disc in enumerate(table.discs) if disc.end == end] for end in ("front", "rear")}
-    front, rear = ([_disc(disc, opened) for _, disc in ends[end]] for end in ("front", "rear"))
+    front, rear = (
+        [Disc(one.name, opened.number(one.inertia, "inertia", "kg m^2", one.name, [one.name]), one.damping)
+         for _, one in ends[end]]
+        for end in ("front", "rear")
+    )  # fmt: skip
     discs = (*front, *own, *rear)
     names = [disc.name for disc in discs]
     links = [f"{a} - {b}" for a, b in itertools.pairwise(names)]
@@ -217,11 +221,6 @@ def _piece(piece: PieceTable, where: str, count: int) -> tuple[float, float, flo
     if piece.bore >= given.lower:
         raise Refused(f"{where}.bore", units.shown(piece.bore, "m"), "is as wide as its shaft", "give it a wall")
     return piece.length, given.start, piece.bore
-
-
-def _disc(table: DiscTable, opened: _Opened) -> Disc:
-    inertia = opened.number(table.inertia, "inertia", "kg m^2", table.name, [table.name])
-    return Disc(table.name, inertia, table.damping)
 
 
 def _absorber(table: AbsorberTable, names: Sequence[str], where: str, opened: _Opened) -> Absorber:

@@ -125,7 +125,7 @@ def _with_star(tables: dict[str, Any], result: Result) -> dict[str, Any]:
 
 def _alike(one: Engine, other: Engine) -> bool:
     """Whether two engines have the same masses, throws, firings, rotors and mounts, but for roundings."""
-    left, right = _numbers(one), _numbers(other)
+    left, right = map(_numbers, (one, other))
     return left.shape == right.shape and bool(np.all(np.abs(left - right) <= SAME * (1.0 + np.abs(left))))
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib.resources import files
+from typing import Any
 
 from markupsafe import Markup, escape
 
@@ -15,17 +15,6 @@ from laufruhe.report.document import Document
 
 PAGE = "page.html"
 HEADING = "Move the decisions"
-
-
-@dataclass(frozen=True)
-class _Live:
-    """What the template puts in the place of a live model; no script where nothing moves."""
-
-    heading: str
-    sentences: tuple[str, ...]
-    model: Markup
-    style: Markup
-    script: Markup
 
 
 def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | None = None) -> str:
@@ -47,15 +36,16 @@ def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | N
     return template.render(document=document, pictures=inline, live=_live(live)) + "\n"
 
 
-def _live(model: LiveModel | None) -> _Live | None:
+def _live(model: LiveModel | None) -> dict[str, Any] | None:
+    """What the template puts in the place of a live model; no script where nothing moves."""
     if model is None or not (model.sliders or model.unmoved):
         return None
     why = model.why_not or model.too_large
     if why:
-        return _Live(HEADING, (why, *model.told), Markup(""), Markup(""), Markup(""))
-    assets = page_assets()
+        return {"heading": HEADING, "sentences": (why, *model.told)}
     # of our own making, and JSON without an opening bracket
-    return _Live(HEADING, (), *(Markup(text) for text in (model.as_json(), assets["live.css"], assets["live.js"])))
+    texts = {"model": model.as_json(), "style": page_assets()["live.css"], "script": page_assets()["live.js"]}
+    return {"heading": HEADING, **{name: Markup(text) for name, text in texts.items()}}
 
 
 def _inline(svg: str) -> str:

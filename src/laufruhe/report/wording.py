@@ -108,15 +108,10 @@ def _proven(certificate: Certificate | None) -> str:
         return "not proven"
     words = {
         "global": "the proven optimum",
-        "global within gap": f"proven to within {gap_text(certificate)} of the optimum",
+        "global within gap": f"proven to within {percent_of(max(certificate.gap, 0.0))} of the optimum",
         "local": "a local optimum",
     }
     return words.get(str(certificate.kind), "not proven")
-
-
-def gap_text(certificate: Certificate) -> str:
-    """The gap in percent, to two figures."""
-    return percent_of(max(certificate.gap, 0.0))
 
 
 def percent_of(share: float) -> str:
@@ -144,7 +139,7 @@ def explained(result: Result) -> str:
             f"For this design {_conditions(c.kkt_residual)}. "
             f"No design is below {figure(c.lower_bound, o.unit, 6)}; designs between the two values are not ruled out."
         )
-    gap = f"a gap of {gap_text(c)}" if c.gap > 0.0 else "which leaves no gap"
+    gap = f"a gap of {percent_of(c.gap)}" if c.gap > 0.0 else "which leaves no gap"
     origin = "was not taken from the solver but computed from the exact model"
     if "SCIP" in c.method:
         origin = "is SCIP's dual bound less its tolerances, or that of dual rows where it is better"

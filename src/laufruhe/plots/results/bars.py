@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -46,13 +44,10 @@ def figure(result: Result) -> Figure:
             axes.set_title(f"at {result.problem.points[k].name}", loc="left", size=10)
     at = f" at {result.problem.points[shown[0]].name}" if len(shown) == 1 else ""
     lines = f"Magnitude of each mount's force{at}: mean over the working cycle, and its largest value."
-    return headed(drawn, result, "Mean and maximum mount forces", lines, _legend(series))
-
-
-def _legend(series: Sequence[Series]) -> list[Artist]:
-    full = Patch(facecolor=FAINT, edgecolor=FAINT, label="full: mean")
-    hollow = Patch(facecolor="none", edgecolor=FAINT, linewidth=1.4, label="outline: maximum")
-    return [*(Patch(facecolor=one.colour, edgecolor=one.colour, label=one.name) for one in series), full, hollow]
+    legend = [Patch(facecolor=one.colour, edgecolor=one.colour, label=one.name) for one in series]
+    legend.append(Patch(facecolor=FAINT, edgecolor=FAINT, label="full: mean"))
+    legend.append(Patch(facecolor="none", edgecolor=FAINT, linewidth=1.4, label="outline: maximum"))
+    return headed(drawn, result, "Mean and maximum mount forces", lines, legend)
 
 
 def _measures(design: Evaluation, k: int) -> Array:

@@ -29,8 +29,8 @@ def figure(result: Result) -> Figure:
     facts, top = facts_of(result.final), fastest(result)
     drawn = page(1, 1, (6.2, 4.2))
     axes = drawn.panels[0]
-    bands = [limit.outside for limit in limits_on(result, channels.FREQUENCIES) if limit.outside is not None]
     limits = limits_on(result, channels.FREQUENCIES)
+    bands = [limit.outside for limit in limits if limit.outside is not None]
     edges = [edge for limit in limits for edge in (limit.minimum, limit.maximum) if math.isfinite(edge)]
     known = [*facts.modes.frequencies, *facts.with_fluid, *edges, *(edge for band in bands for edge in band), 1e-9]
     reach = 1.1 * float(max(known))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,6 +22,7 @@ from laufruhe.present.measures import asks_torque, has_loads
 from laufruhe.present.numbers import RPM, number
 from laufruhe.solvers.result import Result
 
+Unit: TypeAlias = tuple[float, str]
 STEPS, MOST_ORDERS = 1440, 12
 WIDE, HIGH = 6.8, 1.65
 COLOURS = {"gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK}
@@ -48,8 +50,8 @@ def figure(result: Result) -> Figure:
     has_speed, turning = facts[k].irregularity is not None, list[Series]()
     drawn = page(3 + has_speed, 1, (WIDE, HIGH), gap=0.3, lead=0.0)
     _lower(drawn.panels[-1], 0.5)
-    large = whole >= 1e4
-    _torque(drawn.panels[0], felt, degrees, facts[k].mean, large)
+    unit = in_thousands(whole, "N m")
+    _torque(drawn.panels[0], felt, degrees, facts[k].mean, unit)
     _work(drawn.panels[1], parts["all"], degrees, facts[k])
     if has_speed:
         turning = _speed(drawn.panels[2], result, k, degrees)
@@ -59,7 +61,7 @@ def figure(result: Result) -> Figure:
         axes.tick_params(labelbottom=axes is drawn.panels[-2], length=2)
         round_ticks(axes.yaxis, 4)
     drawn.panels[-2].set_xlabel("crank angle [°]")
-    _orders(drawn.panels[-1], felt, large)
+    _orders(drawn.panels[-1], felt, unit)
     radii = {part.crank_radius for part in engine.slider_cranks}
     radius = f"; over {1e3 * min(radii):.4g} mm, the tangential force" if len(radii) == 1 else ""
     lines = f"Torque on the crankshaft at {points[k].name}{radius}."
@@ -75,14 +77,14 @@ def _lower(axes: Axes, inches: float) -> None:
     axes.set_position((box.x0, box.y0 - inches / high, box.width, box.height))
 
 
-def _torque(axes: Axes, parts: Mapping[str, Spectrum], degrees: Array, mean: float, large: bool) -> None:
-    factor = 1e-3 if large else 1.0
+def _torque(axes: Axes, parts: Mapping[str, Spectrum], degrees: Array, mean: float, unit: Unit) -> None:
+    factor = unit[0]
     for name, part in parts.items():
         wide = 1.4 if name == "all" else 2.6
         axes.plot(degrees, factor * part.values(np.radians(degrees)), color=COLOURS[name], linewidth=wide)
     axes.axhline(factor * mean, color=FAINT, linewidth=1.0, linestyle=(0, (4, 1.6)))
     axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
-    axes.set_ylabel(f"torque [{'k' if large else ''}N m]")
+    axes.set_ylabel(f"torque [{unit[1]}]")
 
 
 def _work(axes: Axes, torque: Spectrum, degrees: Array, facts: TorqueFacts) -> None:
@@ -120,9 +122,9 @@ def _speed(axes: Axes, result: Result, k: int, degrees: Array) -> list[Series]:
     return shown
 
 
-def _orders(axes: Axes, parts: Mapping[str, Spectrum], large: bool) -> None:
+def _orders(axes: Axes, parts: Mapping[str, Spectrum], unit: Unit) -> None:
     """Amplitudes side by side, the strongest orders of all."""
-    factor, total = 1e-3 if large else 1.0, parts.get("all", next(iter(parts.values())))
+    factor, total = unit[0], parts.get("all", next(iter(parts.values())))
     orders, sizes = total.orders[1:], np.abs(total.coefficients[1:])
     top = float(sizes.max(initial=0.0))
     chosen = sorted(k for k in np.argsort(-sizes, kind="stable")[:MOST_ORDERS].tolist() if sizes[k] > SEEN * top)
@@ -134,5 +136,5 @@ def _orders(axes: Axes, parts: Mapping[str, Spectrum], large: bool) -> None:
         heights = [factor * abs(complex(part.at(float(orders[k])))) for k in chosen]
         axes.bar(np.arange(len(chosen)) + (j + 0.5) * wide - 0.4, heights, wide, color=COLOURS[name])
     axes.set_xticks(range(len(chosen)), [f"{orders[k]:g}" for k in chosen])
-    axes.set(xlabel="order of crank speed", ylabel=f"amplitude [{'k' if large else ''}N m]")
+    axes.set(xlabel="order of crank speed", ylabel=f"amplitude [{unit[1]}]")
     axes.grid(axis="x", visible=False)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,10 +9,10 @@ from matplotlib.figure import Figure
 from laufruhe.physics.willans import FrictionTest
 from laufruhe.plots.style import AFTER, SKY, entry, entry_of_dots, headed, page, styled
 from laufruhe.plots.words import INK
+from laufruhe.present.numbers import RPM
 from laufruhe.solvers.result import Result
 
-BAR, RPM = 1e-5, 30.0 / math.pi
-MOST = 4
+BAR, MOST = 1e-5, 4
 
 
 def applies(result: Result) -> bool:

@@ -31,8 +31,8 @@ def _row(place: Place) -> tuple[str, ...]:
 def _beside(found: AssemblyResult, unit: str) -> str:
     """What other assemblies have."""
     middle, most = (figure(found.quantiles[int(share * (len(found.quantiles) - 1))], unit) for share in (0.5, 0.95))
-    told = (
-        f"Of {found.assemblies:,.0f} assemblies; {found.random} of them at random: half above {middle}, one of twenty"
-    )
+    told = f"Of {found.assemblies:,.0f} assemblies; {found.random} of them at random"
     worst, mean = figure(found.worst, unit), figure(found.mean_parts, unit)
-    return f"{told} above {most}, the worst {worst}. With parts of mean mass {mean}."
+    return (
+        f"{told}: half above {middle}, one of twenty above {most}, the worst {worst}. With parts of mean mass {mean}."
+    )

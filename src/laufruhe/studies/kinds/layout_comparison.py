@@ -165,7 +165,10 @@ def _ranking(data: xr.Dataset) -> list[Text]:
     scaled = [(name, *readable(unit), values, _places(values), why) for name, unit, values, why in columns]
     for k in sorted(range(points), key=lambda k: (math.isnan(best[k]), best[k])):
         row = [str(data["case"].values[k]), *(str(data[name].values[k]) for name in swept)]
-        rows.append(row + [_placed(factor * values[k], at[k], why[k]) for _, _, factor, values, at, why in scaled])
+        rows.append(row + [
+            f"{number(factor * values[k])} ({at[k]})" if at[k] else f"{NOTHING} {why[k]}".strip()
+            for _, _, factor, values, at, why in scaled
+        ])  # fmt: skip
     head = ["case", *swept, *(f"{name} [{unit}]" if unit else name for name, unit, *_ in scaled)]
     words = "Ranked by the first quantity; in parentheses the place by each. A dash: why that engine has none."
     return [words, Rows(head, rows[:MOST_ROWS], len(rows))]
@@ -176,7 +179,3 @@ def _places(values: np.ndarray) -> list[int]:
     told = values[np.isfinite(values)]
     near = _SAME * float(np.abs(told).max(initial=0.0))
     return [1 + int((told < value - near).sum()) if math.isfinite(value) else 0 for value in values]
-
-
-def _placed(value: float, place: int, why: str) -> str:
-    return f"{number(value)} ({place})" if place else f"{NOTHING} {why}".strip()

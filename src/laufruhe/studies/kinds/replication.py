@@ -58,17 +58,15 @@ class Replication(Part):
     @model_validator(mode="after")
     def _means_something(self) -> Replication:
         """Names, cases, functions and quantities are looked up before anything is computed."""
-        wrong = [InitErrorDetails(type=f.refusal(str(e)), loc=at, input=told) for at, told, e in self._wrong()]
-        if wrong:
-            raise ValidationError.from_exception_data("replication", wrong)
-        return self
-
-    def _wrong(self) -> Iterator[tuple[Place, Any, ModelError]]:
+        wrong = list[InitErrorDetails]()
         for at, told, check_it in self._checks():
             try:
                 check_it(told)
             except ModelError as error:
-                yield at, told, error
+                wrong.append(InitErrorDetails(type=f.refusal(str(error)), loc=at, input=told))
+        if wrong:
+            raise ValidationError.from_exception_data("replication", wrong)
+        return self
 
     def _checks(self) -> Iterator[tuple[Place, Any, Callable[[Any], None]]]:
         """What is looked up: where it stands, it, and how."""

@@ -142,20 +142,17 @@ def _read(text: str) -> tuple[tuple[ast.AST, ...], CodeType]:
             tree, own = (ast.parse(text.strip(), mode="eval") for _ in range(2))
             nodes = tuple(ast.walk(tree.body))
             for node in nodes:
-                _check_node(node)
+                if isinstance(node, ast.Call):
+                    check_among(ast.unparse(node.func), FUNCTIONS, "function")
+                if not _is_allowed(node):
+                    rule = f"'{ast.unparse(node)}' is not allowed here"
+                    raise ExpressionError(f"{rule}; use numbers, names and functions alone")
             return nodes, compile(ast.fix_missing_locations(_Called().visit(own)), "", "eval")
     except ExpressionError:
         raise
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         write = "write for example 100 * (mean['b'] / mean['a'] - 1)"
         raise ExpressionError(f"'{text}' is no expression; {write}") from None
-
-
-def _check_node(node: ast.AST) -> None:
-    if isinstance(node, ast.Call):
-        check_among(ast.unparse(node.func), FUNCTIONS, "function")
-    if not _is_allowed(node):
-        raise ExpressionError(f"'{ast.unparse(node)}' is not allowed here; use numbers, names and functions alone")
 
 
 def _is_allowed(node: ast.AST) -> bool:
