@@ -22,14 +22,6 @@ from laufruhe.plots.words import SMALL, apart, ink_on, legible, typeset
 from laufruhe.studies.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
 
 MOST_ENTRIES, FEW_ENTRIES = 8, 5
-_MORE = {
-    "indigo": "#332288",
-    "olive": "#999933",
-    "leaf": "#00664b",
-    "rust": "#a63c00",
-    "mint": "#d9ecd9",
-    "white": "#ffffff",
-}
 
 
 @styled()
@@ -58,7 +50,7 @@ def hue(colour: Colour) -> str:
     """A colour as matplotlib takes it."""
     if isinstance(colour, float):
         return to_hex(colormaps["viridis"](colour))
-    return str(_MORE.get(colour) or getattr(style, colour.upper()))
+    return str(getattr(style, colour.upper()))
 
 
 def _panel(axes: Axes, panel: Panel) -> None:

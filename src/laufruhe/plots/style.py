@@ -34,6 +34,7 @@ from laufruhe.solvers.result import Result
 # Okabe and Ito: told apart by every eye, and by their lightness in print
 GREY, SKY, BLUE, ORANGE, VERMILION, GREEN = "#8a8a8a", "#56B4E9", "#0072B2", "#E69F00", "#D55E00", "#009E73"
 PURPLE, PALE = "#CC79A7", "#8fc4e8"
+INDIGO, OLIVE, LEAF, RUST, MINT, WHITE = "#332288", "#999933", "#00664b", "#a63c00", "#d9ecd9", "#ffffff"
 BEFORE, AFTER = GREY, BLUE
 DPI = 150
 GAP = 0.42

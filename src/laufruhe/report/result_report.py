@@ -7,9 +7,8 @@ from collections.abc import Iterator, Sequence
 from laufruhe.present.pictures import PICTURES
 from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph
 from laufruhe.report.sections import tables_of
-from laufruhe.report.sections.reach import sentences
 from laufruhe.report.versions import versions
-from laufruhe.report.wording import explained, fidelity_of, fired, headline, why_star
+from laufruhe.report.wording import explained, fidelity_of, headline, told
 from laufruhe.solvers.result import Result
 
 
@@ -36,7 +35,7 @@ def _blocks(result: Result, pictures: Sequence[str], command: str) -> Iterator[B
         yield Bullets("Numbers to check:", [str(doubt) for doubt in problem.doubts])
     yield Heading("Result")
     yield Paragraph(headline(result))
-    yield from (Paragraph(s) for s in (*sentences(result), fired(result), why_star(result)) if s)
+    yield from map(Paragraph, told(result))
     yield from (Illustration(name, PICTURES[name]) for name in pictures)
     yield from tables_of(result)
     yield Heading("Proof")

@@ -12,8 +12,7 @@ from rich.text import Text
 
 from laufruhe.report.grid import Grid
 from laufruhe.report.sections import tables_of
-from laufruhe.report.sections.reach import sentences
-from laufruhe.report.wording import explained, fidelity_of, fired, headline, why_star
+from laufruhe.report.wording import explained, fidelity_of, headline, told
 from laufruhe.solvers.result import Result, Status
 
 PIPE_WIDTH = 110
@@ -25,12 +24,12 @@ def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
     # titles and names are the user's: what looks like markup in them is text
     console = Console(file=stream, markup=False, emoji=False, highlight=False)
     if not console.is_terminal:
-        console = Console(file=stream, markup=False, emoji=False, highlight=False, width=PIPE_WIDTH)
+        console.width = PIPE_WIDTH
     console.print(Text(result.problem.title, style="bold"))
     console.print(Text(headline(result), style=_COLOURS[result.status]))
     if result.certificate is not None:
         console.print(Text(explained(result), style="dim"))
-    for sentence in filter(None, (*sentences(result), fired(result), why_star(result))):
+    for sentence in told(result):
         console.print(Text(sentence))
     for grid in tables_of(result):
         console.print()

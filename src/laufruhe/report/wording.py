@@ -9,6 +9,7 @@ from laufruhe.present.measures import breaks_a_limit, changed
 from laufruhe.present.numbers import figure, number, percent, trimmed
 from laufruhe.problem.plausibility import together
 from laufruhe.prove.certificate import Certificate, Proof
+from laufruhe.report.sections.reach import sentences
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import RankedStar
 
@@ -41,6 +42,11 @@ def headline(result: Result) -> str:
         why = ", which breaks a limit," if breaks_a_limit(result.problem, result.initial) else ""
         sentence = f"{name} goes from {given}{why} to {decided}"
     return f"{sentence}{change}, {_proven(result.certificate)}."
+
+
+def told(result: Result) -> list[str]:
+    """What is said below the headline: what limits can reach, when cylinders fire, and why its star is the best."""
+    return [sentence for sentence in (*sentences(result), fired(result), why_star(result)) if sentence]
 
 
 def fidelity_of(result: Result) -> str:

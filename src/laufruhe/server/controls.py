@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from laufruhe import units
@@ -164,10 +164,10 @@ def _of_limits(tables: Mapping[str, Any]) -> Iterator[Control]:
     for k, entry in enumerate(tables.get("constraints", [])):
         name = limit_name(entry) or ""
         for key, words in _SIDES.items():
-            for own in _around(f"constraints.{k + 1}.{key}", "Limits", f"{name} {words}", entry.get(key), 0.05):
-                yield Control(**{**asdict(own), "limit": name})
+            own = _around(f"constraints.{k + 1}.{key}", "Limits", f"{name} {words}", entry.get(key), 0.05)
+            yield from (replace(one, limit=name) for one in own)
         for end, given in enumerate(entry.get("outside") or []):
             words = "band ends" if end else "band begins"
             path = f"constraints.{k + 1}.outside.{end + 1}"
-            for own in _around(path, "Limits", f"{name}, {words} at", given, 0.5, 1.5):
-                yield Control(**{**asdict(own), "limit": name})
+            own = _around(path, "Limits", f"{name}, {words} at", given, 0.5, 1.5)
+            yield from (replace(one, limit=name) for one in own)

@@ -21,7 +21,7 @@ verdict, but where a share is closer to its threshold than the gap of the proof.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, TypeAlias
 
@@ -99,17 +99,34 @@ class Worth:
     why: str
 
 
+class _Engine(NamedTuple):
+    """One engine of an economics dataset: shafts, least force at its optimum, and what no design falls below."""
+
+    name: str
+    standing: str
+    shafts: int
+    force: float
+    bound: float
+
+
+def _engines(data: xr.Dataset) -> dict[str, _Engine]:
+    """All of them, by their names."""
+    names = ("build", "standing", "shafts", "optimum", "optimum_bound")
+    rows = zip(*(data[name].values.tolist() for name in names), strict=True)
+    return {row[0]: _Engine(*row) for row in rows}
+
+
 def worths(data: xr.Dataset) -> tuple[Worth, ...]:
     """Every set of shafts of an economics dataset, judged by W3."""
-    return tuple(_worth(data, name) for name in _named(data, SHAFTS) if _shafts(data, name))
+    engines = _engines(data)
+    return tuple(_worth(engines, one) for one in engines.values() if one.standing == SHAFTS and one.shafts)
 
 
-def _worth(data: xr.Dataset, build: str) -> Worth:
-    own, plain = _optimum(data, build), _optimum(data, _named(data, PLAIN)[0])
-    same, shafts = data["standing"].values != NEXT, data["shafts"].values
-    fewer = float(data["optimum"].values[same & (shafts < _shafts(data, build))].min())
-    following = _named(data, NEXT)[0]
-    further, beside = 1.0 - own / fewer, own / _optimum(data, following)
+def _worth(engines: Mapping[str, _Engine], own: _Engine) -> Worth:
+    plain, next_one = (next(e for e in engines.values() if e.standing == standing) for standing in (PLAIN, NEXT))
+    fewer = min(e.force for e in engines.values() if e.standing != NEXT and e.shafts < own.shafts)
+    following = next_one.name
+    further, beside = 1.0 - own.force / fewer, own.force / next_one.force
     if further < 0.0:
         why = f"fewer shafts do better: {percent(-further)} beside the best of them"
     elif further < NOTICEABLE:
@@ -122,20 +139,21 @@ def _worth(data: xr.Dataset, build: str) -> Worth:
     else:
         why = f"{percent(-further)}, and {percent(beside - 1.0)} beside {following} without shafts"
     worth = further >= NOTICEABLE and beside < 1.0 - NEGLIGIBLE
-    return Worth(build, 1.0 - own / plain, further, beside, worth, why)
+    return Worth(own.name, 1.0 - own.force / plain.force, further, beside, worth, why)
 
 
 def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
     """What the source says of each build, confirmed or not, by the name of the build."""
     found: dict[str, tuple[Verdict, ...]] = {}
-    for name in map(str, data["build"].values):
+    engines = _engines(data)
+    for name in engines:
         row = data.sel(build=name)
         says, falls, against, where = (row[f"claim{end}"].item() for end in ("", "ed_fall", "ed_against", "ed_where"))
         statement = f"{name}: beside {against}" + (f" ({where})" if where else "")
         own: list[Verdict] = []
-        fall = _fall(data, name, against)
+        fall = 1.0 - engines[name].force / engines[against].force
         if says:
-            agrees, why = _judged(data, name, against, says)
+            agrees, why = _judged(engines, engines[name], engines[against], says)
             own.append(Verdict(statement, says, -100.0 * fall, "% of the force", agrees, why))
         if not np.isnan(falls):
             agrees, said = abs(fall - falls) <= PRINTED_FALL, f"{-100.0 * falls:.0f} %"
@@ -145,35 +163,14 @@ def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
     return found
 
 
-def _judged(data: xr.Dataset, build: str, against: str, says: str) -> tuple[bool, str]:
+def _judged(engines: Mapping[str, _Engine], own: _Engine, against: _Engine, says: str) -> tuple[bool, str]:
     """Whether a judgement holds, and by which rule."""
     if says == "negligible":
-        most = 1.0 - _bound(data, build) / _optimum(data, against)
+        most = 1.0 - own.bound / against.force
         return most < NEGLIGIBLE, f"W1: under {100.0 * NEGLIGIBLE:.0f} %; proven, none of these shafts does more"
     if says == "noticeable":
-        return _fall(data, build, against) >= NOTICEABLE, f"W2: {100.0 * NOTICEABLE:.0f} % or more"
+        return 1.0 - own.force / against.force >= NOTICEABLE, f"W2: {100.0 * NOTICEABLE:.0f} % or more"
     if says == "better":
-        better = _optimum(data, build) < _bound(data, against)
-        return better, "its force lies under the other's lower bound"
-    found = _worth(data, build)
+        return own.force < against.bound, "its force lies under the other's lower bound"
+    found = _worth(engines, own)
     return found.worth == (says == "worth building"), f"W3: {found.why}"
-
-
-def _named(data: xr.Dataset, standing: str) -> list[str]:
-    return [str(build) for build in data["build"].values[data["standing"].values == standing]]
-
-
-def _shafts(data: xr.Dataset, build: str) -> int:
-    return int(data["shafts"].sel(build=build))
-
-
-def _optimum(data: xr.Dataset, build: str) -> float:
-    return float(data["optimum"].sel(build=build))
-
-
-def _bound(data: xr.Dataset, build: str) -> float:
-    return float(data["optimum_bound"].sel(build=build))
-
-
-def _fall(data: xr.Dataset, build: str, against: str) -> float:
-    return 1.0 - _optimum(data, build) / _optimum(data, against)

@@ -29,7 +29,10 @@ applies = has_bearings
 @styled()
 def figure(result: Result) -> Figure:
     """A column a bearing, all to one scale: above as the block feels it, below as the crankshaft does."""
-    k, series = _hardest(result), series_of(result, loads=True)
+    first = load_designs(result)[0]
+    # the operating point with the largest force on a bearing
+    k = int(np.argmax([np.abs(bearing_paths(first, j)).max() for j in range(len(first.loads))]))
+    series = series_of(result, loads=True)
     planes = [bearing_paths(one.design, k) for one in series]
     names = BEARINGS.channel.places(result.final.engine)
     sizes = np.abs(planes[-1]).max(axis=0)
@@ -59,12 +62,6 @@ def figure(result: Result) -> Figure:
     wear: Artist = Patch(color=ORANGE, alpha=0.6, label="where it wears" + (", as decided" if len(series) > 1 else ""))
     legend = [*(one.entry() for one in series), dot, wear]
     return headed(drawn, result, "Main-bearing loads over one working cycle", lines, legend, some)
-
-
-def _hardest(result: Result) -> int:
-    """The operating point with the largest force on a bearing."""
-    design = load_designs(result)[0]
-    return int(np.argmax([np.abs(bearing_paths(design, k)).max() for k in range(len(design.loads))]))
 
 
 def _draw(axes: Axes, paths: Sequence[Plane], series: Sequence[Series], size: float) -> None:

@@ -11,14 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from laufruhe.machine.crank_names import name_of_crank
-from laufruhe.plots.style import entry, headed, page, point_name, styled
+from laufruhe.plots.style import BLUE, VERMILION, entry, headed, page, point_name, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, UNSEEN
 from laufruhe.present.measures import hardest_point
 from laufruhe.present.numbers import figure as told
 from laufruhe.present.twins import KINDS, ORDERS, Parts, is_twin, parts_of
 from laufruhe.solvers.result import Result
 
-FORWARD, BACKWARD = "#0072b2", "#d55e00"
+FORWARD, BACKWARD = BLUE, VERMILION
 TURN = np.linspace(0.0, math.tau, 361)
 SIZE = 1.9
 

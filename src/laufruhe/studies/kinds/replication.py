@@ -137,7 +137,7 @@ class Replication(Part):
         result = solve(problem)
         if result.status in (Status.INFEASIBLE, Status.FAILED):
             raise ModelError(f"no design meets all limits of '{case.name}'; loosen one")
-        return {name: asked(result, what).as_dict() for name, what in self.quantities.items()}
+        return {name: asked(result, what)._asdict() for name, what in self.quantities.items()}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Quantities along the points, and every statement judged."""
@@ -161,15 +161,12 @@ class Replication(Part):
 
     def names(self, data: xr.Dataset) -> dict[str, dict[str, Any]]:
         """What expressions know in each reading: numbers, what every case gave, and what is defined of them."""
-        return {
-            name: self._names(data.isel(point=np.flatnonzero(data["reading"] == name)), name)
-            for name in self._all_readings()
-        }
-
-    def _names(self, data: xr.Dataset, reading: str) -> dict[str, Any]:
-        quantities = {str(name): _by_case(data, str(name)) for name in data.data_vars if "point" in data[name].dims}
-        numbers = {**self.numbers, **self._all_readings()[reading]}
-        return numbers_of(self.define, {**numbers_of(numbers, {}), **quantities})
+        names, found = [str(name) for name in data.data_vars if "point" in data[name].dims], {}
+        for reading, told in self._all_readings().items():
+            own = data.isel(point=np.flatnonzero(data["reading"] == reading))
+            quantities = {name: _by_case(own, name) for name in names}
+            found[reading] = numbers_of(self.define, {**numbers_of({**self.numbers, **told}, {}), **quantities})
+        return found
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:

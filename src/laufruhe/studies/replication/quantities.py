@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,16 +46,11 @@ class AskedTable(QuantityTable):
     of: list[str] | None = f.told("Names of the counterweights or balancers whose mass counts.")
 
 
-@dataclass(frozen=True)
-class Labelled:
+class Labelled(NamedTuple):
     """Numbers along named dimensions, as JSON holds them: nested lists, and the labels of each dimension in turn."""
 
     values: Any
-    coords: Mapping[str, list[Any]]
-
-    def as_dict(self) -> dict[str, Any]:
-        """For the file of finished points."""
-        return {"values": self.values, "coords": dict(self.coords)}
+    coords: dict[str, list[Any]]
 
 
 def check_asked(what: str | AskedTable) -> None:
