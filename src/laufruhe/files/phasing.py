@@ -112,24 +112,22 @@ def opened(
         problem = replace(phasing.realise(_first(phasing)), phasing=phasing)
     except ModelError as error:
         raise (error.__cause__ if isinstance(error.__cause__, Refused) else error) from None
-    _check_speed(problem, phasing)
-    _check_inside(problem, engine)
+    _check_physics(problem, phasing, engine)
     return problem
 
 
-def _check_inside(problem: Problem, engine: EngineTable) -> None:
-    """Rows of geared cranks are told apart by what the block feels of them."""
-    if engine.kind.fires_evenly and problem.feels_order:
-        rule = f"is open in layout '{engine.layout}', and something is asked of what happens inside the crankcase"
-        raise Refused("engine.throws", None, rule, "fix the throws, or ask for loads on the block")
+def _check_physics(problem: Problem, phasing: Phasing, engine: EngineTable) -> None:
+    """The smooth program of uneven throws knows a crank that turns evenly (S19).
 
-
-def _check_speed(problem: Problem, phasing: Phasing) -> None:
-    """The smooth program of uneven throws knows a crank that turns evenly (S19)."""
+    Rows of geared cranks are told apart by what the block feels of them.
+    """
     if phasing.continuous and problem.fidelity.is_uneven:
         inertia = f"{problem.fidelity.crank_inertia:g} kg m^2"
         rule = "makes the crank's speed uneven, and throws that leave the even steps are decided at an even one"
         raise Refused("fidelity.crank_inertia", inertia, rule, "leave it out, or fix the throws")
+    if engine.kind.fires_evenly and problem.feels_order:
+        rule = f"is open in layout '{engine.layout}', and something is asked of what happens inside the crankcase"
+        raise Refused("engine.throws", None, rule, "fix the throws, or ask for loads on the block")
 
 
 def _has_open(value: object) -> bool:

@@ -96,7 +96,10 @@ def _filled(
 ) -> LiveModel:
     model = AffineModel(moving)
     kinds = {decision.kind for decision in moving.decisions}
-    collected = _Collected(model, kinds, result, _aside(bare.file, is_served))
+    # why a measure does not follow sliders, and when its value is known
+    known = "it is measured when they rest" if is_served else f"its value is that of the design decided; {HOW}"
+    aside = f"does not follow sliders in proportion, so {known.format(file=bare.file)}"
+    collected = _Collected(model, kinds, result, aside)
     curves = _curves(collected, result)
     measures = collected.measures()
     start = vector_of(model.domains)
@@ -228,12 +231,6 @@ def _proved(result: Result) -> Proved | None:
     if certificate is None or objective is None or certificate.kind is Proof.NONE:
         return None
     return Proved(objective.value, certificate.lower_bound, certificate.gap, str(certificate.kind))
-
-
-def _aside(file: str, is_served: bool) -> str:
-    """Why a measure does not follow sliders, and when its value is known."""
-    known = "it is measured when they rest" if is_served else f"its value is that of the design decided; {HOW}"
-    return f"does not follow sliders in proportion, so {known.format(file=file)}"
 
 
 def _still(problem: Problem, how: str) -> Iterator[tuple[str, str]]:

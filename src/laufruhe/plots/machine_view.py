@@ -14,7 +14,6 @@ from matplotlib.patches import Circle, Patch, Rectangle, Wedge
 
 from laufruhe.machine import Engine, Rotor
 from laufruhe.machine.rotor import Role
-from laufruhe.numerics.arrays import Array
 from laufruhe.plots.machine_parts import (
     IRON,
     METAL,
@@ -119,17 +118,14 @@ def views(scene: Scene) -> Page:
         wide = max(float(scale * size[0]), NARROW)
         axes.set_position((left / inches, 0.0, wide / inches, 1.0))
         left += wide + ACROSS
-        _framed(axes, points, (wide / scale, high / scale), backwards=is_side, down=is_side and scene.is_flat)
+        # so much [mm] about the middle of what is seen at any angle
+        (x, y), half = 0.5 * (points.min(axis=0) + points.max(axis=0)), (0.5 * wide / scale, 0.5 * high / scale)
+        across, up = (x - half[0], x + half[0]), (y - half[1], y + half[1])
+        down = is_side and scene.is_flat
+        axes.set(xlim=across[::-1] if is_side else across, ylim=up[::-1] if down else up)
         for axis, steps in ((axes.xaxis, wide / 0.8), (axes.yaxis, high / 0.5)):
             round_ticks(axis, min(max(int(steps), 2), 7))
     return drawn
-
-
-def _framed(axes: Axes, points: Array, size: tuple[float, float], backwards: bool, down: bool) -> None:
-    """So much [mm] about the middle of what is seen at any angle; x to the left, or y down, where told."""
-    x, y = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    across, up = (x - 0.5 * size[0], x + 0.5 * size[0]), (y - 0.5 * size[1], y + 0.5 * size[1])
-    axes.set(xlim=across[::-1] if backwards else across, ylim=up[::-1] if down else up)
 
 
 def draw_views(drawn: Page, scene: Scene, phi: float = 0.0) -> None:

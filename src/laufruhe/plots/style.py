@@ -114,16 +114,8 @@ def page(
     return Page(figure, tuple(panels))
 
 
-def heading(
-    figure: Figure, title: str, lines: str, legend: Sequence[Artist], source: str, engine: str = "", clear: float = 0.0
-) -> None:
-    """Title, the engine, what is seen, the legend, and where the data come from; the page grows around it all.
-
-    Parameters
-    ----------
-    clear
-        Kept free above the panels for what has no extent of its own [inch].
-    """
+def heading(figure: Figure, title: str, lines: str, legend: Sequence[Artist], source: str, engine: str = "") -> None:
+    """Title, the engine, what is seen, the legend, and where the data come from; the page grows around it all."""
     with styled():
         for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
             axis.set_label_text(typeset(axis.get_label_text()))
@@ -139,7 +131,7 @@ def heading(
         rows, columns = _legend_shape([str(artist.get_label()) for artist in legend], room)
         above = sum(len(text) * size * _LINE + 0.03 for text, size, _, _ in head) + rows * 1.05 * SMALL * _LINE
         below = EDGE + len(foot) * SMALL * _LINE + _ABOVE_FOOT
-        high = EDGE + above + _BELOW_HEAD + clear + inside.height + below
+        high = EDGE + above + _BELOW_HEAD + inside.height + below
         _moved(figure, (wide, high), (EDGE - inside.x0, below - inside.y0))
         top, left = high - EDGE, EDGE / wide
         for text, size, weight, ink in head:

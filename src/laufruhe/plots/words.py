@@ -118,15 +118,15 @@ def _rising(values: Array) -> Array:
     return np.repeat([mean for mean, _ in shared], [count for _, count in shared])
 
 
-def beside(axes: Axes, heights: Sequence[float], texts: Sequence[str], size: float = SMALL) -> None:
+def beside(axes: Axes, heights: Sequence[float], texts: Sequence[str]) -> None:
     """Names of horizontal lines, right of the panel: none covers another, and each is joined to its line."""
     low, high = axes.get_ylim()
-    least = 1.3 * size / _POINTS / (axes.bbox.height / axes.figure.dpi)
+    least = 1.3 * SMALL / _POINTS / (axes.bbox.height / axes.figure.dpi)
     places = spread((np.asarray(heights, dtype=float) - low) / (high - low), least)
     for height, place, text in zip(heights, places, texts, strict=True):
         leader = {"arrowstyle": "-", "color": FAINT, "lw": 0.6, "shrinkA": 0.0, "shrinkB": 0.0}
         axes.annotate(
-            text, (1.0, height), (1.035, place), axes.get_yaxis_transform(), "axes fraction", size=size, color=INK,
+            text, (1.0, height), (1.035, place), axes.get_yaxis_transform(), "axes fraction", size=SMALL, color=INK,
             va="center", ha="left", annotation_clip=False, arrowprops=leader,
         )  # fmt: skip
 
@@ -149,7 +149,7 @@ def left_out(largest: float, most: float, unit: str) -> str:
     return "none: balanced" if largest <= NOTHING * most else f"at most {number(largest, 2)} {unit}"
 
 
-def apart(texts: Sequence[Text], room: float = 1.15) -> None:
+def apart(texts: Sequence[Text]) -> None:
     """Words that would cover each other moved up and down, as little as may be."""
     left = [(text, text.get_window_extent()) for text in texts]
     while left:
@@ -160,7 +160,7 @@ def apart(texts: Sequence[Text], room: float = 1.15) -> None:
                 group.append((text, box))
                 left.remove((text, box))
         heights = np.array([0.5 * (box.y0 + box.y1) for _, box in group])
-        least = room * max(box.height for _, box in group)
+        least = 1.15 * max(box.height for _, box in group)
         moved = spread(heights, least, -math.inf, math.inf)
         for (text, _), up in zip(group, moved - heights, strict=True):
             if abs(up) > 0.1:

@@ -9,7 +9,7 @@ import os
 import secrets
 import shutil
 from collections.abc import Collection, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -63,16 +63,8 @@ class Set:
     adds: bool = False
     beside: Collection[str] = ()
 
-    def check(self) -> frozenset[str]:
-        """The files that earlier runs made there; what they did not make is never touched (`InputError`)."""
-        if not self.folder.parent.is_dir():
-            return self.checked()
-        # not while another run swaps the folder
-        with held(self.folder.parent):
-            return self.checked()
-
     def checked(self) -> frozenset[str]:
-        """As `check`, by who keeps the folder above to itself."""
+        """The files that earlier runs made there; what they did not make is never touched (`InputError`)."""
         folder = self.folder
         above = next(path for path in (folder, *folder.parents) if path.exists())
         if not above.is_dir():
@@ -112,7 +104,10 @@ def staged(wanted: Set) -> Iterator[Path]:
     wanted = replace(wanted, folder=Path(os.path.realpath(wanted.folder)))
     with ExitStack() as until_then:
         with _reporting(wanted):
-            wanted.check()
+            above = wanted.folder.parent
+            # not while another run swaps the folder
+            with held(above) if above.is_dir() else nullcontext():
+                wanted.checked()
             stage = until_then.enter_context(_stage_for(wanted.folder))
             # there may be none, or none while another run puts its own there
             with suppress(FileNotFoundError):

@@ -32,7 +32,7 @@ def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | N
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["marked"] = _marked
     template = environment.from_string((files("laufruhe.report") / PAGE).read_text(encoding="utf-8"))
-    inline = {name: _inline(svg) for name, svg in pictures.items()}
+    inline = {name: inlined(svg) for name, svg in pictures.items()}
     return template.render(document=document, pictures=inline, live=_live(live)) + "\n"
 
 
@@ -48,7 +48,7 @@ def _live(model: LiveModel | None) -> dict[str, Any] | None:
     return {"heading": HEADING, **{name: Markup(text) for name, text in texts.items()}}
 
 
-def _inline(svg: str) -> str:
+def inlined(svg: str) -> str:
     """A picture as an address that holds it: names within it cannot meet those of another."""
     return "data:image/svg+xml;base64," + base64.b64encode(svg.encode("utf-8")).decode("ascii")
 

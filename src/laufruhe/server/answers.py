@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import math
 import time
@@ -25,6 +24,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
+from laufruhe.report.web_page import inlined
 from laufruhe.server import told
 from laufruhe.server.asked import CRANK, LATER, Asked, Edit
 from laufruhe.server.controls import as_json, controls_of, offered_by, typed
@@ -199,10 +199,8 @@ def picture(_: Source, asked: Asked, k: int) -> dict[str, Any]:
     names = [] if result is None else plots.names(result)
     if result is None or k >= len(names):
         return {"done": True}
-    svg = as_svg(plots.figure(result, names[k]))
-    data = base64.b64encode(svg.encode()).decode()
-    caption = PICTURES[names[k]]
-    return {"name": names[k], "caption": caption, "image": f"data:image/svg+xml;base64,{data}", "of": len(names)}
+    image = inlined(as_svg(plots.figure(result, names[k])))
+    return {"name": names[k], "caption": PICTURES[names[k]], "image": image, "of": len(names)}
 
 
 def _settled(result: Result, tables: Mapping[str, Any]) -> dict[str, Any]:

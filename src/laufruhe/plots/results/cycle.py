@@ -188,17 +188,11 @@ def _draw(axes: Axes, row: Row, degrees: Array, colours: Sequence[str], factor: 
         empty(axes, row.left_out)
 
 
-def _firings(engine: Engine) -> dict[float, list[int]]:
-    """Numbers of the cylinders that fire, by the crank angle [deg]."""
-    whole, found = math.degrees(engine.cycle.angle), dict[float, list[int]]()
-    for number, part in enumerate(engine.cylinders, 1):
-        found.setdefault(round(math.degrees(part.firing_angle), 6) % whole, []).append(number)
-    return found
-
-
 def _mark_firings(panels: Sequence[Axes], engine: Engine, wide: float) -> None:
     """A line at every firing; above the first panel the cylinders, where there is room for their numbers."""
-    firings = _firings(engine)
+    whole, firings = math.degrees(engine.cycle.angle), dict[float, list[int]]()
+    for number, part in enumerate(engine.cylinders, 1):
+        firings.setdefault(round(math.degrees(part.firing_angle), 6) % whole, []).append(number)
     for axes in panels:
         for angle in firings:
             axes.axvline(angle, color=FAINT, linewidth=0.8, linestyle=STYLES[2], zorder=0.6)

@@ -10,7 +10,7 @@ from laufruhe.plots.words import FAINT, INK, SMALL
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.tolerances.result import SHARES, BuiltDesign, RobustResult
+from laufruhe.solvers.tolerances.result import SHARES, RobustResult
 
 WORST, DRAWN = (0, (4, 2)), (0, (1, 2))
 MOST_TOLERANCES = 8
@@ -30,7 +30,9 @@ def figure(result: Result) -> Figure:
     drawn = page(2, 1, (6.4, 2.5), gap=0.7)
     first, second = drawn.panels
     for design, colour in ((found.nominal, BEFORE), (found.robust, AFTER)):
-        _curve(first, design, colour)
+        first.plot(design.quantiles, [100.0 * share for share in SHARES], color=colour, linewidth=1.8)
+        first.axvline(design.drawing, color=colour, linewidth=1.2, linestyle=DRAWN)
+        first.axvline(design.worst, color=colour, linewidth=1.4, linestyle=WORST)
     first.axhline(100.0 * found.share, color=FAINT, linewidth=0.7, linestyle=DRAWN)
     name = result.problem.changed(over=None).objective_name
     first.set(
@@ -46,12 +48,6 @@ def figure(result: Result) -> Figure:
         f"{found.engines:,} engines built at random within their tolerances; below, which tolerance to narrow first."
     )
     return headed(drawn, result, "The price of tolerances", lines, legend)
-
-
-def _curve(axes: Axes, design: BuiltDesign, colour: str) -> None:
-    axes.plot(design.quantiles, [100.0 * share for share in SHARES], color=colour, linewidth=1.8)
-    axes.axvline(design.drawing, color=colour, linewidth=1.2, linestyle=DRAWN)
-    axes.axvline(design.worst, color=colour, linewidth=1.4, linestyle=WORST)
 
 
 def _bars(axes: Axes, found: RobustResult, unit: str) -> None:
