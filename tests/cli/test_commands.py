@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
@@ -51,11 +53,26 @@ def refused(result: Result, *words: str) -> None:
         assert word in result.stderr
 
 
-def test_solve_writes_everything_under_results(here: Path) -> None:
-    path = written(here, scenes.TIGHT, "tight")
-    result = run("solve", path)
+@pytest.fixture(scope="module")
+def with_pictures(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
+    """A folder in which a problem has been solved and drawn, and what was said."""
+    folder = tmp_path_factory.mktemp("drawn")
+    path = written(folder, scenes.TIGHT, "tight")
+    with chdir(folder):
+        return folder, run("solve", path)
+
+
+@pytest.fixture
+def drawn(with_pictures: tuple[Path, Result], here: Path) -> Path:
+    """The problem, its results beside it."""
+    shutil.copytree(with_pictures[0], here, dirs_exist_ok=True)
+    return here / "tight.toml"
+
+
+def test_solve_writes_everything_under_results(with_pictures: tuple[Path, Result]) -> None:
+    folder, result = with_pictures
     assert result.exit_code == 0
-    assert tree(here / "results") == {f"tight/{name}" for name in ALL_FILES}
+    assert tree(folder / "results") == {f"tight/{name}" for name in ALL_FILES}
     assert "balancer mass" in result.stdout
     assert "N per kg" in result.stdout
     assert "proven optimum" in result.stdout
@@ -135,28 +152,24 @@ def test_an_interrupt_leaves_nothing(here: Path, monkeypatch: pytest.MonkeyPatch
     assert list(here.iterdir()) == [path]
 
 
-def test_an_interrupt_keeps_the_earlier_result(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = written(here, scenes.TIGHT)
-    run("solve", path)
-    before = {name: (here / "results/scene" / name).read_bytes() for name in ALL_FILES}
+def test_an_interrupt_keeps_the_earlier_result(here: Path, drawn: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = {name: (here / "results/tight" / name).read_bytes() for name in ALL_FILES}
 
     def interrupt(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("laufruhe.cli.drawing.processors", lambda: 1)
     monkeypatch.setattr("laufruhe.plots.draw_and_show", interrupt)
-    assert run("solve", path).exit_code == 130
-    assert {name: (here / "results/scene" / name).read_bytes() for name in ALL_FILES} == before
-    assert {entry.name for entry in (here / "results/scene").iterdir()} == ALL_FILES
+    assert run("solve", drawn).exit_code == 130
+    assert {name: (here / "results/tight" / name).read_bytes() for name in ALL_FILES} == before
+    assert {entry.name for entry in (here / "results/tight").iterdir()} == ALL_FILES
 
 
-def test_pictures_of_another_result_do_not_stay(here: Path) -> None:
-    path = written(here, scenes.TIGHT)
-    run("solve", path)
-    (here / "results/scene/notes.txt").write_text("mine")
-    run("solve", path, "--no-plots")
-    assert tree(here / "results/scene") == PAGES | TABLES | DECIDED | {"notes.txt"}
-    assert tree(here / "results") == {f"scene/{name}" for name in tree(here / "results/scene")}
+def test_pictures_of_another_result_do_not_stay(here: Path, drawn: Path) -> None:
+    (here / "results/tight/notes.txt").write_text("mine")
+    run("solve", drawn, "--no-plots")
+    assert tree(here / "results/tight") == PAGES | TABLES | DECIDED | {"notes.txt"}
+    assert tree(here / "results") == {f"tight/{name}" for name in tree(here / "results/tight")}
 
 
 def test_solve_and_evaluate_have_places_of_their_own(here: Path) -> None:

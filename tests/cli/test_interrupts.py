@@ -7,15 +7,21 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from cli import scenes
+from laufruhe.cli import app
 from problem_files import written
 
-# counts on without ever looking at a signal, as a solver may
-DEAF = "import laufruhe.solvers as s; s.solve = lambda *_, **__: sum(range(10**14))\n"
+# counts on without ever looking at a signal, as a solver may; nobody is patient with it for as long as with users
+DEAF = (
+    "import laufruhe.cli.supervised as own, laufruhe.solvers as s; own.PATIENCE = 1\n"
+    "s.solve = lambda *_, **__: sum(range(10**14))\n"
+)
 ASLEEP = DEAF.replace("sum(range(10**14))", "__import__('time').sleep(1e4)")
 RUN = "from laufruhe.cli import main; main()"
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not hasattr(os, "fork"), reason="needs another process")]
@@ -46,8 +52,8 @@ def test_interrupted_within_seconds(code: str, number: signal.Signals, tmp_path:
     assert err.startswith("laufruhe: interrupted")
     assert len(err.splitlines()) == 1
     assert not (tmp_path / "results/scene").exists()
-    done = subprocess.run([sys.executable, "-c", RUN, "solve", "scene.toml", "--no-plots"], cwd=tmp_path, check=False)
-    assert done.returncode == 0
+    with chdir(tmp_path):
+        assert CliRunner().invoke(app, ["solve", "scene.toml", "--no-plots"]).exit_code == 0
     assert {entry.name for entry in (tmp_path / "results").iterdir()} == {"scene"}
 
 

@@ -13,7 +13,7 @@ import xarray as xr
 
 from laufruhe.studies.kept_points import KEPT
 from laufruhe.studies.kinds.replication import Replication
-from laufruhe.studies.reader import load_study
+from laufruhe.studies.reader import StudyFile, load_study
 from laufruhe.studies.replication.expressions import value_of
 from laufruhe.studies.runner import run
 from problem_files import PROBLEMS
@@ -21,15 +21,20 @@ from shared import once
 
 
 @cache
+def study_of(file: str) -> StudyFile:
+    return load_study(PROBLEMS / f"{file}.toml")
+
+
+@cache
 def parts_of(file: str) -> dict[str, Replication]:
-    return {part.name: part for part in load_study(PROBLEMS / f"{file}.toml").study.parts}  # type: ignore[misc]
+    return {part.name: part for part in study_of(file).study.parts}  # type: ignore[misc]
 
 
 def shared_part(file: str, name: str) -> Path:
     """Folder of the finished points of one part, and its dataset, which one process of the tests has computed."""
 
     def fill(folder: Path) -> None:
-        study = load_study(PROBLEMS / f"{file}.toml")
+        study = study_of(file)
         alone = study.study.model_copy(update={"parts": [parts_of(file)[name]]})
         data = run(study.model_copy(update={"study": alone}), PROBLEMS, folder / KEPT)[0][name]
         (folder / "data").write_bytes(pickle.dumps(data))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
@@ -22,7 +23,9 @@ KILLED_AT = 6
 def serial(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """One process, left alone."""
     folder = clusters.prepared(tmp_path_factory.mktemp("serial"), **SMALL)
-    assert clusters.finished(folder, "--jobs", "1") == ""
+    with chdir(folder):
+        answer = CliRunner().invoke(app, ["study", "s.toml", "--out", "out", "--jobs", "1"])
+    assert answer.exit_code == 0, answer.output
     return folder
 
 
