@@ -10,10 +10,11 @@ from typing import Protocol
 import numpy as np
 
 from laufruhe.numerics.arrays import Array, Mask
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import passed, rounds
 from laufruhe.prove.springs.bound import Cap, Program, Proposed, Root, follows, pulls
 from laufruhe.prove.springs.columns import Columns
 from laufruhe.prove.springs.conditions import Held, conditions, of_stiffness
+from laufruhe.prove.springs.ends import Ahead, Aims
 from laufruhe.prove.springs.high_orders import AtMost, HighOrder, constant
 from laufruhe.prove.springs.limits import Limits
 from laufruhe.prove.springs.lines import Felt, Line, squared
@@ -21,7 +22,7 @@ from laufruhe.prove.springs.means import Mean, mean_of
 from laufruhe.prove.springs.modes import Mode, shapes_of
 from laufruhe.prove.springs.open_mounts import OpenMounts
 from laufruhe.prove.springs.orders import Asked, Head, Order, lengths_of, most_of
-from laufruhe.prove.springs.program import Stated, proposed
+from laufruhe.prove.springs.program import proposed
 
 # share of what a solver takes for the least that its multipliers should prove,
 # and where that is of a mean, which its own ends hold back more
@@ -45,6 +46,8 @@ class Searched(Protocol):
         Where the numbers of every mode stand.
     felt_at_most
         By order, what designs that count have of it.
+    ahead
+        Who works relaxations out before they are wanted; nobody when None.
     """
 
     lower: Array
@@ -54,6 +57,7 @@ class Searched(Protocol):
     columns: Columns
     limits: Limits
     felt_at_most: dict[int, float]
+    ahead: Ahead | None
 
     @property
     def stiffness_alone(self) -> bool:
@@ -149,33 +153,41 @@ class SpringBox:
 
         Where no odd multiples hide the norm, a root that does not rise so tells that the others leave room for all.
         """
-        least, units, hidden = known.copy(), np.array([head.unit for head in heads]), self.is_hidden(heads)
-        if len(heads) == 1 and not hidden:
-            return least
-        for _ in range(ROUNDS):
+        least, units = known.copy(), np.array([head.unit for head in heads])
+        if self.is_hidden(heads):
+            return self._side_by_side(heads, least)
+        for _ in range(ROUNDS if len(heads) > 1 else 0):
             for k in range(len(heads)):
                 mean, before = self._mean(heads, least), least[k]
                 if mean.floor >= self.most:
                     return least
                 if _matter(mean.prices)[k] and not passed():
                     least[k] = max(before, units[k] * self._together(heads, mean.prices, mean, k)[0])
-                    if hidden:
-                        self._narrow(heads, heads[k], least)
-                    elif least[k] <= (1.0 + RISEN) * before:
+                    if least[k] <= (1.0 + RISEN) * before:
                         return least
         return least
 
-    def _narrow(self, heads: Sequence[Head], head: Head, least: Array) -> None:
-        """What designs that are no worse than the best known have at most of odd multiples."""
-        if self._mean(heads, least).floor >= self.most:
-            return
-        shapes = np.zeros(5 * len(self.modes))
-        for (order, _), line in zip(head.beside, self._of_head(head), strict=True):
-            if np.any(line.slopes):
-                found, _ = Stated(self.under_all(heads, least)).least(np.append(-line.slopes, shapes))
-                known = self.search.felt_at_most.get(id(order), math.inf)
-                self.search.felt_at_most[id(order)] = min(known, line.constant - found)
-        self._taken.clear()
+    def _side_by_side(self, heads: Sequence[Head], least: Array) -> Array:
+        """The same, and what designs that are no worse than the best known have at most of odd multiples.
+
+        All of a round follow from the same conditions, so that they may be worked out side by side.
+        """
+        units, shapes = np.array([head.unit for head in heads]), np.zeros(5 * len(self.modes))
+        for _ in rounds(ROUNDS):
+            mean = self._mean(heads, least)
+            if mean.floor >= self.most:
+                break
+            matter = np.flatnonzero(_matter(mean.prices)).tolist()
+            told = [pair for k in matter for pair in zip(heads[k].beside, self._of_head(heads[k]), strict=True)]
+            felt = [(id(order), line) for (order, _), line in told if np.any(line.slopes)]
+            aims = Aims(self.under_all(heads, least), self.search.ahead)
+            found = aims.all_least([*matter, *(np.append(-line.slopes, shapes) for _, line in felt)])
+            least[matter] = np.maximum(least[matter], units[matter] * found[: len(matter)])
+            for (order, line), bound in zip(felt, found[len(matter) :], strict=True):
+                at_most = self.search.felt_at_most
+                at_most[order] = min(at_most.get(order, math.inf), line.constant - bound)
+            self._taken.clear()
+        return least
 
     def _mean(self, heads: Sequence[Head], least: Array) -> Mean:
         """A mean as roots of heads, which are not under these."""

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pickle
 import threading
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Sequence
 from contextlib import AbstractContextManager
+from itertools import islice
 from typing import TypeAlias
 from uuid import uuid4
 
@@ -14,7 +15,7 @@ from laufruhe.numerics.foresight import Foresight, foresight
 from laufruhe.prove.springs.bound import Program
 from laufruhe.prove.springs.program import Stated
 
-_Step: TypeAlias = tuple[str, bytes, Array]
+_Step: TypeAlias = tuple[str, bytes, Array | int]
 Ahead: TypeAlias = Foresight[_Step, tuple[float, Array]]
 
 # seconds of relaxations after which processes are worth starting: where there is one, there are often dozens
@@ -51,12 +52,20 @@ class Aims:
         if ahead is not None:
             ahead.forget()
 
-    def least(self, key: Hashable, aim: Array) -> tuple[float, Array]:
+    def least(self, key: Hashable, aim: Array | int) -> tuple[float, Array]:
         """As `Stated.least`."""
         step = (self._name, self._program, aim)
         return _least(step) if self._ahead is None else self._ahead.wanted((self._name, key), step)
 
-    def likely(self, aims: Iterable[tuple[Hashable, Array]]) -> None:
+    def all_least(self, aims: Sequence[Array | int]) -> list[float]:
+        """Of each of some aims."""
+        found = []
+        for k, aim in enumerate(aims):
+            self.likely(islice(enumerate(aims), k, None))
+            found.append(self.least(k, aim)[0])
+        return found
+
+    def likely(self, aims: Iterable[tuple[Hashable, Array | int]]) -> None:
         """What may be asked next."""
         if self._ahead is not None:
             self._ahead.likely(((self._name, key), (self._name, self._program, aim)) for key, aim in aims)

@@ -243,13 +243,16 @@ class Stated:
             cost[self._moment(order)] = -ASIDE * _diagonal(size)
         return cost
 
-    def least(self, aim: Array) -> tuple[float, Array]:
-        """Of an aim under the same conditions, as multipliers prove it, and s and w where the solver has it."""
-        own = replace(self.program, aim=aim)
+    def least(self, aim: Array | int) -> tuple[float, Array]:
+        """Of an aim, or of a root, under the same conditions, as multipliers prove it, and s and w where it is."""
+        if isinstance(aim, int):
+            assert self.program.goal is not None
+            own = replace(self.program, goal=replace(self.program.goal, root=aim))
+        else:
+            own = replace(self.program, aim=aim)
         found = self.answer(own, True, ROUGH)
-        return follows(own, found.multipliers), np.concatenate(
-            [found.middle, *(each[0, 0, 1:] for each in found.shapes)]
-        )
+        shapes = [each[0, 0, 1:] for each in found.shapes]
+        return follows(own, found.multipliers), np.concatenate([found.middle, *shapes])
 
     def answer(self, program: Program, scaled: bool, enough: tuple[float, float] = FINE) -> Proposed:
         """As multipliers and moments of a program with the same conditions."""

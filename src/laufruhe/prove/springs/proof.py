@@ -22,7 +22,7 @@ LEVELS = (0.1, 0.05, 0.02, 0.01, 0.003, 0.0)
 # relaxations where none are asked for, and how many times those that were needed so far have to be left for a level
 MOST_RELAXED, AHEAD = 100, 3
 # the same where odd multiples hide a mean: whole boxes alone are worth it
-FIRST, FEW_RELAXED = (0.3, 0.2, 0.15), 45
+FIRST, FEW_RELAXED = (0.3, 0.2, 0.15), 40
 # of a design that is one of many, what is shown first, because the others have to come to it too
 OF_MANY = 0.04
 # of the largest, pulls of sides that are not narrowed; of what is to be shown, what a round of these has to bring
