@@ -231,7 +231,7 @@ def test_signals_of_operating_points_have_as_many_rows_each(tmp_path: Path) -> N
     points = engine + '[[operating_points]]\nname = "loaded"\nspeed = "900 rpm"\n'
     points += '[gas]\nmodel = "seiliger"\npeak_pressure = "50 bar"\nimep = "4 bar"\n'
     asked = '[objective]\nminimise = "peak to peak mount travel"\n[search]\nstarts = 1\nboxes = 0\n'
-    asked += "[fidelity]\nsamples = 60\n"
+    asked += "[fidelity]\nsamples = 48\n"
     result = solve(problem_of(tmp_path, points, BLOCK, MOUNTS, asked))
     assert result.objective is not None
     assert result.objective.value <= result.objective.initial

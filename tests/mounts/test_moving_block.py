@@ -38,7 +38,8 @@ MASS, INERTIA = 100.0, 6.0
 """Of the block without the piston [kg], [kg m2]; its centre of gravity is on the crank axis."""
 PLACES, STIFFNESS, DAMPING = ((-0.25, -0.1), (0.25, -0.1)), (6e4, 9e4), (600.0, 900.0)
 """Of the mounts: (y, z) [m]; lateral and vertical [N/m], [N s/m]."""
-STEPS, TURNS = 720, 60
+STEPS, TURNS = 720, 30
+"""Of a turn, and until the start has died away: by e^-12 at the least damped motion."""
 
 
 def linear_forces(piston: float, angles: np.ndarray, flywheel: float = 0.0, turns: bool = True) -> np.ndarray:

@@ -71,18 +71,19 @@ def by_scipy(engine: Engine, problem: Problem) -> tuple[float, float]:
     force = travel = 0.0
     for first, last, seconds in ((0.0, run.speed, run.up), (run.speed, 0.0, run.down)):
         gain = (last - first) / seconds
+        orders, coefficients = 1j * inertia.orders, model.load @ inertia.coefficients.T
 
         def rates(t: float, z: Array, first: float = first, gain: float = gain) -> Array:
             speed, angle = first + gain * t, first * t + gain * t * t / 2.0
-            wrench = speed**2 * (inertia.coefficients * np.exp(1j * inertia.orders * angle)[:, None]).real.sum(axis=0)
+            driven = speed**2 * (coefficients @ np.exp(orders * angle)).real
             y, rate = z[:6], z[6:]
             moved = model.travels @ y
             stop = model.stops * np.sign(moved) * np.maximum(np.abs(moved) - model.gaps, 0.0)
-            push = model.load @ wrench - model.stiffness @ y - model.damping @ rate - model.travels.T @ stop
+            push = driven - model.stiffness @ y - model.damping @ rate - model.travels.T @ stop
             return np.concatenate([rate, push])
 
         times = np.linspace(0.0, seconds, 12_000)
-        states = solve_ivp(rates, (0.0, seconds), np.zeros(12), "DOP853", times, rtol=1e-8, atol=1e-11, max_step=5e-3).y
+        states = solve_ivp(rates, (0.0, seconds), np.zeros(12), "DOP853", times, rtol=1e-7, atol=1e-10, max_step=5e-3).y
         y, rate = states[:6], states[6:]
         force = max(force, float(np.linalg.norm(model.mount_forces(y, rate), axis=-1).max()))
         travel = max(travel, float(np.linalg.norm(model.mount_travels(y), axis=-1).max()))

@@ -86,7 +86,7 @@ def test_banks_that_no_even_star_fits_start_from_every_crank_that_fires(tmp_path
 
 def test_more_freedom_is_never_worse(tmp_path):
     """A V10 at 90 degrees fires 54 and 90 degrees apart at best."""
-    rest = engines.COUPLE + "[search]\nboxes = 50\n"
+    rest = engines.COUPLE + "[search]\nboxes = 5\n"
     found = [crooked_vee(tmp_path, 10, 90, deviation, rest).objective for deviation in (18, 25)]
     values = [objective.value for objective in found]
     assert values == sorted(values, reverse=True)

@@ -145,9 +145,9 @@ def test_throws_between_bounds_of_their_own(tmp_path):
 @pytest.mark.slow
 def test_bank_and_split_pins_move_within_bounds(tmp_path):
     engine = f'{SPLIT}throws = "open"\nfiring_order = "open"\nrotating_mass = "0.7 kg"\n'
-    allowed = 'intervals = { largest_deviation = "10 deg" }\nbest = 2'
+    allowed, few = 'intervals = { largest_deviation = "10 deg" }\nbest = 2', "[search]\nboxes = 4\n"
     result = solve(
-        engines.problem(tmp_path, 6, "four-stroke", engine, allowed, engines.WEIGHTS + engines.COUPLE, "vee")
+        engines.problem(tmp_path, 6, "four-stroke", engine, allowed, engines.WEIGHTS + engines.COUPLE + few, "vee")
     )
     values = {d.name: d for d in result.decisions}
     for name in ("bank angle", "split pin angle"):

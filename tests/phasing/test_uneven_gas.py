@@ -198,7 +198,7 @@ def _light(problem):
 
 def test_the_bound_is_the_steady_torque(tmp_path):
     """Work of the cycle over its angle: imep times what all cylinders displace, on any star."""
-    rest = GAS + '[objective]\nminimise = "rms roll moment"\n'
+    rest = GAS + '[search]\nboxes = 4\n[objective]\nminimise = "rms roll moment"\n'
     allowed = 'intervals = { largest_deviation = "5 deg" }\nbest = 1'
     problem = engines.problem(tmp_path, 3, phasing=allowed, rest=rest)
     assert steady_bound(problem) == pytest.approx(8e5 * DISPLACED * 3.0 / math.tau, rel=1e-3)

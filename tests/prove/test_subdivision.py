@@ -84,7 +84,7 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, tmp_path: Path) -> Non
     assert divides(problem)
     given = evaluate(problem)
     search = StiffnessBoxes(problem, 1e-4 * objective_value(problem, given))
-    low, high = boxes(problem, 40, 1)
+    low, high = boxes(problem, 25, 1)
     bounds, _ = search.bounds(low, high)
     generator = np.random.default_rng(2)
     tight = []
