@@ -68,10 +68,10 @@ def by_scipy(engine: Engine, problem: Problem) -> tuple[float, float]:
     run, model = problem.engine.run, time_model(mounting_in(engine))
     inertia, gas = run_loads(engine, problem.points[0], problem.fidelity)
     assert gas is None
+    orders, coefficients = 1j * inertia.orders, model.load @ inertia.coefficients.T
     force = travel = 0.0
     for first, last, seconds in ((0.0, run.speed, run.up), (run.speed, 0.0, run.down)):
         gain = (last - first) / seconds
-        orders, coefficients = 1j * inertia.orders, model.load @ inertia.coefficients.T
 
         def rates(t: float, z: Array, first: float = first, gain: float = gain) -> Array:
             speed, angle = first + gain * t, first * t + gain * t * t / 2.0

@@ -109,8 +109,8 @@ def _shaft(x: Any) -> list[dict[str, Any]]:
 def test_places_of_balancer_shafts_beside_bearings() -> None:
     """Bearings feel no place of a shaft that they do not carry: the optimum of both is the best of a row of places."""
     told = {
-        "objective": {"terms": [{"quantity": "mean mount force"},
-                                {"quantity": "mean main-bearing force", "weight": 0.1}]},
+        "objective": {"terms": [{"quantity": "rms mount force"},
+                                {"quantity": "rms main-bearing force", "weight": 0.1}]},
         "counterweights": WEBS[:2], "tolerance": 1e-3, "gas": None,
     }  # fmt: skip
     open_place = {"between": ["-200 mm", "200 mm"]}
