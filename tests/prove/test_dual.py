@@ -1,4 +1,6 @@
-"""A program over cones by its dual: x and z that keep the conditions and meet, whatever was solved before."""
+"""A program over cones, by its dual and as told: x and z keep the conditions and meet, whatever was solved before."""
+
+from typing import Any
 
 import clarabel
 import numpy as np
@@ -6,7 +8,7 @@ import pytest
 from scipy.sparse import coo_array
 
 from laufruhe.prove.quadratics import column, matrix_of
-from laufruhe.prove.springs.dual import Cone, Dual
+from laufruhe.prove.springs.dual import Cone, Dual, Plain, solver_for
 
 SETTINGS = {"verbose": False, "max_threads": 1, "presolve_enable": False, "chordal_decomposition_enable": False}
 SIZE, COUNT = 3, 4
@@ -40,18 +42,20 @@ class Program:
         ]
         self.costs = generator.normal(size=(3, width))
 
-    def dual(self, scaled: bool) -> Dual:
-        """Solved by its dual."""
+    def solver(self, scaled: bool, kind: Any) -> Dual | Plain:
+        """By its dual, or as told."""
         kinds = [(own, clarabel.PSDTriangleConeT(SIZE)) for own in self.matrices]
-        return Dual(coo_array(self.rows), self.right, self.cones, kinds, scaled, SETTINGS)
+        found: Dual | Plain = kind(coo_array(self.rows), self.right, self.cones, kinds, scaled, SETTINGS)
+        return found
 
 
+@pytest.mark.parametrize("kind", [Dual, Plain])
 @pytest.mark.parametrize("scaled", [True, False])
 @pytest.mark.parametrize("seed", range(4))
-def test_both_keep_their_conditions_and_meet(seed: int, scaled: bool) -> None:
+def test_both_keep_their_conditions_and_meet(seed: int, scaled: bool, kind: Any) -> None:
     program = Program(seed)
     for cost in program.costs:
-        x, z, least = program.dual(scaled).solved(cost)
+        x, z, least = program.solver(scaled, kind).solved(cost)
         slack = program.right - program.rows @ x
         assert np.abs(slack[:3]).max() < 1e-6
         assert slack[3 : 3 + 2 * COUNT].min() > -1e-6
@@ -66,19 +70,30 @@ def test_both_keep_their_conditions_and_meet(seed: int, scaled: bool) -> None:
         assert least == cost @ x == pytest.approx(-program.right @ z, abs=1e-5)
 
 
-def test_an_answer_does_not_depend_on_those_before() -> None:
+def test_what_is_larger_stands_in_a_program_once() -> None:
+    program = Program(1)
+    assert isinstance(program.solver(True, solver_for), Dual)
+    program.rows = np.concatenate([program.rows, program.rows[-4:], program.rows[-4:]])
+    program.right = np.concatenate([program.right, program.right[-4:], program.right[-4:]])
+    program.cones[-1:] = [Cone(12, clarabel.SecondOrderConeT(12), True)]
+    assert isinstance(program.solver(True, solver_for), Plain)
+
+
+@pytest.mark.parametrize("kind", [Dual, Plain])
+def test_an_answer_does_not_depend_on_those_before(kind: Any) -> None:
     program = Program(7)
-    several = program.dual(True)
+    several = program.solver(True, kind)
     for cost in (*program.costs, *program.costs[::-1]):
-        for told, alone in zip(several.solved(cost), program.dual(True).solved(cost), strict=True):
+        for told, alone in zip(several.solved(cost), program.solver(True, kind).solved(cost), strict=True):
             assert np.array_equal(told, alone)
 
 
-def test_what_has_no_least_value_is_told() -> None:
+@pytest.mark.parametrize("kind", [Dual, Plain])
+def test_what_has_no_least_value_is_told(kind: Any) -> None:
     program = Program(3)
     # nothing holds an entry that no row has
     rows, width = np.column_stack([program.rows, np.zeros(len(program.rows))]), program.rows.shape[1] + 1
     kinds = [(own, clarabel.PSDTriangleConeT(SIZE)) for own in program.matrices]
-    unbounded = Dual(coo_array(rows), program.right, program.cones, kinds, True, SETTINGS)
+    unbounded = kind(coo_array(rows), program.right, program.cones, kinds, True, SETTINGS)
     assert unbounded.solved(np.eye(width)[-1])[2] == np.inf
     assert np.isfinite(unbounded.solved(np.append(program.costs[0], 0.0))[2])

@@ -1,4 +1,4 @@
-"""A program over cones by its dual, which is solved sooner where most variables are entries of matrices in cones.
+"""A program over cones, by its dual where that is solved sooner: where its matrices are large beside other cones.
 
     least q'x   with   b - A x in K,   the matrices X_k of x nowhere indefinite
     least b'z   with   A_o' z = -q_o,   q_k + A_k' z nowhere indefinite for every X_k,   z in the dual of K
@@ -6,7 +6,8 @@
 with A_k the columns of X_k and A_o all others: X_k and x_o are multipliers of the second program. As the first is told
 to a solver, an entry of X_k is a column and a row, and both are eliminated; as the second, it is a row. Their steps are
 the same, so both are scaled as the first one is: rows and columns by the roots of their largest entries again and
-again (Ruiz, RAL-TR-2001-034), those of a cone alike.
+again (Ruiz, RAL-TR-2001-034), those of a cone alike. As the second, rows of all other cones are variables and rows;
+what costs most is full among the entries of a cone, so it is the larger square that should not stand there twice.
 """
 
 from __future__ import annotations
@@ -86,11 +87,8 @@ class Dual:
 
     def solved(self, cost: Array) -> tuple[Array, Array, float]:
         """x and z, whatever the solver says of them, and q'x; infinite where it takes that for unbounded."""
-        import clarabel
-
         scaled = (self._across * cost)[self._order]
-        size = float(np.abs(scaled).max(initial=0.0))
-        factor = float(np.clip(1.0 / size, _LEAST, _MOST)) if self._scaled and size > 0.0 else 1.0
+        factor = _factor(scaled) if self._scaled else 1.0
         right = np.append(-factor * self._signs * scaled, self._aside)
         if self._solver is None:
             self._solver = solver_of(self._cost, self._rows, right, self._kinds, self._settings)
@@ -100,9 +98,76 @@ class Dual:
         x = np.empty(len(cost))
         x[self._order] = -self._signs * np.nan_to_num(np.array(found.z))[: len(cost)]
         x *= self._across
-        lost = (clarabel.SolverStatus.PrimalInfeasible, clarabel.SolverStatus.AlmostPrimalInfeasible)
-        least = math.inf if found.status in lost else float(cost @ x)
+        # infeasible where the program itself is unbounded
+        least = math.inf if _is_infeasible(found) else float(cost @ x)
         return x, self._along * np.nan_to_num(np.array(found.x)) / factor, least
+
+
+class Plain:
+    """A solver of the same, by the program as it is told."""
+
+    def __init__(
+        self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]], scaled: bool,
+        settings: Mapping[str, Any],
+    ) -> None:  # fmt: skip
+        from scipy.sparse import coo_array, csc_array, diags_array, vstack
+
+        count, width = rows.shape
+        own = np.concatenate([columns for columns, _ in matrices])
+        self._scaled, self._settings = scaled, {**settings, "equilibrate_enable": False}
+        self._along: Array = np.ones(count)
+        self._across: Array = np.ones(width)
+        if scaled:
+            self._along, self._across = _scales(rows, cones, matrices)
+        told = diags_array(self._along) @ rows @ diags_array(self._across)
+        entries = coo_array((-np.ones(len(own)), (np.arange(len(own)), own)), shape=(len(own), width))
+        self._rows = csc_array(vstack([told, entries]))
+        self._right = np.append(self._along * right, np.zeros(len(own)))
+        self._kinds = [_zero(cone.size) if cone.kind is None else cone.kind for cone in cones]
+        self._kinds += [kind for _, kind in matrices]
+        self._solver: Any = None
+
+    def solved(self, cost: Array) -> tuple[Array, Array, float]:
+        """x and z, whatever the solver says of them, and q'x; infinite where it takes that for unbounded."""
+        scaled = self._across * cost
+        factor = _factor(scaled) if self._scaled else 1.0
+        if self._solver is None:
+            self._solver = solver_of(factor * scaled, self._rows, self._right, self._kinds, self._settings)
+        else:
+            self._solver.update(q=factor * scaled)
+        found = self._solver.solve()
+        x, z = (np.nan_to_num(np.array(each)) for each in (found.x, found.z))
+        x *= self._across
+        least = math.inf if _is_unbounded(found) else float(cost @ x)
+        return x, self._along * z[: len(self._along)] / factor, least
+
+
+def solver_for(
+    rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]], scaled: bool,
+    settings: Mapping[str, Any],
+) -> Dual | Plain:  # fmt: skip
+    """That which is sooner done: matrices, or all other cones, are full and stand in it once."""
+    alone = sum(len(columns) ** 2 for columns, _ in matrices)
+    others = sum(cone.size**2 for cone in cones if cone.is_alike)
+    return (Dual if alone >= others else Plain)(rows, right, cones, matrices, scaled, settings)
+
+
+def _factor(cost: Array) -> float:
+    """With which its largest entry is about one."""
+    size = float(np.abs(cost).max(initial=0.0))
+    return float(np.clip(1.0 / size, _LEAST, _MOST)) if size > 0.0 else 1.0
+
+
+def _is_infeasible(found: Any) -> bool:
+    import clarabel
+
+    return found.status in (clarabel.SolverStatus.PrimalInfeasible, clarabel.SolverStatus.AlmostPrimalInfeasible)
+
+
+def _is_unbounded(found: Any) -> bool:
+    import clarabel
+
+    return found.status in (clarabel.SolverStatus.DualInfeasible, clarabel.SolverStatus.AlmostDualInfeasible)
 
 
 def _zero(size: int) -> Any:

@@ -14,7 +14,7 @@ from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.prove.quadratics import column, matrix_of, triangle
 from laufruhe.prove.springs.bound import Cap, Multipliers, Priced, Program, Proposed, Root, follows
 from laufruhe.prove.springs.conditions import Held
-from laufruhe.prove.springs.dual import Cone, Dual
+from laufruhe.prove.springs.dual import Cone, Dual, Plain, solver_for
 from laufruhe.prove.springs.modes import Shapes
 
 # what a solver leaves of a price of one for every square, so that what its multipliers leave over is convex
@@ -54,7 +54,7 @@ class Stated:
         self.rows: list[Any] = []
         self.right: list[Array] = []
         self.cones: list[tuple[str, Hashable]] = []
-        self._solvers: dict[tuple[bool, tuple[float, float]], Dual] = {}
+        self._solvers: dict[tuple[bool, tuple[float, float]], Dual | Plain] = {}
         blocks = [_entries(size) for cap in program.caps for size in cap.blocks]
         heads = len(program.prices)
         self.blocks = np.cumsum([heads, *blocks])
@@ -288,7 +288,7 @@ class Stated:
                 (self._moment(order), clarabel.PSDTriangleConeT(size)) for order, size in enumerate(self.program.sizes)
             ]
             rows, right = vstack(self.rows, format="coo"), np.concatenate(self.right)
-            solver = Dual(rows, right, self._kinds(), moments, scaled, {**_SETTINGS, **off})
+            solver = solver_for(rows, right, self._kinds(), moments, scaled, {**_SETTINGS, **off})
             self._solvers[scaled, enough] = solver
         return solver.solved(cost)
 
