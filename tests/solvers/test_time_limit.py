@@ -18,7 +18,7 @@ from laufruhe.cli import app
 from laufruhe.files.reader import load
 from laufruhe.numerics.budget import at_least, in_time, left, limited, passed, rounds
 from laufruhe.prove.quadratics import solver_of
-from laufruhe.solvers import CUT_SHORT, Status, solve
+from laufruhe.solvers.methods import CUT_SHORT, Status, solve
 from problem_files import PROBLEMS, written
 
 # a problem of every kind of search, and what its whole search finds

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
+from importlib import import_module
 from pathlib import Path
 
 import typer
@@ -25,7 +26,7 @@ from laufruhe.report import files
 from laufruhe.report.json_result import as_json
 from laufruhe.report.result_report import result_document
 from laufruhe.report.tables import write_tables
-from laufruhe.report.web_page import as_html
+from laufruhe.report.web_page import as_html, template
 from laufruhe.solvers.result import Result, Status
 
 # each has a folder of its own
@@ -116,6 +117,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         if request.kinds:
             say("drawing")
         with _timed(seconds, "plots"):
+            _get_ready()
             pictures = drawn()
         document = document.showing(pictures)
         files.write(stage / files.REPORT, document.as_markdown(f".{request.kinds[0]}" if request.kinds else ""))
@@ -123,6 +125,13 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         for place in filter(None, (stage / files.RESULT, copy)):
             files.write(place, as_json(result, request.series))
     return result, folder
+
+
+def _get_ready() -> None:
+    """Load what makes the page and the tables on the screen, while pictures are drawn."""
+    template()
+    if not is_quiet():
+        import_module("laufruhe.report.screen")
 
 
 @contextmanager

@@ -5,13 +5,17 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Mapping
+from functools import cache
 from importlib.resources import files
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup, escape
 
 from laufruhe.live import LiveModel, page_assets
 from laufruhe.report.document import Document
+
+if TYPE_CHECKING:
+    from jinja2 import Template
 
 PAGE = "page.html"
 HEADING = "Move the decisions"
@@ -27,13 +31,18 @@ def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | N
     live
         What lets a reader move decisions.
     """
+    inline = {name: inlined(svg) for name, svg in pictures.items()}
+    return f"{template().render(document=document, pictures=inline, live=_live(live))}\n"
+
+
+@cache
+def template() -> Template:
+    """What a page is made of; it takes longer to read than to fill."""
     import jinja2
 
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["marked"] = _marked
-    template = environment.from_string((files("laufruhe.report") / PAGE).read_text(encoding="utf-8"))
-    inline = {name: inlined(svg) for name, svg in pictures.items()}
-    return template.render(document=document, pictures=inline, live=_live(live)) + "\n"
+    return environment.from_string((files("laufruhe.report") / PAGE).read_text(encoding="utf-8"))
 
 
 def _live(model: LiveModel | None) -> dict[str, Any] | None:

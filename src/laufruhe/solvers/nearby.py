@@ -19,9 +19,9 @@ from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem, Search
-from laufruhe.solvers import kinds_of, solve
 from laufruhe.solvers.conclusion import given_design, values_of
 from laufruhe.solvers.cones.conic import solve_cones
+from laufruhe.solvers.methods import kinds_of, solve
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import candidates_of
 

@@ -1,0 +1,322 @@
+"""Which method decides what: a table, and the way of one decision through it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+from laufruhe.errors import ModelError, SolverError
+from laufruhe.load_models.run_look import asks_runs
+from laufruhe.numerics.budget import limited, passed
+from laufruhe.numerics.progress import Listener, listening, tell
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.evaluation import objective_value
+from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof, Reach
+from laufruhe.solvers.accuracy import solve_within
+from laufruhe.solvers.apart import is_apart, solve_apart
+from laufruhe.solvers.boxes.flywheel import solve_flywheel
+from laufruhe.solvers.boxes.leads import solve_leads
+from laufruhe.solvers.boxes.places import solve_places
+from laufruhe.solvers.boxes.shared_leads import solve_shared_leads
+from laufruhe.solvers.boxes.sizes import solve_sizes
+from laufruhe.solvers.boxes.torsion import solve_torsion
+from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
+from laufruhe.solvers.cones.equal_designs import free_decisions
+from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_sharply
+from laufruhe.solvers.in_order import solve_in_order
+from laufruhe.solvers.mounts.convex import is_convex, solve_convex_mounts
+from laufruhe.solvers.reachable import with_reachable
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.runs import solve_runs
+from laufruhe.solvers.stars.phasing import solve_phasing
+from laufruhe.solvers.stars.rooms import with_room
+from laufruhe.solvers.stars.sizes import solve_star_sizes
+from laufruhe.solvers.tolerances.assembly import solve_assembly
+from laufruhe.solvers.tolerances.robust import solve_robust
+
+LIBRARIES = ("casadi", "clarabel", "cvxpy", "pyscipopt")
+"""Packages that are imported where something open needs them, named as their modules."""
+CUT_SHORT = "stopped at the time limit"
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way of deciding.
+
+    Attributes
+    ----------
+    name
+        In words.
+    decides
+        Kinds that it can have open together.
+    suits
+        Whether what is asked suits it.
+    reach
+        What its bounds can prove.
+    solve
+        The design, proven as far as it is.
+    judges_fidelity
+        Whether the fidelity is chosen again where the design needs a better one than that given (F11).
+    """
+
+    name: str
+    decides: frozenset[Kind]
+    suits: Callable[[Problem], bool]
+    reach: Reach
+    solve: Callable[[Problem], Result]
+    judges_fidelity: bool = False
+
+    def decided(self, problem: Problem) -> Result:
+        """The design, accurate as far as that is looked at."""
+        return solve_within(problem, self.solve) if self.judges_fidelity else self.solve(problem)
+
+
+def kinds_of(problem: Problem) -> frozenset[Kind]:
+    """Kinds of what is open."""
+    stars = [Kind.STAR] if problem.phasing is not None else []
+    return frozenset([*stars, *(decision.kind for decision in problem.decisions)])
+
+
+def _smooth(problem: Problem) -> Result:
+    from laufruhe.solvers.mounts.nonlinear import solve_joint
+
+    return solve_joint(problem)
+
+
+def _stars_on_mounts(problem: Problem) -> Result:
+    from laufruhe.solvers.mounts.stars import solve_star_mounts
+
+    return solve_star_mounts(problem)
+
+
+def _mounted_sizes(problem: Problem) -> Result:
+    from laufruhe.solvers.mounts.sizes import solve_mounted_sizes
+
+    return solve_mounted_sizes(problem)
+
+
+def _asks_mounted_sizes(problem: Problem) -> bool:
+    """Whether loads are minimised beside what mounts are asked for, and the rest suits boxes of sizes."""
+    others = [term for term in problem.objective if not term.measure.is_mounting]
+    limits = [limit for limit in problem.limits if not limit.measure.is_mounting]
+    return bool(others) and _asks_sizes(replace(problem, objective=tuple(others), limits=tuple(limits)))
+
+
+def _asks_sizes(problem: Problem) -> bool:
+    """Whether all that is asked is of loads that are affine in masses at an even speed, of sizes alone, or masses."""
+    felt = [m.channel for m in problem.measures]
+    return (
+        Kind.SIZE in kinds_of(problem)
+        and not problem.fidelity.is_uneven
+        and all(
+            channel.of_engine is not None or channel.is_mass or (channel.is_load and not channel.feels_inertia)
+            for channel in felt
+        )
+    )
+
+
+def _apart(problem: Problem) -> Result:
+    return solve_apart(problem, _decided)
+
+
+def _asks_led(problem: Problem) -> bool:
+    """Whether all that is asked is of loads that what each shaft carries adds up to, or of how evenly these turn."""
+    felt = all(measure.channel.adds_up_by_shafts or measure.is_mass for measure in problem.measures)
+    return felt and not _shares_gas(problem) and _adds_points(problem) and not problem.fidelity.is_uneven
+
+
+def _shares_gas(problem: Problem) -> bool:
+    """Whether gas that is felt works between two pistons, of which one may lead."""
+    names = {shaft for decision in problem.decisions for shaft in decision.keys(Kind.LEAD)}
+    parts = problem.engine.slider_cranks
+    led = (part for part in parts if part.shaft.name in names)
+    return problem.feels_gas and any(part.faces(other) for part in led for other in parts if other is not part)
+
+
+def _asks_shared(problem: Problem) -> bool:
+    """Whether all that is asked is of loads on the block, or on mounts that do not give way, gas between two cranks."""
+    felt = all(m.is_mass or (m.is_load and not m.is_inside) for m in problem.measures)
+    rigid = problem.engine.block is None and not problem.fidelity.is_uneven
+    return _shares_gas(problem) and felt and rigid and _adds_points(problem)
+
+
+def _asks_places(problem: Problem) -> bool:
+    """Whether no bearing that is asked about carries a shaft whose unbalances have open places."""
+    carried = {bearing.shaft.name for bearing in problem.engine.bearings}
+    moved = {drive.rotor for decision in problem.decisions for drive in decision.place_drives}
+    loads = any(rotor.shaft.name in carried for rotor in problem.engine.rotors if rotor.name in moved)
+    inside = any(measure.is_inside or measure.channel.is_flywheel for measure in problem.measures)
+    return _asks_loads(problem) and _adds_points(problem) and not (loads and inside)
+
+
+def _adds_points(problem: Problem) -> bool:
+    """Whether no norm takes operating points as groups: boxes, stars and smooth programs know none such."""
+    return not any(measure.is_load and measure.norm.joins_points for measure in problem.measures)
+
+
+def _asks_stars(problem: Problem) -> bool:
+    """Whether stars may be told apart by all that is asked: by loads, masses, and what each by itself is known for."""
+    return _adds_points(problem) and not any(m.is_mounting and m.channel.of_loads for m in problem.measures)
+
+
+def _asks_stars_on_mounts(problem: Problem) -> bool:
+    """Whether stars on open mounts are told apart by all that is asked; how evenly they turn while they are even."""
+    moves = problem.phasing is not None and problem.phasing.continuous
+    numbers = (m.channel.is_number and not m.is_mounting for m in problem.measures)
+    return problem.engine.block is not None and _adds_points(problem) and not (moves and any(numbers))
+
+
+def _feels_pistons(problem: Problem) -> bool:
+    """Whether nothing is asked but masses and loads that are affine in the masses of the pistons."""
+    channels = [measure.channel for measure in problem.measures]
+    return not any(channel.feels_inertia or channel.is_number for channel in channels)
+
+
+def _asks_loads(problem: Problem) -> bool:
+    """Whether nothing that is asked of the mounts depends on loads: it holds for every design, or for none."""
+    return not any(measure.channel.of_loads for measure in problem.measures)
+
+
+_U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.FLYWHEEL
+_T = Kind.TORSION
+METHODS: tuple[Method, ...] = (
+    Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, state),
+    Method("boxes of the flywheel", frozenset({_F}), lambda p: all(m.channel.is_flywheel for m in p.measures),
+           Reach.WHOLE, solve_flywheel),
+    Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, solve_torsion, True),
+    Method("boxes of sizes", frozenset({Kind.SIZE, _U}), _asks_sizes, Reach.WHOLE, solve_sizes, True),
+    Method("second-order cones", frozenset({_U, Kind.SHARE}), _asks_loads, Reach.WHOLE, solve_sharply, True),
+    Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE, solve_sharply,
+           True),
+    Method("boxes of leads", frozenset({_U, Kind.LEAD}), _asks_led, Reach.WHOLE, solve_leads, True),
+    Method("boxes of leads between shared chambers", frozenset({Kind.LEAD}), _asks_shared, Reach.WHOLE,
+           solve_shared_leads, True),
+    Method("cones over boxes of places", frozenset({_U, _P}), _asks_places, Reach.WHOLE, solve_places, True),
+    Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, solve_phasing, True),
+    Method("stars, each with boxes of sizes", frozenset({_S, _U, Kind.SIZE}), _asks_sizes, Reach.WHOLE,
+           solve_star_sizes, True),
+    Method("linear matrix inequalities", frozenset({_K}), is_convex, Reach.WHOLE, solve_convex_mounts),
+    Method("smooth program, boxes of stiffness", frozenset({_K}), _adds_points, Reach.NEAR, _smooth),
+    Method("smooth program", frozenset({_U, _K, _M}), _adds_points, Reach.ASIDE, _smooth),
+    Method("flywheel, crankshaft and the rest apart", frozenset(Kind) - {_S}, is_apart, Reach.ASIDE, _apart),
+    Method("local programs of sizes and mounts", frozenset({Kind.SIZE, _U, _K, _M}), _asks_mounted_sizes, Reach.ASIDE,
+           _mounted_sizes),
+    Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), _asks_stars_on_mounts, Reach.ASIDE,
+           _stars_on_mounts),
+)  # fmt: skip
+"""Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
+
+
+def solve(
+    problem: Problem, listener: Listener | None = None, time_limit: float | None = None, further: bool = False
+) -> Result:
+    """Decide what a problem leaves open.
+
+    Parameters
+    ----------
+    problem
+        What is open, wanted and forbidden.
+    listener
+        Told how far searches are.
+    time_limit
+        Seconds after which searches end with the best that they have, and with its bound.
+    further
+        Whether to ask what limits that no design keeps can reach, and which decisions an optimum leaves free.
+
+    Raises
+    ------
+    SolverError
+        If a solver stops without an answer.
+    ModelError
+        If the engine as given cannot be evaluated, or nothing decides what is open.
+    """
+    with limited(time_limit), listening(listener):
+        begun = time.perf_counter()
+        found: Result | None
+        try:
+            found = _decided(problem)
+        except ModuleNotFoundError as error:
+            if error.name not in LIBRARIES:
+                raise
+            why = f"what is open needs {error.name}, which is not installed; pip install {error.name}"
+            raise SolverError(why) from None
+        except SolverError:
+            if not passed():
+                raise
+            found = None
+        found = found if found is not None and not passed() else _cut_short(problem, found)
+        if not further or found.status is Status.FEASIBLE:
+            return found
+        if found.status is Status.OPTIMAL:
+            return replace(found, free=free_decisions(found))
+        return with_reachable(found, problem, kinds_of(problem), time.perf_counter() - begun, _decided)
+
+
+def _cut_short(problem: Problem, found: Result | None) -> Result:
+    """What there is when time is over: the best of the search, or the design as given where that is allowed."""
+    if found is None or found.status is Status.FAILED:
+        with suppress(ModelError):
+            given = judged(problem, problem.start)
+            if problem.phasing is None and given.excess <= KEPT:
+                shown = Shown(0.0, Reach.ASIDE, math.inf, f"the design as given; {CUT_SHORT}")
+                return concluded(given, given.evaluation, shown, {})
+    if found is None:
+        raise SolverError("no design was found within the time limit; raise it")
+    if found.status is Status.FAILED:
+        return replace(found, message=f"{found.message}; {CUT_SHORT}")
+    own = found.certificate
+    if own is None or own.kind is Proof.GLOBAL:
+        return found
+    return replace(found, certificate=replace(own, method=f"{own.method}; {CUT_SHORT}"))
+
+
+def _decided(problem: Problem) -> Result:
+    """By the first method that suits, for the drawing or for the engines that are built to it."""
+    if problem.ranks:
+        return solve_in_order(problem, _decided)
+    if problem.assembly is not None:
+        return solve_assembly(problem)
+    if problem.over is not None:
+        return solve_robust(problem, _decided)
+    if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
+        raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
+    kinds = kinds_of(problem)
+    fixed = [limit for limit in problem.limits if not limit.measure.channel.is_moved_by(kinds)]
+    if fixed:
+        given = evaluate_start(problem)
+        # what cannot be evaluated is refused first
+        objective_value(problem, given)
+        problem, least = with_room(problem, fixed, given)
+        broken = broken_limits(fixed, least)
+        if broken:
+            return none_within(problem, given, broken, {})
+        moved = tuple(limit for limit in problem.limits if limit not in fixed)
+        return with_limits(_decided(problem.changed(limits=moved)), problem.limits)
+    if kinds and asks_runs(problem):
+        return solve_runs(problem, kinds, _decided)
+    if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
+        raise ModelError("flywheel is open, and nothing that is asked depends on it; fix it, or ask for its inertia")
+    moving = any(term.measure.channel.is_moved_by(kinds) for term in problem.objective)
+    if problem.objective and kinds and not moving and problem.phasing is None:
+        design = judged(problem, problem.start)
+        if design.excess <= KEPT:
+            shown = Shown(design.value, Reach.WHOLE, 0.0, "nothing open changes what is minimised")
+            return concluded(design, design.evaluation, shown, {})
+    words = " and ".join(kind.name.lower() for kind in sorted(kinds))
+    if kinds and not problem.objective:
+        raise ModelError(f"{words} is open and nothing is minimised; add [objective] or [mounts]")
+    method = next((m for m in METHODS if kinds <= m.decides and m.suits(problem)), None)
+    if method is None:
+        asked = ", ".join(dict.fromkeys(measure.name for measure in problem.measures))
+        raise ModelError(f"no method decides {words} together for {asked}; fix one of them, or ask for less")
+    # what is decided apart is asked once more, each part by itself
+    tell(method.name)
+    conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and not kinds & {_S, _T, _F, Kind.SIZE} else ()
+    if conflict:
+        return none_within(problem, evaluate_start(problem), conflict, {})
+    return method.decided(problem)
