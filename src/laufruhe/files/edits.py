@@ -10,6 +10,7 @@ from laufruhe import units
 from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.nested import at, put
 from laufruhe.files.problem_file import ProblemFile
+from laufruhe.files.rotors import name_of_unbalance
 from laufruhe.files.study_tables import keys_of
 
 Keys: TypeAlias = tuple[Any, ...]
@@ -111,11 +112,9 @@ def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
     for k, weight in enumerate(tables.get("counterweights", ())):
         yield weight.get("name", ""), ("counterweights", k)
     for k, shaft in enumerate(tables.get("balancer_shafts", ())):
-        unbalances = shaft.get("unbalances", ())
-        single = len(unbalances) == 1 and "name" not in unbalances[0]
-        for j, unbalance in enumerate(unbalances):
-            label = shaft.get("name", "") if single else f"{shaft.get('name', '')}.{unbalance.get('name', j + 1)}"
-            yield label, ("balancer_shafts", k, "unbalances", j)
+        names = [unbalance.get("name") for unbalance in shaft.get("unbalances", ())]
+        for j in range(len(names)):
+            yield name_of_unbalance(shaft.get("name", ""), names, j), ("balancer_shafts", k, "unbalances", j)
         yield shaft.get("name", ""), ("balancer_shafts", k)
     for k, geared in enumerate(tables.get("geared_inertias", ())):
         yield geared.get("name", ""), ("geared_inertias", k)

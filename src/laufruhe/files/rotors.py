@@ -212,8 +212,7 @@ def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> No
             shaft = Shaft(table.name, table.ratio, *(Open.of(along).start for along in table.position))
         for j, unbalance in enumerate(table.unbalances):
             at = f"{where}.unbalances[{j + 1}]"
-            single = len(table.unbalances) == 1 and unbalance.name is None
-            name = table.name if single else f"{table.name}.{unbalance.name or j + 1}"
+            name = name_of_unbalance(table.name, [own.name for own in table.unbalances], j)
             if unbalance.coupled is not None:
                 _follow(name, unbalance, unbalance.coupled, shaft, at, into)
             else:
@@ -223,6 +222,11 @@ def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> No
         built = [rotor.name for rotor in into.rotors if rotor.shaft == shaft]
         for axis, along in enumerate(table.position, start=1):
             into.move(f"{table.name}.{'xyz'[axis]}", built, axis, along)
+
+
+def name_of_unbalance(shaft: str, names: Sequence[str | None], j: int) -> str:
+    """By which results show the j-th unbalance of a shaft; one without a name of its own has that of the shaft."""
+    return shaft if len(names) == 1 and names[0] is None else f"{shaft}.{names[j] or j + 1}"
 
 
 def _follow(name: str, table: UnbalanceTable, coupled: CoupledTable, shaft: Shaft, where: str, into: RotorList) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeVar
 
@@ -18,22 +18,41 @@ from laufruhe.problem.measure import MEASURES, Measure, counted_parts, counted_r
 
 T = TypeVar("T")
 Motion = Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]
-_NEEDS = {
-    Needs.MOUNTS: ("needs mounts", "add [mounts], or ask for a shaking force"),
-    Needs.ELASTIC: ("needs elastic mounts", 'add [mounts] with kind = "elastic", and [block]'),
-    Needs.BEARINGS: ("needs main bearings", "list them in [[main_bearings]]"),
-    Needs.TORSION: ("needs the discs and shafts of the crankshaft", "add [torsion]"),
-    Needs.DIAMETERS: ("needs the diameter of a shaft", "give one in [torsion]"),
+_NEEDS: Mapping[Needs, tuple[Callable[[Engine], object], str, str]] = {
+    Needs.NOTHING: (lambda _: True, "", ""),
+    Needs.MOUNTS: (lambda e: e.mounts, "needs mounts", "add [mounts], or ask for a shaking force"),
+    Needs.ELASTIC: (lambda e: e.block, "needs elastic mounts", 'add [mounts] with kind = "elastic", and [block]'),
+    Needs.BEARINGS: (lambda e: e.bearings, "needs main bearings", "list them in [[main_bearings]]"),
+    Needs.TORSION: (lambda e: e.torsion, "needs the discs and shafts of the crankshaft", "add [torsion]"),
+    Needs.DIAMETERS: (
+        lambda e: e.torsion and any(section.diameter is not None for section in e.torsion.sections),
+        "needs the diameter of a shaft",
+        "give one in [torsion]",
+    ),
     Needs.FLYWHEEL: (
+        lambda e: e.flywheel or e.torsion,
         "needs a flywheel",
         "add [flywheel] with an inertia or a rim, [torsion], or fidelity.crank_inertia",
     ),
-    Needs.ROTORS: ("needs the rotors of a rotary engine", 'take layout = "rotary"'),
-    Needs.RIM: ("needs the rim of a flywheel", "add [flywheel.rim]"),
-    Needs.RUN: ("needs elastic mounts that an engine is run up on", "add [run_up] and [mounts] of kind elastic"),
-    Needs.CASES: ("needs load cases", "add [[load_cases]], and [mounts] of kind elastic"),
-    Needs.ARMS: ("needs the arms of a flywheel", "add [flywheel.rim.arms]"),
+    Needs.ROTORS: (
+        lambda e: any(not part.has_rod for part in e.slider_cranks),
+        "needs the rotors of a rotary engine",
+        'take layout = "rotary"',
+    ),
+    Needs.RIM: (lambda e: e.flywheel and e.flywheel.rim, "needs the rim of a flywheel", "add [flywheel.rim]"),
+    Needs.RUN: (
+        lambda e: e.run,
+        "needs elastic mounts that an engine is run up on",
+        "add [run_up] and [mounts] of kind elastic",
+    ),
+    Needs.CASES: (lambda e: e.load_cases, "needs load cases", "add [[load_cases]], and [mounts] of kind elastic"),
+    Needs.ARMS: (
+        lambda e: e.flywheel and e.flywheel.rim and e.flywheel.rim.arms,
+        "needs the arms of a flywheel",
+        "add [flywheel.rim.arms]",
+    ),
 }
+"""What an engine has to have for a channel, and what is said of one that has not."""
 PLACES = {
     "mounts": "mount",
     "bearings": "main bearing",
@@ -80,8 +99,9 @@ class Scene:
             raise Refused(where, name, "is no quantity", nearest(name, list(MEASURES)))
         channel, norm = MEASURES[name]
         at, of = where.rsplit(".", 1)[0], getattr(table, "of", None)
-        if not self._has(channel.needs):
-            raise Refused(where, name, *_NEEDS[channel.needs])
+        has, rule, remedy = _NEEDS[channel.needs]
+        if not has(self.engine):
+            raise Refused(where, name, rule, remedy)
         with blamed_on(where):
             channel.check_sizes(self.engine, self.points[0])
         self._check_stiffness(channel, name, where)
@@ -101,26 +121,6 @@ class Scene:
             if not shafts:
                 raise Refused(f"{at}", name, "counts balancer shafts, and there are none", "add one, or leave it out")
         return found
-
-    def _has(self, needs: Needs) -> bool:
-        """Whether the engine has what a channel needs."""
-        engine, chain, wheel = self.engine, self.engine.torsion, self.engine.flywheel
-        rim = wheel.rim if wheel else None
-        has = {
-            Needs.NOTHING: True,
-            Needs.MOUNTS: bool(engine.mounts),
-            Needs.ELASTIC: engine.block is not None,
-            Needs.BEARINGS: bool(engine.bearings),
-            Needs.TORSION: chain is not None,
-            Needs.DIAMETERS: chain is not None and any(s.diameter is not None for s in chain.sections),
-            Needs.FLYWHEEL: wheel is not None or chain is not None,
-            Needs.RIM: rim is not None,
-            Needs.RUN: engine.run is not None,
-            Needs.CASES: bool(engine.load_cases),
-            Needs.ROTORS: any(not part.has_rod for part in engine.slider_cranks),
-            Needs.ARMS: rim is not None and rim.arms is not None,
-        }
-        return has[needs]
 
     def _check_stiffness(self, channel: Channel, name: str, where: str) -> None:
         """Refuse what is of one stiffness where mounts have another at every frequency."""

@@ -21,7 +21,7 @@ from laufruhe.files.problem_file import ProblemFile
 
 MOST_POINTS = 100_000
 _DIGITS = 12
-_SIDES = {"max": "at most", "min": "at least"}
+SIDES = {"max": "at most", "min": "at least"}
 
 
 def _single(given: object) -> object:
@@ -124,7 +124,7 @@ def _paths(node: Any, above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
 def parts_of(where: str) -> list[str]:
     """The parts of a path; the name of a limit may have points of its own, as that of order 0.5."""
     parts = where.split(".")
-    if parts[0] == "constraints" and parts[-1] in _SIDES and len(parts) > 3:
+    if parts[0] == "constraints" and parts[-1] in SIDES and len(parts) > 3:
         return [parts[0], ".".join(parts[1:-1]), parts[-1]]
     return parts
 
@@ -191,7 +191,7 @@ class Axis:
             return f"{before[-1]} {last}"
         if before[:1] == ["constraints"]:
             of = f"limit {before[1]}" if before[1].isdigit() else before[1]
-            return f"{of}, {_SIDES.get(last, last)}"
+            return f"{of}, {SIDES.get(last, last)}"
         return last
 
     def by_value(self) -> dict[Value, float]:
@@ -319,4 +319,4 @@ def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str
 def _is_limit(quantity: str) -> bool:
     """Whether a path is that of a side of a limit, whose dimension is told by its text alone."""
     parts = parts_of(quantity)
-    return parts[0] == "constraints" and parts[-1] in _SIDES
+    return parts[0] == "constraints" and parts[-1] in SIDES

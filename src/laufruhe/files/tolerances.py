@@ -15,6 +15,7 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, key_path
 from laufruhe.files.fields import Table
 from laufruhe.files.nested import put
+from laufruhe.files.rotors import name_of_unbalance
 from laufruhe.machine import Engine, Rotor
 from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
 from laufruhe.problem.problem import Problem
@@ -287,10 +288,7 @@ def _names(path: Path, tables: Mapping[str, Any]) -> list[str]:
     table = tables[str(path[0])][path[1]]
     if path[0] == "counterweights":
         return [str(table["name"])]
-    unbalances, j = table["unbalances"], int(path[3])
-    own = unbalances[j].get("name")
-    single = len(unbalances) == 1 and own is None
-    return [str(table["name"]) if single else f"{table['name']}.{own or j + 1}"]
+    return [name_of_unbalance(table["name"], [one.get("name") for one in table["unbalances"]], int(path[3]))]
 
 
 def _of_file(one: Written) -> Tolerance:

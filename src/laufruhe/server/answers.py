@@ -27,7 +27,7 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.report.web_page import inlined
 from laufruhe.server import told
 from laufruhe.server.asked import CRANK, LATER, Asked, Edit
-from laufruhe.server.controls import as_json, controls_of, offered_by, typed
+from laufruhe.server.controls import as_json, as_typed, controls_of, offered_by
 from laufruhe.server.front import Front, partners, places
 from laufruhe.server.held import held_by, ranking_of
 from laufruhe.server.scenes import Scene, key_of, scene_of
@@ -266,8 +266,6 @@ def save(source: Source, asked: Asked) -> dict[str, Any]:
     with in_file(source.path.name):
         for name, value in asked.design.items():
             if name in units:
-                unit, factor = typed(units[name])
-                text = f"{factor * value!r} {unit}".rstrip()
-                tables = edits.with_value(tables, name, text if unit else factor * value)
+                tables = edits.with_value(tables, name, as_typed(value, units[name]))
     load_tables(tables, source.path)
     return {"toml": toml_text(tables), "file": f"{source.path.stem}-page.toml"}

@@ -11,6 +11,7 @@ from laufruhe import units
 from laufruhe.files import edits
 from laufruhe.files.asked import limit_name
 from laufruhe.files.complaints import Refused
+from laufruhe.files.study_tables import SIDES
 from laufruhe.problem.problem import Problem
 from laufruhe.server.asked import CRANK, OBJECTIVE, STAR
 
@@ -23,7 +24,6 @@ _OF_ENGINE = {
 _WHOLE_TURN = ("bank_angle", "split_pin_angle")
 _LOADS = {"imep": "indicated mean pressure", "bmep": "brake mean pressure", "brake_torque": "torque at the brake"}
 _SPEEDS = {"speed": "speed", "mean_piston_speed": "mean piston speed"}
-_SIDES = {"max": "at most", "min": "at least"}
 _AXES = "xyz"
 _NARROW, _WIDE, _STEPS = 0.25, 2.0, 200
 
@@ -150,6 +150,12 @@ def typed(unit: str) -> tuple[str, float]:
     return units.shown(1.0, unit).partition(" ")[2], factor
 
 
+def as_typed(value: float, unit: str) -> str | float:
+    """A number [SI] as a file has it."""
+    name, factor = typed(unit)
+    return f"{factor * value!r} {name}" if name else factor * value
+
+
 def _of_mounts(tables: Mapping[str, Any]) -> Iterator[Control]:
     mounts = tables.get("mounts", {})
     of = [("mounts", "All mounts", mounts)]
@@ -163,7 +169,7 @@ def _of_mounts(tables: Mapping[str, Any]) -> Iterator[Control]:
 def _of_limits(tables: Mapping[str, Any]) -> Iterator[Control]:
     for k, entry in enumerate(tables.get("constraints", [])):
         name = limit_name(entry) or ""
-        for key, words in _SIDES.items():
+        for key, words in SIDES.items():
             own = _around(f"constraints.{k + 1}.{key}", "Limits", f"{name} {words}", entry.get(key), 0.05)
             yield from (replace(one, limit=name) for one in own)
         for end, given in enumerate(entry.get("outside") or []):

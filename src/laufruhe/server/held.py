@@ -10,7 +10,7 @@ from laufruhe.errors import InputError
 from laufruhe.files.complaints import Refused
 from laufruhe.present.numbers import figure
 from laufruhe.server.asked import STAR, Edit
-from laufruhe.server.controls import typed
+from laufruhe.server.controls import as_typed
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import RankedOrder, RankedStar
 
@@ -28,9 +28,7 @@ def held_by(result: Result, tables: Mapping[str, Any]) -> list[list[Any]]:
     for decision in result.problem.decisions:
         if decision.is_affine or decision.name not in values:
             continue
-        unit, factor = typed(decision.unit)
-        value = factor * values[decision.name].value
-        edit = Edit("fix", decision.name, f"{value!r} {unit}" if unit else value)
+        edit = Edit("fix", decision.name, as_typed(values[decision.name].value, decision.unit))
         try:
             edit(tables)
         except (Refused, InputError):

@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from laufruhe.errors import ModelError
+from laufruhe.files.asked import SIDES
 from laufruhe.live import live_model
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit
@@ -23,7 +24,6 @@ from laufruhe.solvers.conclusion import decision_values, limit_values
 from laufruhe.solvers.following import Followed, Follower, can_follow
 from laufruhe.solvers.result import LimitValue, ObjectiveValue, Result, Status
 
-_SIDES = ("max", "min", "outside")
 _KEPT = 6
 
 
@@ -114,6 +114,6 @@ def scene_of(problem: Problem, tables: Mapping[str, Any]) -> Scene:
 
 def key_of(tables: Mapping[str, Any]) -> str:
     """Of all but where limits stand."""
-    limits = [{k: v for k, v in entry.items() if k not in _SIDES} for entry in tables.get("constraints", [])]
+    limits = [{k: v for k, v in entry.items() if k not in SIDES} for entry in tables.get("constraints", [])]
     text = json.dumps({**tables, "constraints": limits}, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
