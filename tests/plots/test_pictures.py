@@ -276,8 +276,11 @@ def test_pictures_need_no_pyplot_and_change_no_settings(tmp_path: Path) -> None:
     code = (
         "import sys; from pathlib import Path; import matplotlib as mpl; before = dict(mpl.rcParams)\n"
         "from laufruhe.files.reader import load; from laufruhe.solvers import state\n"
-        "from laufruhe.plots import draw\n"
-        "draw(state(load(sys.argv[1])), Path(sys.argv[2]))\n"
+        "from laufruhe.plots import figures, get_ready, save\n"
+        "get_ready()\n"
+        "drawn = dict(figures(state(load(sys.argv[1]))))\n"
+        "assert len(drawn) == 5\n"
+        "save(drawn['bars'], Path(sys.argv[2]) / 'bars.png')\n"
         "assert 'matplotlib.pyplot' not in sys.modules\n"
         "assert dict(mpl.rcParams) == before\n"
     )

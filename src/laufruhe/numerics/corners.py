@@ -88,13 +88,14 @@ class Corners:
 
     def coefficients(self, count: int, base: float) -> NDArray[np.complex128]:
         """Orders 0, b, ... (count - 1) b, shape (count, ...); none at order zero."""
-        orders = np.arange(count) * base
+        k, degrees = self.jumps.shape[:2]
+        flat, orders = self.jumps.reshape(k, degrees, -1), np.arange(count) * base
         waves = np.exp(-1j * np.outer(orders, self.angles))
         with np.errstate(divide="ignore", invalid="ignore"):
-            shares = base / math.pi / (1j * orders[:, None]) ** np.arange(1, 1 + self.jumps.shape[1])
+            shares = base / math.pi / (1j * orders[:, None]) ** np.arange(1, 1 + degrees)
         shares[:1] = 0.0
-        table = (waves[:, :, None] * shares[:, None, :]).reshape(count, -1)
-        total, size = table @ self._flat, np.abs(table) @ np.abs(self._flat)
+        together = (waves @ flat.reshape(k, -1)).reshape(count, degrees, -1)
+        total, size = (shares[:, None] @ together)[:, 0], np.abs(shares) @ np.abs(flat).sum(axis=0)
         # what a star cancels is nothing, and not a rounding
         return np.where(np.abs(total) > _CANCELLED * size, total, 0.0).reshape(count, *self.jumps.shape[2:])
 
@@ -151,10 +152,6 @@ class Corners:
         size = np.einsum("km,m->k", np.abs(self.jumps).reshape(*self.jumps.shape[:2], -1).max(axis=2), steps)
         kept = np.sort(np.argsort(-size, kind="stable")[:count])
         return merged(self.angles[kept], self.jumps[kept])
-
-    @property
-    def _flat(self) -> Array:
-        return self.jumps.reshape(self.jumps.shape[0] * self.jumps.shape[1], -1)
 
 
 def joined(parts: Sequence[Corners | None]) -> Corners | None:
