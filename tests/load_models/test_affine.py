@@ -150,9 +150,8 @@ def test_rows_are_those_of_the_exact_model(cylinders: int, samples: int, x: np.n
 @given(x=COLUMNS)
 def test_loads_inside_the_crankcase_are_those_of_the_exact_model(x: np.ndarray) -> None:
     """As above; a bearing feels the cylinders beside it alone, so that its period is the whole cycle."""
-    p, m = inside()
+    p, m, affine = inside()
     assert m.base == p.engine.cycle.base_order
-    affine = m.at(96)
     x = x * affine.scales
     exact = evaluate(p, p.design([d.complex_value(x) for d in m.domains]), 96)
     for measure, (_, norm) in zip(INSIDE, affine.terms, strict=True):
@@ -171,8 +170,8 @@ def test_loads_inside_the_crankcase_are_those_of_the_exact_model(x: np.ndarray) 
 
 
 @lru_cache(maxsize=1)
-def inside() -> tuple[Problem, AffineModel]:
-    """Five bearings between and beside the throws."""
+def inside() -> tuple[Problem, AffineModel, AffineProblem]:
+    """Five bearings between and beside the throws; its model, and that at 96 steps."""
     whole = scene(4)
     bearings = tuple(Bearing(str(k), 0.25 - 0.12 * k, 0.06, 0.025, 0.01) for k in range(5))
     parts = tuple(replace(part, big_end=(0.05, 0.03)) for part in whole.engine.slider_cranks)
@@ -181,7 +180,8 @@ def inside() -> tuple[Problem, AffineModel]:
     )
     engine = replace(whole.engine, slider_cranks=parts, bearings=bearings, gear=gear)
     own = replace(whole, engine=engine, objective=tuple(Term(measure) for measure in INSIDE))
-    return own, AffineModel(own)
+    model = AffineModel(own)
+    return own, model, model.at(96)
 
 
 def test_the_scenes_test_what_they_should() -> None:

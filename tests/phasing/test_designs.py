@@ -131,7 +131,7 @@ def test_limits_that_contradict_each_other_at_one_star_exclude_others(tmp_path):
     assert found.solved[0].value == pytest.approx(min(solved.value for solved, _ in answers if solved), rel=2e-4)
 
 
-@pytest.mark.parametrize("cylinders", [3, 4, 5, 6, 7, pytest.param(8, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("cylinders", [3, 4, 5, 6, 7, pytest.param(8, marks=pytest.mark.long)])
 def test_program_and_search_agree_on_couples(tmp_path, cylinders):
     by = {}
     for method in ("search", "program"):
@@ -148,7 +148,7 @@ def test_program_and_search_agree_on_couples(tmp_path, cylinders):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("cylinders", [9, 10])
+@pytest.mark.parametrize("cylinders", [pytest.param(9, marks=pytest.mark.long), 10])
 def test_program_and_search_agree_up_to_ten(tmp_path, cylinders):
     test_program_and_search_agree_on_couples(tmp_path, cylinders)
 

@@ -70,15 +70,16 @@ max = "10 mm"
 POWERTRAIN = PROBLEMS / "powertrain-least-force.toml"
 
 
-def designs_of(problem: Problem, low: np.ndarray, high: np.ndarray, count: int, seed: int) -> list[tuple[Any, float]]:
+def designs_of(
+    problem: Problem, low: np.ndarray, high: np.ndarray, count: int, seed: int
+) -> Iterator[tuple[Any, float]]:
     """Random designs of a box that keep every limit, and what they are worth."""
-    generator, given, found = np.random.default_rng(seed), evaluate(problem), []
+    generator, given = np.random.default_rng(seed), evaluate(problem)
     for share in generator.random((count, len(low))):
         x = low + share * (high - low)
         each = remounted(given, problem.design(x.tolist()))
         if each.excess(problem.limits) <= 0.0:
-            found.append((x, objective_value(problem, each)))
-    return found
+            yield x, objective_value(problem, each)
 
 
 def asked_of(problem: Problem) -> SpringBoxes:
@@ -290,7 +291,7 @@ def _is_allowed(mounts: OpenMounts, stiffness: np.ndarray) -> bool:
 def test_no_design_in_a_box_is_under_its_bound(name: str, limits: str, tmp_path: Path) -> None:
     problem = asked_for(tmp_path, ASKED[name], limits, mounts=TURNED)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
-    centre, tight = designs_of(problem, low, high, 100, 5)[0][0], 0.0
+    centre, tight = next(designs_of(problem, low, high, 100, 5))[0], 0.0
     for share in (1.0, 0.02):
         below = np.clip(centre - 0.5 * share * (high - low), low, high - share * (high - low))
         above = below + share * (high - low)
@@ -363,7 +364,7 @@ def test_no_design_of_mounts_and_unbalances_is_under_the_bound(norm: str, tmp_pa
 @pytest.mark.parametrize("name", ["rms", pytest.param("means", marks=pytest.mark.slow)])
 def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Multipliers at random, and none at all."""
-    problem = asked_for(tmp_path, ASKED.get(name, MEANS), LIMITS, mounts=TURNED)
+    problem = asked_for(tmp_path, ASKED.get(name, MEANS), LIMITS, mounts=DAMPED if name == "means" else TURNED)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     high = low + 0.2 * (high - low)
     best, least = min(designs_of(problem, low, high, 200, 1), key=lambda pair: pair[1])

@@ -287,9 +287,9 @@ def test_distances_by_hand(tmp_path: Path) -> None:
 
 
 def test_distances_that_no_place_keeps(tmp_path: Path) -> None:
-    """Nothing in the box of places is far enough: the limit is named, with places open or given."""
-    text = _enveloped('name = "room"\nlimit = "shaft distance"\nmin = "300 mm"', 1)
-    for own in (text, text.replace(AROUND["y"], '"0 mm"').replace(AROUND["z"], '"90 mm"')):
+    """Nothing in the row of places is far enough: the limit is named, with places open or given."""
+    text = _enveloped('name = "room"\nlimit = "shaft distance"\nmin = "300 mm"', 1).replace(AROUND["y"], '"0 mm"')
+    for own in (text, text.replace(AROUND["z"], '"90 mm"')):
         result = laufruhe.solve(_problem(tmp_path, own))
         assert str(result.status) == "infeasible"
         assert result.conflict == ("room",)
