@@ -13,7 +13,7 @@ from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.numerics.turns import as_turn, cis, star_orders
 from laufruhe.physics.mechanism import Direction, Effect
-from laufruhe.physics.wrench import ROLL, plane_wrench
+from laufruhe.physics.wrench import ROLL, plane_parts
 
 
 def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]) -> Spectrum:
@@ -32,17 +32,14 @@ def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], It
 
 def _load_of_alike(engine: Engine, speed: float, members: Sequence[tuple[int, Effect]]) -> NDArray[np.complex128]:
     """Of effects alike of cylinders by their numbers, by the orders of the cycle."""
-    first = engine.slider_cranks[members[0][0]]
     series = members[0][1].series()
-    weights = np.empty((len(members), 6))
-    for row, (k, own) in zip(weights, members, strict=True):
-        part = engine.slider_cranks[k]
-        row[:] = _weight(part, own.direction)
-        row *= own.size * square_of(part, speed)
-    turns = tuple([engine.slider_cranks[k].star_turn for k, _ in members])
+    parts = [engine.slider_cranks[k] for k, _ in members]
+    sizes = np.array([own.size * square_of(part, speed) for part, (_, own) in zip(parts, members, strict=True)])
+    weights = sizes[:, None] * np.array([_weight(part, members[0][1].direction) for part in parts])
+    turns = tuple([part.star_turn for part in parts])
     load = star_orders(weights, turns, len(series))
     load *= series[:, None]
-    ratio = first.shaft.ratio
+    ratio = parts[0].shaft.ratio
     # a crank that runs backwards turns its phasors backwards: Re c e^{-ix} = Re conj(c) e^{ix}
     return spread(load if ratio > 0.0 else load.conj(), order_index(engine.cycle, abs(ratio)))
 
@@ -67,9 +64,17 @@ def square_of(part: SliderCrank, speed: float) -> float:
     return (part.shaft.ratio * speed) ** 2
 
 
-def _weight(part: SliderCrank, direction: Direction) -> NDArray[np.float64]:
+def _weight(part: SliderCrank, direction: Direction) -> tuple[float, ...]:
     """Wrench of a unit load of a cylinder: a force along its axis or across it, or a roll moment."""
     if direction is Direction.ROLL:
-        return ROLL
-    axis = cis(as_turn(part.bank)) * (1j if direction is Direction.TRANSVERSE else 1.0)
-    return plane_wrench(axis.imag, axis.real, part.x, part.shaft).real
+        return _ROLL
+    axis = _axis(part.bank) * (1j if direction is Direction.TRANSVERSE else 1.0)
+    return plane_parts(axis.imag, axis.real, part.x, part.shaft)
+
+
+_ROLL = tuple(ROLL.tolist())
+
+
+@lru_cache(maxsize=256)
+def _axis(bank: float) -> complex:
+    return cis(as_turn(bank))
