@@ -122,7 +122,7 @@ class SmoothProgram:
     def _built(self) -> NonlinearProgram:
         least = ca.MX(0.0)
         for term in self.problem.objective:
-            least += term.weight * self._least(term.measure)
+            least += term.weight * self._least(term.measure, self.unit / (term.weight or 1.0))
         for limit in self.problem.limits:
             self._limit(limit)
         self._hold_unbalances()
@@ -206,8 +206,8 @@ class SmoothProgram:
             return sampled_rows(self._points, names, measure)
         return self._loads.rows(measure)
 
-    def _least(self, measure: Measure) -> Any:
-        """A measure to be minimised, softened by a share of the objective (N3); a number where nothing moves it."""
+    def _least(self, measure: Measure, unit: float) -> Any:
+        """A measure to be minimised, softened by a share of its unit (N3); a number where nothing moves it."""
         if self.moves is None and not measure.channel.is_moved_by({d.kind for d in self.problem.decisions}):
             return evaluate(off_resonance(self.problem)).value(measure)
         if measure.is_mounting:
@@ -215,7 +215,7 @@ class SmoothProgram:
         if measure.channel.is_checked:
             return self._runs.least(measure)
         rows, grid = self._rows(measure)
-        return measure.norm.least(self._held.named(measure.name), grid, rows, self.unit, self._e)
+        return measure.norm.least(self._held.named(measure.name), grid, rows, unit, self._e)
 
     def _limit(self, limit: Limit) -> None:
         measure = limit.measure
