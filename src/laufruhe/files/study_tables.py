@@ -49,6 +49,11 @@ class SweepTable(Table):
     points: int | None = f.told("Number of values from the first to the last.")
     spacing: Literal["linear", "log"] | None = None
 
+    @property
+    def count(self) -> int:
+        """Values that it takes."""
+        return (self.points or 0) if self.values is None else len(self.values)
+
 
 class DrawnTable(Table):
     """One quantity of the problem that is drawn at random, evenly between two ends."""

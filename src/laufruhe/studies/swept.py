@@ -213,7 +213,7 @@ class SweptPart(Part):
 
     def size(self) -> int:
         """Every case at every combination."""
-        return len(self.cases) * math.prod(len(axis.values) for axis in self.axes())
+        return len(self.cases) * math.prod(sweep.count for sweep in self.sweep)
 
     def axes(self) -> list[Axis]:
         """What is swept."""
