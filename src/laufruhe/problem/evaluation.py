@@ -26,6 +26,8 @@ from laufruhe.problem.problem import Problem
 
 BETWEEN = NORMS["maximum"].refinement
 """Times as many samples as are asked for, among which maxima of mounts are sought (M6)."""
+FINE = 5760
+"""Angles at which limits are read that nothing open acts on."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +130,11 @@ class Standing:
     edge: float
     side: str
     excess: float
+
+
+def finely(evaluation: Evaluation) -> Evaluation:
+    """At so many angles that a mean is what it is: at few it may be more (P7)."""
+    return replace(evaluation, samples=evaluation.samples * max(2, math.ceil(FINE / evaluation.samples)))
 
 
 def over(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:

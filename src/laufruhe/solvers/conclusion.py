@@ -14,7 +14,7 @@ import numpy as np
 from laufruhe.fidelity.error_bounds import missed, relative
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision
-from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.evaluation import Evaluation, evaluate, finely, objective_value
 from laufruhe.problem.measure import Limit, Side
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.nothing import nothing_of
@@ -278,8 +278,11 @@ def _limit_value(
 def with_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
     """A result with limits beside its own that nothing open acts on, in the order given."""
     problem, known = result.problem, dict(zip(result.problem.limits, result.limits, strict=False))
+    still, finer = result.final, finely(result.final)
     shown = tuple(
-        known.get(limit) or _limit_value(limit, result.final, None, 0.0, problem.tolerance) for limit in limits
+        known.get(limit)
+        or _limit_value(limit, finer if still.excess([limit]) > KEPT else still, None, 0.0, problem.tolerance)
+        for limit in limits
     )
     resonant = not known and result.final.resonance
     return replace(result, problem=problem.changed(limits=limits), limits=() if resonant else shown)

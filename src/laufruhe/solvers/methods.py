@@ -25,7 +25,7 @@ from laufruhe.solvers.boxes.places import solve_places
 from laufruhe.solvers.boxes.shared_leads import solve_shared_leads
 from laufruhe.solvers.boxes.sizes import solve_sizes
 from laufruhe.solvers.boxes.torsion import solve_torsion
-from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, state, with_limits
+from laufruhe.solvers.conclusion import KEPT, Shown, concluded, judged, none_within, state, with_limits
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_sharply
 from laufruhe.solvers.in_order import solve_in_order
@@ -34,7 +34,7 @@ from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.runs import solve_runs
 from laufruhe.solvers.stars.phasing import solve_phasing
-from laufruhe.solvers.stars.rooms import with_room
+from laufruhe.solvers.stars.rooms import surely_broken, with_room
 from laufruhe.solvers.stars.sizes import solve_star_sizes
 from laufruhe.solvers.tolerances.assembly import solve_assembly
 from laufruhe.solvers.tolerances.robust import solve_robust
@@ -292,7 +292,7 @@ def _decided(problem: Problem) -> Result:
         # what cannot be evaluated is refused first
         objective_value(problem, given)
         problem, least = with_room(problem, fixed, given)
-        broken = broken_limits(fixed, least)
+        broken = surely_broken(fixed, least)
         if broken:
             return none_within(problem, given, broken, {})
         moved = tuple(limit for limit in problem.limits if limit not in fixed)

@@ -13,7 +13,7 @@ from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.problem.channels import OF_MOUNTS
-from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.evaluation import FINE, evaluate, finely
 from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.nothing import ROUNDING, nothing_of
@@ -31,8 +31,6 @@ MOST_DOUBLINGS = 4
 MOST_MARGINS = 3
 MANY_ROWS = 2000
 MOST_ROWS = 60_000
-# angles at which a limit is read that nothing open acts on
-FINE = 5760
 NEGLIGIBLE = 1e-6
 
 
@@ -42,7 +40,7 @@ def beyond_mounts(problem: Problem) -> tuple[str, ...]:
     if not limits:
         return ()
     apart = off_resonance(replace(problem.balance, objective=(Term(limits[0].measure),), limits=limits))
-    return solve_unbalances(apart).conflict if apart.decisions else broken_limits(limits, evaluate(apart))
+    return solve_unbalances(apart).conflict if apart.decisions else broken_limits(limits, finely(evaluate(apart)))
 
 
 def solve_sharply(problem: Problem) -> Result:

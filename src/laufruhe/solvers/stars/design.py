@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from laufruhe.problem.evaluation import finely
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import KEPT, state
 from laufruhe.solvers.cones.unbalances import solve_unbalances
-from laufruhe.solvers.result import Result
+from laufruhe.solvers.result import Result, Status
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,14 @@ class StarDesign:
     def is_met(self) -> bool:
         """Whether it is a design within its limits."""
         return self.result.status.has_design and self.result.final.excess(self.result.problem.limits) <= KEPT
+
+    @property
+    def is_excluded(self) -> bool:
+        """Whether no design of this star keeps the limits: a mean at a few angles alone may be more than it is (P7)."""
+        result = self.result
+        if not result.status.has_design:
+            return result.status is Status.INFEASIBLE
+        return finely(result.final).excess(result.problem.limits) > KEPT
 
     @property
     def value(self) -> float:

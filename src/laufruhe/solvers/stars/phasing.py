@@ -160,7 +160,7 @@ def by_each_order(
     every, least, complete = _solved(problem, phasing, designs, decide)
     solved = [design for design in every if design.is_met]
     if not solved:
-        proven = complete and all(design.result.status is not Status.FAILED for design in every)
+        proven = complete and all(design.is_excluded for design in every)
         why = f"no firing order and no set of shafts that may be built {'keeps' if proven else 'was found that keeps'}"
         status, names = Status.INFEASIBLE if proven else Status.FAILED, [limit.name for limit in problem.limits]
         return no_star(problem, f"{why} the limits", status, tuple(names) if proven else ())

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
-from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.evaluation import Evaluation, finely
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import broken_limits
@@ -45,3 +45,9 @@ def with_room(problem: Problem, limits: Sequence[Limit], given: Evaluation) -> t
                 clashes.append(sets)
     shafts = replace(phasing.shafts, clashes=tuple(clashes))
     return replace(problem, phasing=replace(phasing, shafts=shafts)), built(())
+
+
+def surely_broken(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[str, ...]:
+    """Of limits that nothing open moves those that are broken at many angles too."""
+    known = broken_limits(limits, evaluation)
+    return known and broken_limits([limit for limit in limits if limit.name in known], finely(evaluation))
