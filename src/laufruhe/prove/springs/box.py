@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from laufruhe.numerics.arrays import Array, Mask
-from laufruhe.numerics.budget import passed, rounds
+from laufruhe.numerics.budget import rounds
 from laufruhe.prove.springs.bound import Cap, Program, Proposed, Root, follows, pulls
 from laufruhe.prove.springs.columns import Columns
 from laufruhe.prove.springs.conditions import Held, conditions, of_stiffness
@@ -29,8 +29,8 @@ from laufruhe.prove.springs.program import proposed
 NEAR, ROUGH = 0.9995, 0.97
 # rounds that the roots of a mean narrow each other in, and share of it under which one is left as it is
 ROUNDS, SMALL = 2, 0.03
-# share of a mean that is worth narrowing what hides it, and by which a root has to rise where nothing does
-LARGE, RISEN = 0.03, 1e-3
+# share of a mean that is worth narrowing what hides it
+LARGE = 0.03
 # of what a box lacks, what is told too high of odd multiples and is worth halving it for
 WORTH = 0.25
 
@@ -78,7 +78,15 @@ class Searched(Protocol):
 
 
 class SpringBox:
-    """One box, for designs of which a norm is not over a number; no more is proven than is enough."""
+    """One box, for designs of which a norm is not over a number; no more is proven than is enough.
+
+    Attributes
+    ----------
+    roots
+        What those of the heads that were bounded last are at least.
+    """
+
+    roots: Array
 
     def __init__(self, search: Searched, each: Asked, ends: tuple[float, float], lower: Array, upper: Array) -> None:
         self.search, self.each, self.lower, self.upper = search, each, lower, upper
@@ -101,17 +109,20 @@ class SpringBox:
         they are at least and at most, and these are bounded together (E54).
         """
         pull, most = np.zeros(len(self.lower)), self.most
+        self.roots = known
         if not heads:
             return 0.0, pull, None
         if len(heads) == 1 and not heads[0].beside:
             bound, pull, middle = self._together(heads, np.ones(1))
             found = heads[0].unit * math.sqrt(max(bound, 0.0)) - heads[0].loss
             return min(max(found, 0.0), most), pull, middle
-        roots = self._alone(heads, known)
-        shown = self._shown(heads, roots)
+        self.roots = self._alone(heads, known)
+        shown = self._shown(heads, self.roots)
         if shown[0] < self.enough and self._is_whole:
-            known[:] = self._together_again(heads, roots)
-            shown = max(shown, self._shown(heads, known), key=lambda each: each[0])
+            if self.is_hidden(heads):
+                self.roots = self._together_again(heads, self.roots)
+                shown = max(shown, self._shown(heads, self.roots), key=lambda each: each[0])
+            known[:] = self.roots
         return shown
 
     @property
@@ -151,28 +162,10 @@ class SpringBox:
     def _together_again(self, heads: Sequence[Head], known: Array) -> Array:
         """What every root is at least with the others in what is left of the norm (E58).
 
-        Where no odd multiples hide the norm, a root that does not rise so tells that the others leave room for all.
+        And what designs that are no worse than the best known have at most of odd multiples. All of a round follow
+        from the same conditions, so that they may be worked out side by side.
         """
-        least, units = known.copy(), np.array([head.unit for head in heads])
-        if self.is_hidden(heads):
-            return self._side_by_side(heads, least)
-        for _ in range(ROUNDS if len(heads) > 1 else 0):
-            for k in range(len(heads)):
-                mean, before = self._mean(heads, least), least[k]
-                if mean.floor >= self.most:
-                    return least
-                if _matter(mean.prices)[k] and not passed():
-                    least[k] = max(before, units[k] * self._together(heads, mean.prices, mean, k)[0])
-                    if least[k] <= (1.0 + RISEN) * before:
-                        return least
-        return least
-
-    def _side_by_side(self, heads: Sequence[Head], least: Array) -> Array:
-        """The same, and what designs that are no worse than the best known have at most of odd multiples.
-
-        All of a round follow from the same conditions, so that they may be worked out side by side.
-        """
-        units, shapes = np.array([head.unit for head in heads]), np.zeros(5 * len(self.modes))
+        least, units, shapes = known.copy(), np.array([head.unit for head in heads]), np.zeros(5 * len(self.modes))
         for _ in rounds(ROUNDS):
             mean = self._mean(heads, least)
             if mean.floor >= self.most:

@@ -100,6 +100,7 @@ class SpringBoxes:
         self._heads = [heads_of(each, self._parts) for _, each in self._terms]
         self._least = [np.zeros(len(heads)) for heads in self._heads]
         self.felt_at_most: dict[int, float] = {}
+        self._looked = self.lower, self.upper, self._least[0]
 
     def parts(self, lower: Array, upper: Array) -> tuple[OpenMounts, ...]:
         """The mounts of a box for all motions, and where they mirror each other for both halves of them (E57)."""
@@ -190,6 +191,8 @@ class SpringBoxes:
             whole = not self.places and k == 0
             box = SpringBox(self, each, self._ends(weight), lower, upper)
             least, own, middle = box.least(self._heads[k], self._least[k])
+            if k == 0:
+                self._looked = lower, upper, box.roots
             total += weight * least
             pull += own
             if whole and middle is not None:
@@ -201,7 +204,10 @@ class SpringBoxes:
         """Conditions of designs of a box of which the first term leaves that they are better than the best known."""
         weight, each = self._terms[0]
         box = SpringBox(self, each, self._ends(weight), lower, upper)
-        return box.under_all(self._heads[0], self._least[0]), box.mounts
+        # what is so of a box that was looked at is so of all in it
+        low, high, roots = self._looked
+        inside = bool(np.all(lower >= low) and np.all(upper <= high))
+        return box.under_all(self._heads[0], roots if inside else self._least[0]), box.mounts
 
     def under(self, value: float) -> SpringBoxes:
         """The same for designs that are better than a value, orders left out that this hardly needs."""
@@ -209,6 +215,7 @@ class SpringBoxes:
         found.value = found.enough = value
         found._heads = [[replace(head, orders=self._needed(head, value)) for head in heads] for heads in self._heads]
         found._least = [least.copy() for least in self._least]
+        found._looked = self.lower, self.upper, found._least[0]
         found.felt_at_most = dict(self.felt_at_most)
         return found
 
