@@ -14,7 +14,7 @@ from contextlib import ExitStack, contextmanager
 from typing import Generic, TypeVar
 
 from laufruhe.numerics.budget import left
-from laufruhe.numerics.workers import WORTH_PROCESSES, count_of, executor_for, given, worked
+from laufruhe.numerics.workers import WORTH_PROCESSES, count_of, executor_for, given, imported, worked
 
 T = TypeVar("T")
 A = TypeVar("A")
@@ -51,7 +51,7 @@ class Foresight(Generic[T, A]):
             self._executor = self._held.enter_context(executor_for())
             self._held.callback(self._end)
             if given() is None:
-                self._starting = [self._executor.submit(_started, self._work) for _ in range(count_of(self._executor))]
+                self._starting = [self._executor.submit(imported, self._work) for _ in range(count_of(self._executor))]
         return count_of(self._executor) - sum(not future.done() for future in self._starting)
 
     def wanted(self, key: Hashable, step: T) -> A:
@@ -78,10 +78,6 @@ class Foresight(Generic[T, A]):
         if self._executor is not None and given() is None:
             # nobody waits for what is at work
             self._executor.shutdown(cancel_futures=True)
-
-
-def _started(work: Callable[..., object]) -> None:
-    """Nothing more than to have imported what works."""
 
 
 @contextmanager

@@ -87,6 +87,35 @@ def executor_for(most: int | None = None) -> Iterator[Executor]:
         yield own
 
 
+def imported(*_: Callable[..., object]) -> None:
+    """Nothing: to be asked, a process has imported what works are of."""
+
+
+@contextmanager
+def at_hand(*works: Callable[..., object]) -> Iterator[None]:
+    """For searches that follow one another: processes of this machine that start at once and end with the last search.
+
+    Where an executor was given, or there is one processor, nothing is started.
+
+    Parameters
+    ----------
+    works
+        What they will be asked for.
+    """
+    if _given.get() is not None or processors() == 1:
+        yield
+        return
+    with Processes() as own:
+        try:
+            for _ in range(own.count):
+                own.submit(imported, *works)
+            with working_on(own):
+                yield
+        finally:
+            # nobody waits for what is at work
+            own.shutdown(cancel_futures=True)
+
+
 def count_of(executor: Executor | None = None) -> int:
     """How many pieces an executor does side by side; of the one given, or the processes that would be, when None."""
     executor = _given.get() if executor is None else executor

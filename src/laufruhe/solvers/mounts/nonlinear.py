@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
+from laufruhe.numerics.workers import at_hand
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Limit, Measure, Term
@@ -32,10 +34,13 @@ from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mount
 from laufruhe.solvers.mounts.search import Found, MountSearch, Place, judged_at
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.smooth.ipopt import run
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct
 from laufruhe.solvers.smooth.program import SmoothProgram
 
 WORTH_SAYING = 1.01
+# processor seconds of points to start from, where the search and its bounds take several times as long
+WORTH_WORKERS = 0.4
 
 
 def solve_mounts(
@@ -95,12 +100,14 @@ def _solved(
     among: bool,
 ) -> tuple[Result, Array]:
     """Result, and deviations of the throws."""
-    started = time.perf_counter()
+    started, began = time.perf_counter(), time.process_time()
     initial = evaluate_start(problem)
     search = MountSearch(problem, initial, workers, moves, first, beside=moves is None)
     modelled = time.perf_counter()
-    search.run()
-    divided = divided_by(problem, search, among)
+    worth = time.process_time() - began > WORTH_WORKERS and workers != 1 and not among
+    with at_hand(run, spring_bound) if worth else nullcontext():
+        search.run()
+        divided = divided_by(problem, search, among)
     timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
     found = search.chosen
     if found is None or found.design.excess > KEPT:

@@ -24,7 +24,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
@@ -34,12 +34,15 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
-from laufruhe.numerics.workers import WORTH_PROCESSES, count_of, each, executor_for
+from laufruhe.numerics.foresight import foresight
+from laufruhe.numerics.processes import Processes
+from laufruhe.numerics.workers import WORTH_PROCESSES, count_of, each, executor_for, given
 from laufruhe.solvers.smooth.ipopt import Outside, Task, Teller, run
 from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 
 Enough: TypeAlias = Callable[[Sequence[LocalOptimum]], bool]
-Several: TypeAlias = Callable[[tuple[Task, Sequence[tuple[int, Array]]]], list[LocalOptimum]]
+Share: TypeAlias = tuple[Task, Sequence[tuple[int, Array]]]
+Several: TypeAlias = Callable[[Share], list[LocalOptimum]]
 
 WORTH_EXPANDING = 3
 # starts of one round
@@ -176,13 +179,18 @@ def _first_ends(
     task: Task, points: Sequence[tuple[int, Array]], workers: int | None, enough: Enough | None, stack: ExitStack
 ) -> tuple[list[LocalOptimum], Several]:
     """Where starts end, and who looked for that."""
+    rest = points[1:]
+    count = min(len(rest), workers if workers is not None else count_of())
+    # threads would share a linear solver that knows of one alone
+    at_hand = _AtHand(stack, count) if count > 1 and isinstance(given(), Processes) else None
+    if at_hand is not None:
+        at_hand.begin((task, rest[:ROUND] if enough is not None else rest))
     # one start tells whether the others are worth processes of their own
     began = time.process_time()
-    found, rest = run((task, points[:1])), points[1:]
-    count = min(len(rest), workers if workers is not None else count_of())
+    found = run((task, points[:1]))
     spent = sum(o.seconds for o in found)
     pays = spent * len(rest) > WORTH_PROCESSES + (time.process_time() - began - spent)
-    several: Several = _Shared(stack, count) if count > 1 and pays else run
+    several: Several = at_hand or (_Shared(stack, count) if count > 1 and pays else run)
     while rest and not passed() and not (enough is not None and enough(_grouped(found, task))):
         some, rest = (rest[:ROUND], rest[ROUND:]) if enough is not None else (rest, [])
         found += several((task, some))
@@ -200,12 +208,37 @@ class _Shared:
     def __init__(self, stack: ExitStack, count: int) -> None:
         self._count, self._executor = count, stack.enter_context(executor_for(count))
 
-    def __call__(self, share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
+    def __call__(self, share: Share) -> list[LocalOptimum]:
         """As `run`."""
         task, points = share
         shares = [(task, points[k :: self._count]) for k in range(min(self._count, len(points)))]
         with closing(each(run, shares, self._executor, patient=True)) as answers:
             return sorted((optimum for _, some in answers for optimum in some), key=lambda o: o.start)
+
+
+class _AtHand:
+    """Workers that are there before they are asked, and so may begin before it is known that they will be."""
+
+    def __init__(self, stack: ExitStack, count: int) -> None:
+        self._count, self._ahead = count, stack.enter_context(foresight(run))
+
+    def begin(self, share: Share) -> None:
+        """What is likely to be asked."""
+        self._ahead.likely(self._shares(share))
+
+    def __call__(self, share: Share) -> list[LocalOptimum]:
+        """As `run`; one start goes on here, where the program is set up."""
+        if len(share[1]) == 1:
+            return run(share)
+        self.begin(share)
+        found = [optimum for key, own in self._shares(share) for optimum in self._ahead.wanted(key, own)]
+        return sorted(found, key=lambda o: o.start)
+
+    def _shares(self, share: Share) -> list[tuple[Hashable, Share]]:
+        """With what they are known by."""
+        task, points = share
+        shares = [points[k :: self._count] for k in range(min(self._count, len(points)))]
+        return [((task.stages, tuple(number for number, _ in own)), (task, own)) for own in shares]
 
 
 def _grouped(found: Sequence[LocalOptimum], task: Task) -> list[LocalOptimum]:
