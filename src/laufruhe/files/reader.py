@@ -28,13 +28,12 @@ from laufruhe.files.flywheel import check_told_alike, flywheel_of
 from laufruhe.files.friction import Brake
 from laufruhe.files.gas import gas_of, needs_bore
 from laufruhe.files.geared import geared_of
-from laufruhe.files.leads import leads_of
 from laufruhe.files.load_cases import load_cases_of
 from laufruhe.files.mounts import mounts_of
 from laufruhe.files.nested import inside
+from laufruhe.files.open_parts import check_factors, leads_of, piston_masses
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
-from laufruhe.files.piston_masses import check_factors, piston_masses
 from laufruhe.files.problem_file import ProblemFile
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.run_up import run_of

@@ -1,9 +1,10 @@
-"""Masses of pistons and levers that are open: the decisions about them."""
+"""Masses of pistons and levers, and leads of geared shafts, that are open: the decisions about them."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+from laufruhe import units
 from laufruhe.files.complaints import Refused
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fields import Open
@@ -11,6 +12,7 @@ from laufruhe.files.rotors import CounterweightTable
 from laufruhe.machine import CRANKSHAFT, SliderCrank
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
 
+OPPOSED = "second crankshaft"
 SECOND, RECIPROCATING = "second_reciprocating_mass", "reciprocating_mass"
 
 
@@ -47,3 +49,18 @@ def check_factors(weights: Sequence[CounterweightTable], rule: str) -> None:
         if weight.factor_key is not None:
             remedy = "give the counterweights a mass, or fix the other"
             raise Refused(f"counterweights[{k}].{weight.factor_key}", None, rule, remedy)
+
+
+def leads_of(table: EngineTable) -> list[Decision]:
+    """A decision for every shaft whose lead is open; the layout sees where one starts, so its bounds are looked at."""
+    lead, ports = table.own("crank_lead"), table.own("port_arc")
+    if isinstance(lead, Open) and ports is not None and max(map(abs, lead.bounds)) >= ports:
+        rule = f"goes beyond the ports, which are open for {units.shown(ports, 'rad')}"
+        raise Refused("engine.crank_lead", None, rule, "narrow its bounds")
+    leads = [(f"{shaft.name}.lead", shaft.name, shaft.lead) for shaft in table.shafts]
+    leads += [("crank lead", OPPOSED, lead)]
+    return [
+        decision
+        for name, shaft, own in leads
+        for decision in Open.of(own).decisions(name, "rad", NumberDrive(Kind.LEAD, shaft))
+    ]
