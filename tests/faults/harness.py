@@ -26,6 +26,7 @@ from typer.testing import CliRunner
 
 from cli import scenes
 from faults import damage
+from laufruhe.cli import app, check, fidelity, solve, study  # noqa: F401
 
 PROBLEMS = Path(__file__).parents[2] / "problems"
 LONGEST = 10.0
@@ -65,7 +66,7 @@ def sources() -> dict[str, list[str]]:
     found: dict[str, list[str]] = {"problem": [scenes.PARTS, scenes.IMPOSSIBLE], "study": []}
     for path in sorted(PROBLEMS.glob("*.toml")):
         text = path.read_text(encoding="utf-8")
-        found["study" if "study" in tomllib.loads(text) else "problem"].append(text)
+        found["study" if re.search(r"^\[study", text, re.MULTILINE) else "problem"].append(text)
     return found
 
 
@@ -113,8 +114,6 @@ def tried(seed: int, verb: str, folder: Path) -> Found:
     try:
         with _alarm(), warnings.catch_warnings():
             warnings.simplefilter("always")
-            from laufruhe.cli import app
-
             answer = CliRunner().invoke(app, words)
         status = answer.exit_code
         if answer.exception is not None and not isinstance(answer.exception, SystemExit):
@@ -189,8 +188,10 @@ def _serve(seeds: Sequence[int], verb: str, folder: Path, log: Path) -> None:
 
 def run(seeds: Sequence[int], verb: str, folder: Path, jobs: int) -> list[Found]:
     """All seeds through one command; a process that dies or hears no alarm is a finding of the seed it was at."""
-    # forked: a worker starts with everything imported
+    # forked: a worker starts with all that is imported, built and read
     fork = multiprocessing.get_context("fork")
+    sources()
+    CliRunner().invoke(app, ["check", str(PROBLEMS / "tractor-single.toml")])
     share = max(20, min(500, len(seeds) // jobs))
     waiting = [list(seeds[k : k + share]) for k in range(0, len(seeds), share)]
     running: list[tuple[multiprocessing.process.BaseProcess, Path, list[int]]] = []

@@ -27,6 +27,7 @@ from laufruhe.studies.replication.expressions import (
     check_among,
     checks_in,
     filled,
+    filling,
     grid,
     numbers_of,
 )
@@ -113,13 +114,16 @@ class Replication(Part):
 
     def _points(self, case: ReplicaCase, reading: Mapping[str, Any], scenes: Scenes) -> Iterator[Point]:
         grids = {name: grid(name, table).values.tolist() for name, table in case.sweep.items()}
+        with self._blamed(case.name):
+            tables = self._tables(case.problem, scenes)
+        fill = filling(tables)
         for values in itertools.product(*grids.values()):
             swept = dict(zip(grids, values, strict=True))
             with self._blamed(case.name):
                 names = numbers_of({**self.numbers, **reading, **case.numbers, **swept}, {})
-                tables = filled(self._tables(case.problem, scenes), names)
+                own = tables if fill is None else fill(names)
                 changed = case.model_copy(update={"set": filled(case.set, names), "numbers": swept})
-            yield Point(changed, base=tables)
+            yield Point(changed, base=own)
 
     def _tables(self, name: Any, scenes: Scenes, *seen: Any) -> dict[str, Any]:
         """Tables of a problem under `problems`, upon those of what it is like; else of a file."""

@@ -193,12 +193,26 @@ _CALLED |= {f"{name}()": _of_numbers(function) for name, function in _ARITHMETIC
 
 def filled(text: Any, names: Mapping[str, Any]) -> Any:
     """Text with its `{expressions}` replaced, lists and tables inside and out; one that is all of it keeps its type."""
+    fill = filling(text)
+    return text if fill is None else fill(names)
+
+
+def filling(text: Any) -> Callable[[Mapping[str, Any]], Any] | None:
+    """What fills a text, a list or a table with names, for many of these; None where there is nothing to fill.
+
+    What holds no expression is shared by all that is filled.
+    """
     if isinstance(text, dict):
-        return {key: filled(value, names) for key, value in text.items()}
+        inside = {key: fill for key, value in text.items() if (fill := filling(value)) is not None}
+        return (lambda names: {**text, **{key: fill(names) for key, fill in inside.items()}}) if inside else None
     if isinstance(text, list):
-        return [filled(value, names) for value in text]
-    if not isinstance(text, str) or "{" not in text:
-        return text
+        fills = [filling(value) for value in text]
+        pairs = list(zip(text, fills, strict=True))
+        return (lambda names: [own if fill is None else fill(names) for own, fill in pairs]) if any(fills) else None
+    return partial(_filled, text) if isinstance(text, str) and "{" in text else None
+
+
+def _filled(text: str, names: Mapping[str, Any]) -> Any:
     parts = list(_parts(text))
     if len(parts) == 1 and not parts[0][0] and not parts[0][2]:
         return value_of(parts[0][1], names)
