@@ -76,6 +76,18 @@ def test_time_that_ran_out_is_no_proof() -> None:
     assert laufruhe.solve(single(QUIET)).status is Status.OPTIMAL
 
 
+def test_a_mean_that_is_all_but_least_is_sought_at_more_angles() -> None:
+    """The force is no less than 1071.66270 N, which 768 angles of two turns do not tell."""
+    left, right = SINGLE["balancer_shafts"]
+    turned = {**left, "unbalances": [{**left["unbalances"][0], "angle": 180.7}]}
+    told = {
+        **SINGLE, "engine": {**SINGLE["engine"], "cycle": "four-stroke", "throws": [0.7]},
+        "balancer_shafts": [turned, right], "objective": {"minimise": "rms shaking force"},
+        "constraints": [{"limit": "mean shaking force", "max": "1071.6648434 N"}],
+    }  # fmt: skip
+    assert solve(load_tables(told, Path("single.toml"))).status.has_design
+
+
 def test_a_run_up_is_designed_for_where_few_angles_forbid_a_mean() -> None:
     """Steps of a run are gathered at 48 angles, at which no design keeps this force; over the cycle 7.073 N is kept."""
     left, right = SINGLE["balancer_shafts"]
@@ -137,3 +149,13 @@ def test_a_star_is_excluded_by_what_the_cycle_has(most: str, excluded: bool) -> 
     design = StarDesign(Candidate((0.0,)), state(load_tables(told, Path("single.toml"))))
     assert not design.is_met
     assert design.is_excluded is excluded
+
+
+def test_a_design_is_not_broken_by_what_few_angles_read_of_a_limit_that_it_cannot_move() -> None:
+    """Shafts at the speed of the crank beside a limit on the second order, which 96 angles have too much of."""
+    limits = [{"limit": "mean shaking force", "orders": [2], "max": "964.64 N"}]
+    told = {**SINGLE, "engine": {**SINGLE["engine"], "throws": [2]}, "constraints": limits}
+    told["objective"] = {"minimise": "rms shaking force"}
+    result = solve(load_tables(told, Path("single.toml")))
+    assert result.status is Status.OPTIMAL
+    assert result.limits[0].value == pytest.approx(964.6277, rel=1e-6)

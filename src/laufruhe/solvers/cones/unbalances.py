@@ -80,7 +80,9 @@ def solve_unbalances(problem: Problem, sharply: bool = False) -> Result:
     values = [domain.complex_value(optimum.x) for domain in model.domains]
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
     design = judged(problem, values, cycle_samples)
-    initial = replace(initial, samples=cycle_samples)
+    if idle and design.excess > KEPT:
+        design = judged(problem, values, finely(design.evaluation).samples)
+    initial = replace(initial, samples=design.evaluation.samples)
     timing["evaluate"] = time.perf_counter() - solved
     return concluded(design, initial, _shown(model.problem.load_limits, idle, optimum, design.value), timing)
 
@@ -93,7 +95,9 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optim
     The optimum, None where the limits cannot be met, and the angles that told.
     """
     samples, best = _first_samples(model), None
-    for _ in in_time(range(MOST_DOUBLINGS + 1)):
+    # a mean that is all but as little as can be is kept at no few angles
+    most = max(MOST_DOUBLINGS, math.ceil(math.log2(2 * FINE / samples)))
+    for k in in_time(range(most + 1)):
         found = _allowed(problem, model, samples, nothing)
         if found is None:
             if best is not None and best.excess <= KEPT:
@@ -106,7 +110,8 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optim
         best = found
         rows = max(len(norm.grid.weights) for _, norm in best.problem.terms)
         enough = best.gap <= problem.tolerance or not problem.search.proves
-        if (enough and best.excess <= FEASIBLE) or rows > MOST_ROWS:
+        kept = best.excess <= (FEASIBLE if k < MOST_DOUBLINGS else KEPT)
+        if rows > MOST_ROWS or (kept and (enough or k >= MOST_DOUBLINGS)):
             break
         samples *= 2
     return best, samples
