@@ -35,7 +35,7 @@ orders = [1, 2]
 
 def solved(folder: Path, most: float) -> laufruhe.solvers.result.Result:
     path = folder / "five.toml"
-    path.write_text(f'{FIVE}max = "{most} N"\n', encoding="utf-8")
+    path.write_text(f'{FIVE}max = "{most} N"\n[search]\nboxes = 2\n', encoding="utf-8")
     return laufruhe.solve(laufruhe.load(path))
 
 

@@ -209,7 +209,7 @@ def test_a_limit_on_the_worst_mean_is_one_on_every_point(tmp_path: Path) -> None
     text = (PROBLEMS / "car-four-willans.toml").read_text(encoding="utf-8")
     text = text[: text.index("[objective]")].replace("unbalance = {", 'radius = "30 mm"\nunbalance = {')
     (tmp_path / "car-four-fuel.csv").write_text((PROBLEMS / "car-four-fuel.csv").read_text("utf-8"), encoding="utf-8")
-    least = text + '[fidelity]\nsamples = 240\n[objective]\nminimise = "balancer mass"\n'
+    least = text + '[fidelity]\nsamples = 120\n[objective]\nminimise = "balancer mass"\n'
     most = 'max = "700 N"\n'
     joint = laufruhe.solve(loaded(tmp_path, least + f'[[constraints]]\nlimit = "worst mean mount force"\n{most}'))
     each = "".join(
