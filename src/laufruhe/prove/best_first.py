@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Generic, NamedTuple, Protocol, TypeAlias, TypeVar
 
@@ -99,8 +99,13 @@ class Division(Generic[P]):
         -------
         The least bound of what is left, infinite where nothing is.
         """
-        queue = self.waiting = [] if root is None else [Waiting(root[0], 0, root[1])]
-        self.seen, self.complete = 1, True
+        self.waiting = [] if root is None else [Waiting(root[0], 0, root[1])]
+        self.seen = 1
+        return self.further(most)
+
+    def further(self, most: int) -> float:
+        """The same with what waits, up to so many parts in all."""
+        queue, self.complete = self.waiting, True
         while queue:
             self.look(queue[0].part)
             if self.is_done(queue[0]):
@@ -184,7 +189,10 @@ class Halving(Division[Box]):
 
     def run(self, root: tuple[float, Box] | None, most: int) -> Divided:
         """What is proven, and where the least of the boxes that are left are."""
-        bound = self.divide(root, most)
+        return self.found(self.divide(root, most))
+
+    def found(self, bound: float) -> Divided:
+        """With the least bound of what is left."""
         least = [one.part for one in self.coming(MOST_PLACES) if one.bound < self.enough]
         places = tuple(0.5 * (box.lower + box.upper) for box in least)
         return Divided(min(bound, self.enough), self.seen, places)
@@ -224,5 +232,15 @@ class _Bounded(Halving):
 
 def divide(search: BoxBounds, lower: Array, upper: Array, value: float, room: float, most: int) -> Divided:
     """Halve boxes, the least first, until none may hold a design that is `room` better than `value`."""
+    return next(divided_on(search, lower, upper, value, room, [most]))
+
+
+def divided_on(
+    search: BoxBounds, lower: Array, upper: Array, value: float, room: float, most: Sequence[int]
+) -> Iterator[Divided]:  # fmt: skip
+    """The same up to each of these numbers of boxes, one after the other."""
     division = _Bounded(search, value, room)
-    return division.run(division.bounded([(lower, upper)])[0], most)
+    for k, count in enumerate(most):
+        yield (
+            division.found(division.further(count)) if k else division.run(division.bounded([(lower, upper)])[0], count)
+        )

@@ -7,7 +7,8 @@ the least value on what is left bounds the objective of every design allowed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import Divided, divide
+from laufruhe.prove.best_first import Divided, divided_on
 from laufruhe.prove.mounts.box_norms import Under, root_under, under
 from laufruhe.prove.mounts.box_numbers import RANGES, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, Lines
@@ -54,11 +55,18 @@ def divided_bound(problem: Problem, value: float, room: float) -> Divided:
     room
         Difference that counts as none [SI].
     """
+    return next(divided_bounds(problem, value, room, [1.0]))
+
+
+def divided_bounds(problem: Problem, value: float, room: float, shares: Sequence[float]) -> Iterator[Divided]:
+    """The same by each of these shares of what is worth it, one after the other."""
     search = StiffnessBoxes(problem, LEFT_OUT * room)
     most = search.most_boxes
     if not most or not search.is_sampled_fully:
-        return Divided(0.0, 0)
-    return divide(search, search.model.lower, search.model.upper, value, room, most)
+        yield from (Divided(0.0, 0) for _ in shares)
+        return
+    counts = [math.ceil(share * most) for share in shares]
+    yield from divided_on(search, search.model.lower, search.model.upper, value, room, counts)
 
 
 class StiffnessBoxes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,7 +32,8 @@ WON = 0.3
 
 
 def spring_bound(
-    problem: Problem, value: float, room: float, near: Sequence[Value], of_many: bool = False
+    problem: Problem, value: float, room: float, near: Sequence[Value], of_many: bool = False,
+    whole: bool = False,
 ) -> Divided:  # fmt: skip
     """Divide the bounds until no design is more than `room` better than `value`, or as often as is worth it.
 
@@ -46,6 +47,8 @@ def spring_bound(
         Decisions of a design near which most boxes will be.
     of_many
         Whether the same will be asked of other problems, so that a bound that is nearly as good comes first.
+    whole
+        Whether all that is open is looked at alone.
     """
     if not is_bounded(problem) or not 0.0 < value < math.inf:
         return Divided(0.0, 0)
@@ -54,7 +57,8 @@ def spring_bound(
             boxes = SpringBoxes(problem, value, room, near, ahead)
             if not boxes.most_boxes or not boxes.is_sampled_fully:
                 return Divided(0.0, 0)
-            return _by_levels(boxes, room, _ladder(boxes, of_many))
+            ladder = _ladder(boxes, of_many)
+            return _by_levels(boxes, room, replace(ladder, most=1) if whole else ladder)
     except np.linalg.LinAlgError:
         # a middle on a resonance that nothing damps
         return Divided(0.0, 0)
@@ -103,7 +107,7 @@ def _by_levels(boxes: SpringBoxes, room: float, ladder: _Ladder) -> Divided:
         shown, left = _level(boxes, share, room), ladder.most - spent
         if shown <= bound:
             continue
-        if (spent > 1 and AHEAD * spent > ladder.most) or passed():
+        if (spent > 1 and AHEAD * spent > ladder.most) or left <= 0 or passed():
             break
         narrowing = _Narrowing(first if share == ladder.look else boxes.under(shown), left)
         if share == ladder.look:

@@ -12,13 +12,15 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import NEARLY, Divided
 from laufruhe.prove.certificate import Reach, certified, room_of
-from laufruhe.prove.mounts.subdivision import divided_bound, divides
+from laufruhe.prove.mounts.subdivision import divided_bounds, divides
 from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.solvers.conclusion import KEPT, values_of
 from laufruhe.solvers.mounts.search import MountSearch
 from laufruhe.solvers.result import Result
 
 MOST_DIVISIONS = 3
+# share of the expansions that are worth it which are tried first
+EARLY = 0.02
 # seconds that a first bound has where time is over
 LEAST_SECONDS = 0.5
 
@@ -50,12 +52,23 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
 
 
 def _by_boxes(problem: Problem, value: float, room: float, near: Sequence[Value]) -> Divided:
-    """By the forces of springs, a few boxes of which close many stiffnesses; by expansions what these leave open."""
+    """By the forces of springs, a few boxes of which close many stiffnesses; by expansions what these leave open.
+
+    Expansions need more boxes of less time: some are tried once the springs of all that is open do not close it.
+    """
+    alone = divides(problem)
     with at_least(LEAST_SECONDS):
-        few = spring_bound(problem, value, room, near)
-    if passed() or not divides(problem) or (few.boxes and few.bound >= value - room):
+        few = spring_bound(problem, value, room, near, whole=alone)
+    if passed() or not alone or (few.boxes and few.bound >= value - room):
         return few
-    many = divided_bound(problem, value, room)
+    expanded = divided_bounds(problem, value, room, (EARLY, 1.0))
+    many = next(expanded)
+    if few.boxes and many.bound < value - room and not passed():
+        few = spring_bound(problem, value, room, near)
+        if few.bound >= value - room:
+            return few
+    if many.bound < value - room and not passed():
+        many = next(expanded)
     return Divided(max(few.bound, many.bound), few.boxes + many.boxes, many.places or few.places)
 
 
