@@ -19,8 +19,8 @@ from laufruhe.prove.springs.modes import Shapes
 
 # what a solver leaves of a price of one for every square, so that what its multipliers leave over is convex
 ASIDE = 3e-7
-# how far multipliers may be off, and from what is allowed; of what narrows a box
-FINE, ROUGH = (1e-5, 1e-7), (2e-2, 5e-6)
+# how far multipliers may be off, and from what is allowed; when asked again, and of what narrows a box
+FINE, FINER, ROUGH = (1e-5, 1e-7), (1e-5, 1e-9), (2e-2, 5e-6)
 # equations are solved once and not refined, more regular instead, and steps kept from the ends of cones: bounds are as
 # good in less time
 _SETTINGS = {
@@ -42,8 +42,8 @@ _Parts: TypeAlias = defaultdict[Hashable, list[Array]]
 def proposed(program: Program) -> Iterator[Proposed]:
     """Multipliers of all conditions, s and moments, whatever the solver says of them; first and, where asked, again."""
     stated = Stated(program)
-    for scaled in (True, False):
-        yield stated.answer(program, scaled)
+    for scaled, enough in ((True, FINE), (False, FINER)):
+        yield stated.answer(program, scaled, enough)
 
 
 class Stated:
