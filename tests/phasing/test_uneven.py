@@ -168,6 +168,8 @@ def test_no_uneven_star_goes_under_the_bound(tmp_path, cycle, cylinders):
     objective = amplitude_objective(problem, phasing, family.layout)
     costs = throw_costs(phasing, family.space, objective, phasing.intervals)
     least = uneven_bound(phasing, family.space, objective, phasing.intervals)
+    every = replace(family.space, mirror=True, reflect=True).blocks()
+    assert least == pytest.approx(max(min(star_bounds(costs, block).min() for block in every), 0.0), rel=1e-12)
     rng = np.random.default_rng(cylinders)
     x, orders = np.array(family.space.places), np.array(objective.orders)
     for _ in range(60):

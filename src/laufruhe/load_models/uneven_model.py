@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -86,6 +87,7 @@ class UnevenModel:
         self._mounting = mounting_of(problem.engine, problem.fidelity)
         self._start = [_throw_of(problem.engine.slider_cranks, layout, k) for k in range(len(layout.throw_positions))]
         self._left_out = left_out
+        self._wrenches: dict[tuple[OperatingPoint, Symbols], Lines] = {}
 
     def _points(self, quantity: Measure) -> list[OperatingPoint]:
         return [p for p in self.problem.points if quantity.points is None or p.name in quantity.points]
@@ -188,9 +190,16 @@ class UnevenModel:
 
     def wrench(self, point: OperatingPoint, at: Symbols, gain: Callable[[float], float] | None = None) -> Lines:
         """Wrench by order; the roll moment of gas of the orders that a gain leaves to matter."""
+        if gain is not None:
+            return self._wrench(point, at, gain)
+        if (point, at) not in self._wrenches:
+            self._wrenches[point, at] = self._wrench(point, at, lambda _: 1.0)
+        return self._wrenches[point, at]
+
+    def _wrench(self, point: OperatingPoint, at: Symbols, gain: Callable[[float], float]) -> Lines:
         share = NEGLIGIBLE if self.problem.fidelity.gas_of(point) is None else self._left_out
         others = [Felt(slice(k, k + 1), NEGLIGIBLE) for k in range(6) if k != ROLL]
-        roll = Felt(slice(ROLL, ROLL + 1), share, gain or (lambda _: 1.0))
+        roll = Felt(slice(ROLL, ROLL + 1), share, gain)
         (found,) = self._turned(point, at, _wrench_of, [*others, roll], False)
         return found
 
@@ -246,12 +255,19 @@ def _steps(lines: Lines) -> int:
 
 def rides_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
     """The throw that each rotor turns with: found by moving one throw at a time."""
+    count = len(candidate.throws)
+    throws = tuple(math.tau * k / count for k in range(count))
+    return dict(_rides_of(phasing, replace(candidate, throws=throws, firing_order=None, without_gas=True)))
+
+
+@lru_cache(maxsize=16)
+def _rides_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
+    """The same of throws at even steps: what rides on a throw does so wherever it stands."""
     out = {}
-    still = replace(candidate, firing_order=None, without_gas=True)
-    before = rotor_states(phasing.realise(still))
+    before = rotor_states(phasing.realise(candidate))
     for k in range(len(candidate.throws)):
         throws = tuple(angle + (0.1 if j == k else 0.0) for j, angle in enumerate(candidate.throws))
-        after = rotor_states(phasing.realise(replace(still, throws=throws)))
+        after = rotor_states(phasing.realise(replace(candidate, throws=throws)))
         out.update({name: k for name, state in after.items() if state != before[name]})
     return out
 

@@ -157,7 +157,7 @@ def minorant(problem: AffineProblem, multipliers: Multipliers) -> Minorant:
     terms = []
     for (weight, norm), given in zip(problem.terms, multipliers.terms, strict=True):
         # a term that nothing open acts on is its own bound
-        z = norm.dual_feasible(given) if norm.slope.any() else norm.subgradient(np.zeros(len(gradient)))
+        z = norm.dual_feasible(given) if is_moved(norm) else norm.subgradient(np.zeros(len(gradient)))
         terms.append(z)
         constant += weight * float(np.vdot(z, norm.constant))
         gradient += weight * norm.pulled(z)
@@ -167,6 +167,11 @@ def minorant(problem: AffineProblem, multipliers: Multipliers) -> Minorant:
         constant += float(np.vdot(z, norm.constant)) - price * maximum
         gradient += norm.pulled(z)
     return Minorant(constant, gradient, Multipliers(tuple(terms), tuple(held)))
+
+
+def is_moved(norm: AffineNorm) -> bool:
+    """Whether any decision acts on a norm; mostly its first row tells."""
+    return bool(norm.slope[:1].any() or norm.slope.any())
 
 
 def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:

@@ -27,6 +27,8 @@ from laufruhe.problem.problem import Phasing, Problem
 
 POINTS = 97
 MOST_STARS = 50_000
+FEW = 32
+"""Directions that bound all stars before the next ones bound those that are left."""
 
 
 def uneven_bound(
@@ -53,7 +55,9 @@ def uneven_bound(
         return 0.0
     costs = throw_costs(phasing, space, objective, intervals)
     whole = StarSpace(space.phases, space.patterns, space.places, mirror=True, reflect=True)
-    least = min(float(star_bounds(costs, block).min()) for block in whole.blocks())
+    least = math.inf
+    for block in whole.blocks():
+        least = least_bound(costs, block, least)
     return max(least, 0.0)
 
 
@@ -66,6 +70,22 @@ def steady_bound(problem: Problem) -> float:
             continue
         total += term.weight * given.value(replace(quantity, orders=(0.0,)))
     return total
+
+
+def least_bound(costs: Array, stars: Stars, known: float) -> float:
+    """The least of `star_bounds`, or what is known where that is less.
+
+    A few directions in turn: a star that they hold over what another one has needs no further ones.
+    """
+    over = np.full(len(stars), -math.inf)
+    for first in range(0, len(costs), FEW):
+        if not len(stars):
+            return known
+        over = np.maximum(over, star_bounds(costs[first : first + FEW], stars))
+        known = min(known, float(star_bounds(costs, stars[[np.argmin(over)]])[0]))
+        under = over < known
+        stars, over = stars[under], over[under]
+    return min(known, float(over.min(initial=math.inf)))
 
 
 def star_bounds(costs: Array, stars: Stars) -> Array:

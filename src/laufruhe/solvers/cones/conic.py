@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid, lengths
-from laufruhe.prove.certificate import Multipliers, excludes
+from laufruhe.prove.certificate import Multipliers, excludes, is_moved
 from laufruhe.solvers.cones.equations import equations_of
 from laufruhe.solvers.cones.program import ConicSolution, answered, program_of, projected, told
 
@@ -46,7 +46,7 @@ def solve_cones(problem: AffineProblem, held: tuple[Array, Array] | None = None)
         A and b of A x = b, which the decision vector is to keep as well.
     """
     # of several sums those that nothing acts on may still be the largest
-    acting = [k for k, (_, norm) in enumerate(problem.terms) if norm.slope.any() or problem.groups]
+    acting = [k for k, (_, norm) in enumerate(problem.terms) if is_moved(norm) or problem.groups]
     binding = [k for k, limit in enumerate(problem.limits) if _may_bind(problem, *limit)]
     equal = [k for k in binding if problem.limits[k][0] == 0.0]
     equations = equations_of(problem, equal)

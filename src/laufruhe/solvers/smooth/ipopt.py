@@ -21,6 +21,8 @@ from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 SHORTEST = 0.25
 # of a program whose numbers are differences of a model outside
 LOOSER = 1e-8
+# numbers of an array, on average, above which whole arrays have their second derivatives sooner than their numbers
+LONG = 100
 # programs that are kept built
 _BUILT = 4
 _QUIET = {"print_time": False, "show_eval_warnings": False, "error_on_fail": False, "calc_lam_p": False}
@@ -182,7 +184,9 @@ def _built(oracle: str, expand: bool, max_iterations: int, outside: Outside | No
     """A program that can be solved: to build it costs as much as some starts."""
     function, told = ca.Function.deserialize(oracle), None
     if expand:
-        function = function.expand()
+        scalars = function.expand()
+        if scalars.n_instructions() <= LONG * function.n_instructions():
+            function = scalars
     solver = {**_OPTIONS, "max_iter": max_iterations}
     if outside is not None:
         function, told = _with_outside(function, outside)

@@ -86,7 +86,7 @@ class NonlinearProgram:
         Symbols and their values, one row a stage (N4).
     expand
         Whether the expressions may be written out as scalars where several starts share
-        the cost: three times as fast to evaluate, and slower to set up.
+        the cost and arrays are short: three times as fast to evaluate, and slower to set up.
     told
         Numbers in the expressions that a model outside tells.
     deciding

@@ -146,15 +146,10 @@ class SmoothProgram:
             objective_scale=self.unit,
             parameters=self._e,
             stages=self._stages,
-            expand=not self._is_wide,
+            expand=True,
             told=self._runs.told,
             deciding=self._turned.stop,
         )
-
-    @property
-    def _is_wide(self) -> bool:
-        """Whether thousands of rows are waves of a few angles: whole arrays have their second derivatives sooner."""
-        return self.moves is not None and any(measure.is_inside for measure in self.problem.measures)
 
     @property
     def _stages(self) -> tuple[tuple[float, ...], ...]:

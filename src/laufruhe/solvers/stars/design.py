@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 from laufruhe.problem.evaluation import finely
 from laufruhe.problem.phasing import Candidate
@@ -35,7 +36,7 @@ class StarDesign:
     kkt_residual: float = 0.0
     moved: bool = False
 
-    @property
+    @cached_property
     def is_met(self) -> bool:
         """Whether it is a design within its limits."""
         return self.result.status.has_design and self.result.final.excess(self.result.problem.limits) <= KEPT

@@ -78,9 +78,8 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         tell("shares of the deviation allowed", k, len(steps), found[0].value if found else math.inf)
         allowed = _narrowed(phasing, share)
         # what is best with less freedom is a start, so that more of it is never worse
-        own = [design.candidate for design in found[:1]] + starts[
-            : STARTS if share == 1.0 and phasing.thorough else TRADE_STARTS
-        ]
+        few = starts[: STARTS if share == 1.0 and phasing.thorough else TRADE_STARTS]
+        own = dict.fromkeys([*(design.candidate for design in found[:1]), *few])
         answers = [answer for start in in_time(own) if (answer := local_optimum(phasing, start, allowed)) is not None]
         found = sorted(answers, key=lambda answer: answer.value)
         if found and len(steps) > 1:
