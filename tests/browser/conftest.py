@@ -1,5 +1,5 @@
-"""A page of a headless Chromium. A browser lives for the tests of this folder: Playwright's loop runs as long as its
-browser does, and other tests have loops of their own. A page lives for a module, for each is a process of its own."""
+"""A page of a headless Chromium. Playwright's loop runs as long as its browser does, and other tests have loops of
+their own: so a browser lives for a module, not for all of them; and so does its page, for each is a process."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from browser import chromium
 from browser.chromium import Watched
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     if chromium.executable() is None:
         pytest.skip(chromium.MISSING)
