@@ -98,9 +98,9 @@ def test_bearings_walls_heads_and_balancers_make_the_shaking_loads(seed: int) ->
     outside = walls_and_heads(engine, steps)
     total = inside + outside + balancer
     wanted = shaking_loads(engine, POINT, fidelity).sample(steps)
-    # the largest force of those that cancel
+    # the largest force of those that cancel; a thousand terms leave up to 1e-12 of it, by the order they are added in
     size = max(np.abs(bearings).max(), np.abs(outside).max())
-    assert np.abs(total - wanted).max() < 1e-12 * size
+    assert np.abs(total - wanted).max() < 3e-12 * size
 
 
 @pytest.mark.parametrize("seed", range(3))
