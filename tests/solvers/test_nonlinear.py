@@ -62,6 +62,16 @@ def test_no_later_stage_is_begun_after_the_time():
     assert cut.x == pytest.approx(whole.x, abs=1e-6)
 
 
+def test_where_a_start_is_at_an_optimum_is_told_by_its_residual_not_by_the_solver():
+    """One iteration less than the solver's own tolerance takes ends at the same point."""
+    whole = solve_nonlinear(rosenbrock(), [np.array([-1.0, 1.0])])[0]
+    cut = solve_nonlinear(rosenbrock(), [np.array([-1.0, 1.0])], max_iterations=whole.iterations - 1)[0]
+    assert cut.iterations < whole.iterations
+    assert cut.kkt_residual <= 1e-7
+    assert cut.usable
+    assert cut.x == pytest.approx(whole.x, abs=1e-6)
+
+
 def test_the_residual_is_not_small_away_from_an_optimum():
     stopped = solve_nonlinear(rosenbrock(), [np.array([-1.0, 1.0])], max_iterations=2)[0]
     assert stopped.ending is Ending.UNFINISHED

@@ -17,6 +17,8 @@ from laufruhe.numerics.budget import in_time, left, passed
 from laufruhe.numerics.progress import tell, telling
 from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 
+# residual (N2) of what counts as a local optimum, however the solver ended there
+ACCEPTABLE = 1e-7
 # seconds that a start has where time is over
 SHORTEST = 0.25
 # of a program whose numbers are differences of a model outside
@@ -30,7 +32,7 @@ _OPTIONS = {
     "print_level": 0,
     "sb": "yes",
     "tol": 1e-10,
-    "acceptable_tol": 1e-7,
+    "acceptable_tol": ACCEPTABLE,
     "mu_strategy": "adaptive",
     "bound_relax_factor": 1e-10,
 }
@@ -209,7 +211,7 @@ def _with_outside(function: Any, outside: Outside) -> tuple[Any, _Told]:
 
 def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptimum:
     began = time.process_time()
-    y, iterations, ending = point / task.scales, 0, Ending.FAILED
+    y, iterations, ending, begun = point / task.scales, 0, Ending.FAILED, 0
     sides = {"lbx": task.lower, "ubx": task.upper, "lbg": task.constraint_lower, "ubg": task.constraint_upper}
     m = b = np.zeros(0)
     for number, stage in enumerate(task.stages):
@@ -217,7 +219,7 @@ def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptim
             ending = Ending.UNFINISHED
             break
         built.clock.start(min(task.max_seconds, max(left(), SHORTEST)))
-        found = built.solver(x0=y, p=list(stage), **sides)
+        found, begun = built.solver(x0=y, p=list(stage), **sides), number + 1
         stats = built.solver.stats()
         iterations += int(stats["iter_count"])
         ending = _ENDINGS.get(stats["return_status"], Ending.FAILED)
@@ -231,6 +233,8 @@ def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptim
         residual, violation = _judged(task, y, g, gradient, jacobian, m, b)
     if not np.isfinite(residual) or not np.isfinite(f):
         ending, residual, violation = Ending.FAILED, np.inf, np.inf
+    elif ending is Ending.UNFINISHED and begun == len(task.stages) and residual <= ACCEPTABLE:
+        ending = Ending.ACCEPTABLE
     return LocalOptimum(
         x=y * task.scales,
         value=f * task.objective_scale,
