@@ -60,7 +60,13 @@ def pytest_configure(config: pytest.Config) -> None:
         config.add_cleanup(home.cleanup)
 
 
-def pytest_collection_finish() -> None:
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection() -> None:
     """What is imported and collected lives to the end; looking through it again and again costs seconds."""
+    gc.disable()
+
+
+def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
+    gc.enable()
