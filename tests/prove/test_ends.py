@@ -14,8 +14,8 @@ from prove.test_mode_boxes import NEAR, decoupled, designs_about
 
 @pytest.mark.slow
 def test_whoever_works_them_out() -> None:
-    problem = decoupled(4)
-    best, least = min(designs_about(problem, NEAR, 30), key=lambda pair: pair[1])
+    problem = decoupled(3)
+    best, least = min(designs_about(problem, NEAR[:3], 30), key=lambda pair: pair[1])
     found = []
     with ThreadPoolExecutor(3) as pool:
         for executor in (HERE, pool):

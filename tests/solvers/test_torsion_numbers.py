@@ -167,7 +167,9 @@ def test_a_disc_is_sized_for_irregularity_and_stress() -> None:
     assert result.objective.value == pytest.approx(least, rel=2e-3)
     assert result.limits[1].value <= 20e6
     narrow = {**wheel, "inertia": {"between": ["0.05 kg m^2", "0.1 kg m^2"]}}
-    none = laufruhe.solve(problem_of({**own, "discs": [pulley, narrow]}, constraints=limits, search=one))
+    none = laufruhe.solve(
+        problem_of({**own, "discs": [pulley, narrow]}, constraints=limits, objective=inertia, search=one)
+    )
     assert none.status is Status.INFEASIBLE
     assert "degree of irregularity" in none.conflict
 
