@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +11,16 @@ import pytest
 import laufruhe
 from laufruhe.files.reader import load_tables
 from laufruhe.load_models.affine import AffineModel
-from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.evaluation import evaluate, finely
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Status, solve
 from laufruhe.solvers.conclusion import broken_limits, state
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import is_empty
+from laufruhe.solvers.reachable import with_reachable
+from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.design import StarDesign
 
 SINGLE: dict[str, Any] = {
@@ -86,6 +90,43 @@ def test_a_mean_that_is_all_but_least_is_sought_at_more_angles() -> None:
         "constraints": [{"limit": "mean shaking force", "max": "1071.6648434 N"}],
     }  # fmt: skip
     assert solve(load_tables(told, Path("single.toml"))).status.has_design
+
+
+def out_of_reach() -> Problem:
+    """The force is no less than 1071.66270 N, but 480 angles read 1.8e-5 less of that design."""
+    told = {
+        **SINGLE, "fidelity": {"samples": 60}, "objective": {"minimise": "rms shaking force"},
+        "constraints": [{"name": "quiet", "limit": "mean shaking force", "max": "1071.64877 N"}],
+    }  # fmt: skip
+    return load_tables(told, Path("single.toml"))
+
+
+def test_a_proof_stands_against_what_few_angles_read() -> None:
+    problem = out_of_reach()
+    assert solve(problem).status is Status.INFEASIBLE
+    result = laufruhe.solve(problem)
+    assert result.status is Status.INFEASIBLE
+    (told,) = result.reached
+    assert told.limit < told.value == pytest.approx(1071.6627, abs=1e-4)
+
+
+def test_a_design_that_few_angles_alone_allow_is_not_one_that_was_overlooked() -> None:
+    """Of a search that found none: the nearest design is read at many angles, and breaks its limit."""
+    problem = out_of_reach()
+    failed = replace(solve(problem), status=Status.FAILED, conflict=())
+    met: list[bool] = []
+
+    def decide(asked: Problem) -> Result:
+        result = solve(asked)
+        met.append(not broken_limits(problem.limits, result.final))
+        assert broken_limits(problem.limits, finely(result.final))
+        return result
+
+    result = with_reachable(failed, problem, {Kind.UNBALANCE}, 1.0, decide)
+    assert met == [True]
+    assert not result.status.has_design
+    assert result.nearest is not None
+    assert result.nearest.broken == ("quiet",)
 
 
 def test_a_run_up_is_designed_for_where_few_angles_forbid_a_mean() -> None:
