@@ -14,7 +14,7 @@ from laufruhe.numerics.norms import softened_lengths
 from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.workers import HERE, working_on
 from laufruhe.solvers.mounts.starts import spread_starts
-from laufruhe.solvers.smooth.local_optimum import Ending, distinct, is_explored
+from laufruhe.solvers.smooth.local_optimum import Ending, distinct, ends_in_words, is_explored
 from laufruhe.solvers.smooth.nonlinear import NonlinearProgram, solve_nonlinear
 
 
@@ -48,6 +48,19 @@ def test_a_start_whose_time_is_over_stops_where_it_is_and_the_next_does_not():
     assert stopped.ending is Ending.UNFINISHED
     assert stopped.iterations <= 1
     assert solve_nonlinear(rosenbrock(), [np.array([-1.0, 1.0])])[0].usable
+
+
+def test_where_starts_ended_is_said_in_plain_words():
+    """Also where none converged, or there was one start alone."""
+    starts = [np.array([-1.0, 1.0]), np.array([0.5, 0.5])]
+    stopped = solve_nonlinear(rosenbrock(), starts, max_seconds=0.0)
+    met = solve_nonlinear(rosenbrock(), starts)
+    assert ends_in_words(stopped, len(distinct(stopped, 1.0))) == "IPOPT from 2 starts, none of which converged"
+    assert ends_in_words(stopped[:1], 0) == "IPOPT from 1 start, which never converged"
+    assert ends_in_words(met, 1) == "IPOPT from 2 starts, 2 of which ended at one and the same optimum"
+    assert ends_in_words([*met, *stopped], 2) == "IPOPT from 4 starts, 2 of which ended at 2 different optima"
+    assert ends_in_words([replace(met[0], starts=1)], 1) == "IPOPT from 1 start, which ended at an optimum"
+    assert ends_in_words([], 0) == "a design to start from"
 
 
 def test_no_later_stage_is_begun_after_the_time():

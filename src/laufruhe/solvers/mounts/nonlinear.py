@@ -35,7 +35,7 @@ from laufruhe.solvers.mounts.search import Found, MountSearch, Place, judged_at
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.ipopt import run
-from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct
+from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, ends_in_words
 from laufruhe.solvers.smooth.program import SmoothProgram
 
 WORTH_SAYING = 1.01
@@ -215,11 +215,8 @@ def _result(
 
 
 def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, float] | None, divided: Divided) -> str:
-    starts, usable = (sum(o.starts for o in some) for some in (optima, [o for o in optima if o.usable]))
     apart = distinct(optima, scale)
-    text = f"IPOPT from {starts} start{'s' if starts > 1 else ''}, {usable} of which ended at "
-    text += "one and the same optimum" if len(apart) == 1 else f"{len(apart)} different optima"
-    text = text if optima else "a design to start from"
+    text = ends_in_words(optima, len(apart))
     if len(apart) > 1 and apart[-1].value > WORTH_SAYING * apart[0].value > 0.0:
         text += f", up to {apart[-1].value / apart[0].value:.3g} times the best"
     if proven is not None:

@@ -17,7 +17,7 @@ from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, n
 from laufruhe.solvers.mounts.search import NEAR, Found, MountSearch
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct
+from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, ends_in_words
 
 STARTS, STOPPED_STARTS = 6, 3
 """Of a search at most: each of its steps costs several run-ups, most of them with bump stops."""
@@ -62,15 +62,10 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
 
 
 def _method(optima: Sequence[LocalOptimum], scale: float, is_bounded: bool) -> str:
-    starts, usable = sum(o.starts for o in optima), [o for o in optima if o.usable]
-    apart = len(distinct(usable, scale, 1e-3))
-    ends = "one and the same optimum" if apart == 1 else f"{apart} different optima"
+    ends = ends_in_words(optima, len(distinct(optima, scale, 1e-3)))
     told = "" if is_bounded else "; nothing bounds a run-up alone"
     bound = "; the bound is that of the same without what is asked of run-ups" if is_bounded else told
-    return (
-        f"IPOPT from {starts} starts with run-ups integrated, {sum(o.starts for o in usable)} of which ended at "
-        f"{ends}{bound}"
-    )
+    return f"{ends}, with run-ups integrated{bound}"
 
 
 def _none(problem: Problem, search: MountSearch, found: Found | None, result: Result) -> Result:

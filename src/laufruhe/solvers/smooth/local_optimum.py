@@ -80,6 +80,18 @@ def distinct(optima: Sequence[LocalOptimum], scale: float, tolerance: float = _S
     return tuple(kept)
 
 
+def ends_in_words(optima: Sequence[LocalOptimum], apart: int) -> str:
+    """From how many starts IPOPT searched, and at how many optima apart these ended."""
+    if not optima:
+        return "a design to start from"
+    starts, usable = (sum(o.starts for o in some) for some in (optima, [o for o in optima if o.usable]))
+    text = f"IPOPT from {starts} start{'s' if starts > 1 else ''}, "
+    if not usable:
+        return f"{text}{'none of which' if starts > 1 else 'which never'} converged"
+    ends = "one and the same optimum" if apart == 1 else f"{apart} different optima"
+    return f"{text}{usable} of which ended at {ends}" if starts > 1 else f"{text}which ended at an optimum"
+
+
 def is_explored(optima: Sequence[LocalOptimum], scale: float) -> bool:
     """Whether starts spread at random have very likely met the best optimum, and more than once (N5).
 
