@@ -14,7 +14,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.springs.bound import follows
-from laufruhe.prove.springs.box import SpringBox
+from laufruhe.prove.springs.box import WORTH, SpringBox, worth
 from laufruhe.prove.springs.limits import ANYTHING, Limits
 from laufruhe.prove.springs.program import Stated
 from laufruhe.prove.springs.search import SpringBoxes
@@ -125,6 +125,22 @@ def test_transmissibility_of_lines_is_that_of_the_model(name: str) -> None:
             sizes.append(float(np.linalg.norm(line.forces @ v) * line.unit))
         found.append(sizes[0] / sizes[1])
     assert max(found) == pytest.approx(value, rel=1e-7)
+
+
+@pytest.mark.parametrize("lacking", [0.0, -1e-9, 5e-324, 1e-310])
+@pytest.mark.parametrize("size", [5e-324, 1e-305, 1.0, 1e9, 1e300])
+def test_sides_are_told_apart_where_nothing_is_lacking(lacking: float, size: float) -> None:
+    """Zero and the least numbers there are: no share overflows, which would be an error here, nor is one lost."""
+    hidden = size * np.array([0.0, 0.5, 1.0])
+    for pull in (np.zeros(3), np.array([5e-324, 0.0, 0.0])):
+        found = worth(pull, hidden, lacking)
+        assert np.isfinite(found).all()
+        assert found[2] == found.max() > 0.0
+
+
+def test_what_is_hidden_counts_by_what_is_lacking() -> None:
+    pull, hidden = np.array([4.0, 1.0]), np.array([0.0, 3.0])
+    assert worth(pull, hidden, 6.0) == pytest.approx([1.0, 3.0 / (6.0 * WORTH)])
 
 
 SIDEWAYS = """

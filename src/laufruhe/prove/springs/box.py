@@ -149,7 +149,7 @@ class SpringBox:
                     hidden = high.hidden(self._stands) * head.share * head.factor / multiple / len(self.each.mounts)
                     for j, own in enumerate(hidden):
                         self._spread(found, [j], float(own))
-        return np.maximum(pull / max(float(pull.max()), 1e-300), found / max(WORTH * lacking, 1e-300))
+        return worth(pull, found, lacking)
 
     def _alone(self, heads: Sequence[Head], known: Array) -> Array:
         """What every root is at least by itself."""
@@ -323,6 +323,12 @@ class SpringBox:
         left = (self.upper - self.lower) / np.maximum(self.search.upper - self.search.lower, 1e-300)
         best = max(follows_, key=lambda j: left[j])
         pull[best] += share
+
+
+def worth(pull: Array, hidden: Array, lacking: float) -> Array:
+    """Sides by the larger of two shares: of the largest pull, and of what is lacking; finite where nothing is."""
+    least = max(WORTH * lacking, 1e-100 * float(hidden.max()), 1e-300)
+    return np.maximum(pull / max(float(pull.max()), 1e-300), hidden / least)
 
 
 def _matter(shares: Array) -> Mask:
