@@ -62,10 +62,10 @@ class Sweep:
         for k, (orders, coefficients) in enumerate(loads):
             part = np.zeros_like(total)
             for order, own in zip(orders, coefficients, strict=True):
-                if np.any(own != 0.0):
-                    felt = np.flatnonzero(own)
-                    part[felt] += np.outer(own[felt].real, np.cos(order * angle))
-                    part[felt] -= np.outer(own[felt].imag, np.sin(order * angle))
+                for share, wave in ((own.real, np.cos), (-own.imag, np.sin)):
+                    felt = np.flatnonzero(share)
+                    if len(felt):
+                        part[felt] += np.outer(share[felt], wave(order * angle))
             total += part if k else speed**2 * part
         return total
 

@@ -292,9 +292,9 @@ class BoxModel:
 
 def series(centres: Array, halves: Array, inverse: Any, slopes: Any, motion: Any) -> Expansion:
     """Motion over boxes from that at their centres, D(c)^-1 and the slopes of D, (boxes, lines, ...) each (E37)."""
-    pulled = np.einsum("bkij,bknjl->bknil", inverse, slopes) * halves[:, None, :, None, None]
-    first = np.einsum("bknij,bkj->bkni", pulled, motion)
-    second = np.einsum("bkmij,bknj->bkmni", pulled, first)
+    pulled = np.matmul(inverse[:, :, None], slopes) * halves[:, None, :, None, None]
+    first = np.matmul(pulled, motion[:, :, None, :, None])[..., 0]
+    second = _each_by_each(first, pulled)
     pull = np.linalg.norm(pulled, axis=(-2, -1))
     size = np.linalg.norm(_both_ways(second), axis=-1).sum(axis=(-2, -1))
     rho = pull.sum(axis=-1)
@@ -305,13 +305,18 @@ def series(centres: Array, halves: Array, inverse: Any, slopes: Any, motion: Any
 
 def mapped(at: Expansion, value: Any, slopes: Any) -> Answer:
     """What maps at the centres, (boxes, lines, r, 6), and by side, (..., n, r, 6), make of motion (E37)."""
-    first = np.einsum("bknri,bki->bknr", slopes, at.motion) - np.einsum("bkri,bkni->bknr", value, at.first)
-    second = np.einsum("bkri,bkmni->bkmnr", value, at.second) - np.einsum("bkmri,bkni->bkmnr", slopes, at.first)
+    first = np.matmul(slopes, at.motion[:, :, None, :, None])[..., 0] - np.matmul(at.first, np.swapaxes(value, -2, -1))
+    second = np.matmul(at.second, np.swapaxes(value, -2, -1)[:, :, None]) - _each_by_each(at.first, slopes)
     rest = np.linalg.norm(_both_ways(second), axis=-1).sum(axis=(-2, -1))
     turned = np.linalg.norm(slopes, axis=(-2, -1)).sum(axis=-1)
     rest = rest + np.linalg.norm(value, axis=(-2, -1)) * at.rest + turned * at.size
     rest = rest + np.where(turned > 0.0, turned * np.where(turned > 0.0, at.rest, 0.0), 0.0)
     return Answer(np.einsum("bkri,bki->bkr", value, at.motion), first, rest)
+
+
+def _each_by_each(first: ComplexArray, maps: ComplexArray) -> ComplexArray:
+    """What the map of every side, (..., m, r, i), makes of every motion, (..., n, i), shape (..., m, n, r)."""
+    return np.asarray(np.matmul(first[:, :, None], np.swapaxes(maps, -2, -1)))
 
 
 def _both_ways(second: ComplexArray) -> ComplexArray:
