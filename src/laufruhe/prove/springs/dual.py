@@ -45,8 +45,8 @@ class Cone:
     is_alike: bool
 
 
-class Dual:
-    """A solver of one program for any cost.
+class _Solver:
+    """Of one program, for any cost.
 
     Parameters
     ----------
@@ -66,80 +66,90 @@ class Dual:
         self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]], scaled: bool,
         settings: Mapping[str, Any],
     ) -> None:  # fmt: skip
-        from scipy.sparse import csc_array, diags_array, eye_array, vstack
+        from scipy.sparse import csc_array, diags_array
 
         count, width = rows.shape
-        own = np.concatenate([columns for columns, _ in matrices])
-        self._order, free = np.concatenate([np.setdiff1d(np.arange(width), own), own]), width - len(own)
-        self._signs = np.where(np.arange(width) < free, 1.0, -1.0)
         self._scaled, self._settings = scaled, {**settings, "equilibrate_enable": False}
         self._along: Array = np.ones(count)
         self._across: Array = np.ones(width)
         if scaled:
             self._along, self._across = _scales(rows, cones, matrices)
-        turned = csc_array(diags_array(self._along) @ rows @ diags_array(self._across))[:, self._order].T
-        held = np.flatnonzero(np.repeat([cone.kind is not None for cone in cones], [cone.size for cone in cones]))
-        self._aside = np.zeros(len(held))
-        self._rows = csc_array(vstack([diags_array(self._signs) @ turned, -eye_array(count, format="csr")[held]]))
-        self._cost = self._along * right
-        self._kinds = [_zero(free), *(kind for _, kind in matrices), *(c.kind for c in cones if c.kind is not None)]
-        self._solver: Any = None
-
-    def solved(self, cost: Array) -> tuple[Array, Array, float]:
-        """x and z, whatever the solver says of them, and q'x; infinite where it takes that for unbounded."""
-        scaled = (self._across * cost)[self._order]
-        factor = _factor(scaled) if self._scaled else 1.0
-        right = np.append(-factor * self._signs * scaled, self._aside)
-        if self._solver is None:
-            self._solver = solver_of(self._cost, self._rows, right, self._kinds, self._settings)
-        else:
-            self._solver.update(b=right)
-        found = self._solver.solve()
-        x = np.empty(len(cost))
-        x[self._order] = -self._signs * np.nan_to_num(np.array(found.z))[: len(cost)]
-        x *= self._across
-        # infeasible where the program itself is unbounded
-        least = math.inf if _is_infeasible(found) else float(cost @ x)
-        return x, self._along * np.nan_to_num(np.array(found.x)) / factor, least
-
-
-class Plain:
-    """A solver of the same, by the program as it is told."""
-
-    def __init__(
-        self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]], scaled: bool,
-        settings: Mapping[str, Any],
-    ) -> None:  # fmt: skip
-        from scipy.sparse import coo_array, csc_array, diags_array, vstack
-
-        count, width = rows.shape
-        own = np.concatenate([columns for columns, _ in matrices])
-        self._scaled, self._settings = scaled, {**settings, "equilibrate_enable": False}
-        self._along: Array = np.ones(count)
-        self._across: Array = np.ones(width)
-        if scaled:
-            self._along, self._across = _scales(rows, cones, matrices)
-        told = diags_array(self._along) @ rows @ diags_array(self._across)
-        entries = coo_array((-np.ones(len(own)), (np.arange(len(own)), own)), shape=(len(own), width))
-        self._rows = csc_array(vstack([told, entries]))
-        self._right = np.append(self._along * right, np.zeros(len(own)))
-        self._kinds = [_zero(cone.size) if cone.kind is None else cone.kind for cone in cones]
-        self._kinds += [kind for _, kind in matrices]
+        self._told = csc_array(diags_array(self._along) @ rows @ diags_array(self._across))
+        self._right = self._along * right
+        self._own = np.concatenate([columns for columns, _ in matrices])
         self._solver: Any = None
 
     def solved(self, cost: Array) -> tuple[Array, Array, float]:
         """x and z, whatever the solver says of them, and q'x; infinite where it takes that for unbounded."""
         scaled = self._across * cost
         factor = _factor(scaled) if self._scaled else 1.0
+        x, z, is_bounded = self._answer(factor * scaled)
+        x = self._across * x
+        return x, self._along * z / factor, float(cost @ x) if is_bounded else math.inf
+
+    def _answer(self, cost: Array) -> tuple[Array, Array, bool]:
+        """x and z as scaled, and whether there is a least value."""
+        raise NotImplementedError
+
+
+class Dual(_Solver):
+    """By the dual."""
+
+    def __init__(
+        self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]], scaled: bool,
+        settings: Mapping[str, Any],
+    ) -> None:  # fmt: skip
+        from scipy.sparse import csc_array, diags_array, eye_array, vstack
+
+        super().__init__(rows, right, cones, matrices, scaled, settings)
+        count, width = rows.shape
+        free = width - len(self._own)
+        self._order = np.concatenate([np.setdiff1d(np.arange(width), self._own), self._own])
+        self._signs = np.where(np.arange(width) < free, 1.0, -1.0)
+        held = np.flatnonzero(np.repeat([cone.kind is not None for cone in cones], [cone.size for cone in cones]))
+        self._aside = np.zeros(len(held))
+        turned = diags_array(self._signs) @ self._told[:, self._order].T
+        self._rows = csc_array(vstack([turned, -eye_array(count, format="csr")[held]]))
+        self._kinds = [_zero(free), *(kind for _, kind in matrices), *(c.kind for c in cones if c.kind is not None)]
+
+    def _answer(self, cost: Array) -> tuple[Array, Array, bool]:
+        right = np.append(-self._signs * cost[self._order], self._aside)
         if self._solver is None:
-            self._solver = solver_of(factor * scaled, self._rows, self._right, self._kinds, self._settings)
+            self._solver = solver_of(self._right, self._rows, right, self._kinds, self._settings)
         else:
-            self._solver.update(q=factor * scaled)
+            self._solver.update(b=right)
+        found = self._solver.solve()
+        x = np.empty(len(cost))
+        x[self._order] = -self._signs * np.nan_to_num(np.array(found.z))[: len(cost)]
+        # infeasible where the program itself is unbounded
+        return x, np.nan_to_num(np.array(found.x)), not _is_infeasible(found)
+
+
+class Plain(_Solver):
+    """By the program as it is told."""
+
+    def __init__(
+        self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]], scaled: bool,
+        settings: Mapping[str, Any],
+    ) -> None:  # fmt: skip
+        from scipy.sparse import coo_array, csc_array, vstack
+
+        super().__init__(rows, right, cones, matrices, scaled, settings)
+        count = len(self._own)
+        entries = coo_array((-np.ones(count), (np.arange(count), self._own)), shape=(count, rows.shape[1]))
+        self._rows = csc_array(vstack([self._told, entries]))
+        self._sides = np.append(self._right, np.zeros(count))
+        self._kinds = [_zero(cone.size) if cone.kind is None else cone.kind for cone in cones]
+        self._kinds += [kind for _, kind in matrices]
+
+    def _answer(self, cost: Array) -> tuple[Array, Array, bool]:
+        if self._solver is None:
+            self._solver = solver_of(cost, self._rows, self._sides, self._kinds, self._settings)
+        else:
+            self._solver.update(q=cost)
         found = self._solver.solve()
         x, z = (np.nan_to_num(np.array(each)) for each in (found.x, found.z))
-        x *= self._across
-        least = math.inf if _is_unbounded(found) else float(cost @ x)
-        return x, self._along * z[: len(self._along)] / factor, least
+        return x, z[: len(self._right)], not _is_unbounded(found)
 
 
 def solver_for(
