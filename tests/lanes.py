@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from importlib.util import find_spec
 from typing import Any
 
 import pytest
@@ -21,3 +22,9 @@ def first_fast(values: Iterable[Any], fast: int, long: Collection[Any] = ()) -> 
         pytest.param(*case, marks=pytest.mark.long if value in long else pytest.mark.slow if k >= fast else ())
         for k, (value, case) in enumerate(cases)
     ]
+
+
+def of_clusters(*libraries: str) -> pytest.MarkDecorator:
+    """Skipped where one of these is not installed; imported only where a test runs, which takes every process time."""
+    missing = [name for name in libraries if find_spec(name) is None]
+    return pytest.mark.skipif(bool(missing), reason="Dask is not installed: pip install 'laufruhe[cluster]'")

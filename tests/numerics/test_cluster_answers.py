@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("distributed", reason="Dask is not installed: pip install 'laufruhe[cluster]'")
-
+from lanes import of_clusters
 from laufruhe.numerics.cluster import Cluster
 from laufruhe.numerics.workers import each
+
+pytestmark = of_clusters("distributed")
 
 
 class Call:

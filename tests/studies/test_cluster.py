@@ -9,12 +9,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from lanes import of_clusters
 from laufruhe.cli import app
 from studies import clusters
 
-pytest.importorskip("distributed", reason="Dask is not installed: pip install 'laufruhe[cluster]'")
-pytest.importorskip("zarr", reason="Zarr is not installed: pip install 'laufruhe[cluster]'")
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, of_clusters("distributed", "zarr")]
 SMALL = {"draws": 2000, "chunk": 500, "scenes": 20, "few": 2, "points": 3}
 KILLED_AT = 6
 

@@ -14,6 +14,7 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
+from lanes import of_clusters
 from laufruhe.cli import app
 from laufruhe.errors import InputError, SolverError
 from laufruhe.files.reader import load
@@ -26,7 +27,8 @@ from laufruhe.studies.reader import load_study
 from laufruhe.studies.regions import Regions
 from problem_files import PROBLEMS, changed, written
 
-pytest.importorskip("zarr", reason="Zarr is not installed: pip install 'laufruhe[cluster]'")
+pytestmark = of_clusters("zarr")
+
 SINGLE, FOUR = "tractor-single.toml", "tractor-four-lanchester.toml"
 HEAD = 'title = "t"\n[study]\n[[study.parts]]\nname = "p"\ntitle = "t"\n'
 SPEED = '{ quantity = "operating_points.1.mean_piston_speed", from = "6 m/s", to = "12 m/s" }'

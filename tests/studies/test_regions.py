@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lanes import of_clusters
 from laufruhe.errors import InputError
 from laufruhe.studies.part import Column, Template
-
-pytest.importorskip("zarr", reason="Zarr is not installed: pip install 'laufruhe[cluster]'")
-
 from laufruhe.studies.regions import VALUES, Region, Regions, kept_to_one
+
+pytestmark = of_clusters("zarr")
 
 TEMPLATE = Template(("a", "b"), 25, 10, {"objective": Column("N", "force"), "x": Column("1", "x")})
 WANTED = {
