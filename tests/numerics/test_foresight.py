@@ -94,23 +94,18 @@ def test_steps_have_the_time_that_is_left() -> None:
         assert ahead.foreseen == 1
 
 
-class Starting(Executor):
-    """Two workers that never get ready."""
-
-    count = 2
-
-    def submit(self, fn: Callable[..., object], /, *args: object, **kwargs: object):  # type: ignore[override, no-untyped-def]
-        asked.append(fn)
-        return Future()
-
-
-asked: list[Callable[..., object]] = []
-
-
 def test_processes_that_start_are_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("laufruhe.numerics.foresight.executor_for", Starting)
+    asked: list[Callable[..., object]] = []
+
+    class Starting(Executor):
+        """Two workers that never get ready."""
+
+        def submit(self, fn: Callable[..., object], /, *_: object, **__: object):  # type: ignore[override, no-untyped-def]
+            asked.append(fn)
+            return Future()
+
+    monkeypatch.setattr("laufruhe.numerics.foresight.Processes", Starting)
     monkeypatch.setattr("laufruhe.numerics.foresight.count_of", lambda _=None: 2)
-    asked.clear()
     with working_on(None), foresight(abs, worth=0.0) as ahead:
         ahead.likely([("a", -1)])
         assert len(asked) == 2

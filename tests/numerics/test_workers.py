@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import threading
 import time
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
+from queue import SimpleQueue
 
 import pytest
 
@@ -115,6 +117,22 @@ def test_no_process_outlives_an_error() -> None:
     for pid in pids:
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
+
+
+def test_a_call_that_a_worker_takes_while_all_end_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Between the question whether calls are left and the answer a worker may have taken the last one."""
+
+    class Emptied(SimpleQueue[object]):
+        """Seems to hold a call that it does not hold."""
+
+        def empty(self) -> bool:
+            return False
+
+    monkeypatch.setattr("laufruhe.numerics.processes.SimpleQueue", Emptied)
+    ending = threading.Thread(target=Processes(1).shutdown, kwargs={"cancel_futures": True}, daemon=True)
+    ending.start()
+    ending.join(10.0)
+    assert not ending.is_alive()
 
 
 def test_time_that_is_left_goes_with_a_piece() -> None:

@@ -11,17 +11,19 @@ import time
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import ExitStack, contextmanager
+from itertools import islice
 from typing import Generic, TypeVar
 
 from laufruhe.numerics.budget import left
-from laufruhe.numerics.workers import WORTH_PROCESSES, count_of, executor_for, given, imported, worked
+from laufruhe.numerics.processes import Processes
+from laufruhe.numerics.workers import WORTH_PROCESSES, count_of, given, imported, worked
 
 T = TypeVar("T")
 A = TypeVar("A")
 
 
 class Foresight(Generic[T, A]):
-    """Answers of one kind of step; processes are started once a search has taken longer than that is worth."""
+    """Answers of one kind of step; processes are started once a search has taken the seconds that they are worth."""
 
     def __init__(self, work: Callable[[T], A], held: ExitStack, worth: float) -> None:
         self._work, self._held, self._worth = work, held, worth
@@ -33,26 +35,24 @@ class Foresight(Generic[T, A]):
 
     def likely(self, steps: Iterable[tuple[Hashable, T]]) -> None:
         """Steps that may be wanted next, the likeliest first; as many are begun as can be worked at once."""
-        room = self._ready - sum(not future.done() for future in self._asked.values())
-        for key, step in steps:
-            if room <= 0 or self._executor is None:
-                return
-            if key not in self._asked:
-                self._asked[key] = self._executor.submit(worked, time.time() + left(), self._work, step)
-                room -= 1
+        executor = self._executor or self._workers()
+        if executor is None:
+            return
+        busy = sum(not future.done() for future in (*self._starting, *self._asked.values()))
+        unasked = ((key, step) for key, step in steps if key not in self._asked)
+        for key, step in islice(unasked, max(count_of(executor) - busy, 0)):
+            self._asked[key] = executor.submit(worked, time.time() + left(), self._work, step)
 
-    @property
-    def _ready(self) -> int:
-        """How many work; those that are started here are not waited for."""
-        if self._executor is None:
-            waited = time.perf_counter() - self._began > self._worth
-            if count_of() == 1 or not (waited or given() is not None):
-                return 0
-            self._executor = self._held.enter_context(executor_for())
-            self._held.callback(self._end)
-            if given() is None:
-                self._starting = [self._executor.submit(imported, self._work) for _ in range(count_of(self._executor))]
-        return count_of(self._executor) - sum(not future.done() for future in self._starting)
+    def _workers(self) -> Executor | None:
+        """Those that were given; else processes, once they are worth it, of which none is waited for while it starts."""
+        waited = time.perf_counter() - self._began
+        if count_of() == 1 or (given() is None and waited <= self._worth):
+            return None
+        self._executor = executor = given() or Processes()
+        self._held.callback(self._end)
+        if given() is None:
+            self._starting = [executor.submit(imported, self._work) for _ in range(count_of(executor))]
+        return executor
 
     def wanted(self, key: Hashable, step: T) -> A:
         """The answer to a step: the one foreseen, or worked out now."""

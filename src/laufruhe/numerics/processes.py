@@ -14,10 +14,10 @@ import threading
 import traceback
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from pkgutil import resolve_name
-from queue import SimpleQueue
+from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any, ParamSpec, TypeAlias, TypeVar
 
@@ -115,10 +115,12 @@ class Processes(Executor):
             self._closed = True
             children, tenders = tuple(self._children), tuple(self._tenders)
         if cancel_futures:
-            while not self._calls.empty():
-                call = self._calls.get()
-                if call is not None:
-                    call[0].cancel()
+            # others take calls too, so that one that was there may be gone
+            with suppress(Empty):
+                while True:
+                    call = self._calls.get_nowait()
+                    if call is not None:
+                        call[0].cancel()
             for child in children:
                 child.kill()
         for _ in tenders:
@@ -179,12 +181,10 @@ class Processes(Executor):
             child.kill()
             child.wait()
             for stream in (child.stdin, child.stdout):
-                if stream is not None:
-                    try:
+                # what was not written any more
+                with suppress(OSError):
+                    if stream is not None:
                         stream.close()
-                    except OSError:
-                        # what was not written any more
-                        continue
 
 
 def _exchanged(child: subprocess.Popen[bytes], asked: bytes) -> tuple[bool, Any]:

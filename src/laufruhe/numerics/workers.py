@@ -88,7 +88,7 @@ def executor_for(most: int | None = None) -> Iterator[Executor]:
 
 
 def imported(*_: Callable[..., object]) -> None:
-    """Nothing: to be asked, a process has imported what works are of."""
+    """Do nothing: a process that is asked for this has imported what the works come from."""
 
 
 @contextmanager
@@ -105,15 +105,15 @@ def at_hand(*works: Callable[..., object]) -> Iterator[None]:
     if _given.get() is not None or processors() == 1:
         yield
         return
-    with Processes() as own:
-        try:
-            for _ in range(own.count):
-                own.submit(imported, *works)
-            with working_on(own):
-                yield
-        finally:
-            # nobody waits for what is at work
-            own.shutdown(cancel_futures=True)
+    own = Processes()
+    try:
+        for _ in range(own.count):
+            own.submit(imported, *works)
+        with working_on(own):
+            yield
+    finally:
+        # nobody waits for what is at work
+        own.shutdown(cancel_futures=True)
 
 
 def count_of(executor: Executor | None = None) -> int:
