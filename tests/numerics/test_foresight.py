@@ -66,6 +66,9 @@ def test_a_step_that_is_lost_is_done_here() -> None:
     alone, _ = searched(HERE)
     with Losing(2) as pool:
         assert searched(pool) == (alone, 0)
+    # where all who work have ended, a search goes on
+    pool.shutdown()
+    assert searched(pool) == (alone, 0)
 
 
 def test_an_error_is_that_of_the_step() -> None:

@@ -10,9 +10,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Hashable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from laufruhe.numerics.budget import left
 from laufruhe.numerics.processes import Processes
@@ -38,13 +38,16 @@ class Foresight(Generic[T, A]):
         executor = self._executor or self._workers()
         if executor is None:
             return
-        busy = sum(not future.done() for future in (*self._starting, *self._asked.values()))
         unasked = ((key, step) for key, step in steps if key not in self._asked)
-        for key, step in islice(unasked, max(count_of(executor) - busy, 0)):
-            self._asked[key] = executor.submit(worked, time.time() + left(), self._work, step)
+        # where nobody works any more, all is worked out when it is wanted
+        with suppress(RuntimeError, OSError):
+            begun: list[Future[Any]] = [*self._starting, *self._asked.values()]
+            room = count_of(executor) - sum(not future.done() for future in begun)
+            for key, step in islice(unasked, max(room, 0)):
+                self._asked[key] = executor.submit(worked, time.time() + left(), self._work, step)
 
     def _workers(self) -> Executor | None:
-        """Those that were given; else processes, once they are worth it, of which none is waited for while it starts."""
+        """Those that were given; else processes, once they are worth it: none is waited for while it starts."""
         waited = time.perf_counter() - self._began
         if count_of() == 1 or (given() is None and waited <= self._worth):
             return None
