@@ -56,11 +56,11 @@ def command_rows() -> list[Row]:
         ([laufruhe, "check", str(PROBLEM)], "import numpy; from pydantic import BaseModel"),
         (
             [laufruhe, "solve", "--no-plots", str(PROBLEM)],
-            "import clarabel, jinja2, xlsxwriter; from pydantic import BaseModel",
+            "import clarabel, jinja2; from pydantic import BaseModel",
         ),
         (
             [laufruhe, "solve", str(PROBLEM)],
-            "import clarabel, jinja2, xlsxwriter, matplotlib.pyplot; from pydantic import BaseModel",
+            "import clarabel, jinja2, matplotlib.pyplot; from pydantic import BaseModel",
         ),
         ([laufruhe, "solve", str(PROBLEM)], "import cvxpy, matplotlib.pyplot"),
     ]

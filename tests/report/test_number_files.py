@@ -11,6 +11,7 @@ import numpy as np
 import openpyxl
 import pandas as pd
 import pytest
+from openpyxl.utils.escape import unescape
 
 from cli import scenes
 from laufruhe.files.reader import load
@@ -21,7 +22,8 @@ from laufruhe.problem.evaluation import measured
 from laufruhe.report import curves
 from laufruhe.report.sections import SECTIONS
 from laufruhe.report.sheet import Sheet
-from laufruhe.report.tables import sheets_of, write_book, write_tables
+from laufruhe.report.tables import sheets_of, write_tables
+from laufruhe.report.workbook import write_book
 from laufruhe.solvers import Result, state
 from problem_files import PROBLEMS, loaded
 from ready import solved
@@ -163,6 +165,24 @@ def test_pages_of_a_workbook_have_names_that_it_takes(tmp_path: Path) -> None:
     book = openpyxl.load_workbook(tmp_path / "book.xlsx")
     assert book.sheetnames == ["mean force over 'speed-", "a" * 31, "A" * 29 + " 2", "n-a -kg-", "-quoted-"]
     assert [cell.value for cell in book["n-a -kg-"]["A"]] == ["x", 1.5]
+
+
+def test_cells_of_a_workbook_are_what_was_written(tmp_path: Path) -> None:
+    """Every kind of cell through a reader that knows nothing of the writer; more columns than letters."""
+    texts = ['a < b & "c"', " kept ", "two\nlines", "_x0041_", "\x01", "Größe"]
+    numbers = [1.5e-300, -2.25, 1 / 3, np.float64(0.1), np.int64(7), 12, 0]
+    row = [*texts, *numbers, True, np.False_, None, "", math.inf, math.nan, *map(float, range(800))]
+    head = [f"column {k}" for k in range(len(row))]
+    write_book({'a & "b"': Sheet(head, [row, [None] * len(row), row[::-1]])}, tmp_path / "book.xlsx")
+    (page,) = openpyxl.load_workbook(tmp_path / "book.xlsx").worksheets
+    assert (page.title, page.freeze_panes) == ('a & "b"', "A2")
+    expected = [*texts[:3], "_x0041_", "\x01", texts[-1], *numbers, True, False, *[None] * 4, *map(float, range(800))]
+    found = [[unescape(cell.value) if isinstance(cell.value, str) else cell.value for cell in cells] for cells in page]
+    assert found[0] == head
+    assert found[1] == pytest.approx(expected)
+    assert found[3] == pytest.approx(expected[::-1])
+    assert found[2] == [None] * len(row)
+    assert [type(cell) for cell in found[1][13:15]] == [bool, bool]
 
 
 @pytest.mark.slow

@@ -33,7 +33,6 @@ HEAVY = {
     "pyscipopt",
     "scipy",
     "xarray",
-    "xlsxwriter",
     "zarr",
 }
 LATE_ROOMS = ("", "cli")

@@ -10,7 +10,7 @@ import numpy as np
 
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array, ComplexArray
-from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.numerics.spectrum import Spectrum, common_base, orders_equal
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
@@ -80,11 +80,16 @@ class SpeedMap:
 
 
 def speed_map(
-    mounting: ElasticMounting, inertia: Spectrum, gas: Spectrum | None, speeds: Array, least: float = 1e-7
+    mounting: ElasticMounting,
+    inertia: Spectrum,
+    gas: Spectrum | None,
+    speeds: Array,
+    least: float = 1e-7,
+    wanted: Sequence[float] | None = None,
 ) -> SpeedMap:
     """Mount forces at many speeds under the loads of `split_loads`, all orders and speeds solved together.
 
-    Orders under the share `least` of the largest, at every speed, are left out.
+    Orders under the share `least` of the largest, at every speed, are left out, and those that are not `wanted`.
     """
     spectra = [inertia] if gas is None else [inertia, gas]
     base = common_base([spectrum.base for spectrum in spectra])
@@ -95,6 +100,8 @@ def speed_map(
     growth = [np.asarray(speeds, dtype=float) ** 2, np.ones(len(speeds))][: len(spectra)]
     size = sum(np.abs(c).max(axis=1) * g.max(initial=0.0) for c, g in zip(padded, growth, strict=True))
     kept = np.flatnonzero(size > least * np.max(size, initial=0.0))
+    if wanted is not None:
+        kept = kept[orders_equal(kept * float(base), wanted)]
     orders: Array = np.asarray(kept, dtype=float) * float(base)
     parts = [c[kept] for c in padded]
     omegas = np.outer(speeds, orders).reshape(-1)

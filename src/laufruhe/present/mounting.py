@@ -95,8 +95,8 @@ def main_orders(evaluation: Evaluation, mounting: ElasticMounting) -> tuple[floa
     found: dict[float, float] = {}
     for loads in evaluation.loads:
         drive = np.linalg.norm(mounting.drives(loads.wrench.coefficients), axis=1)
-        for order, size in zip(loads.wrench.orders[1:], drive[1:], strict=True):
-            found[float(order)] = max(found.get(float(order), 0.0), float(size))
+        for order, size in zip(loads.wrench.orders[1:].tolist(), drive[1:].tolist(), strict=True):
+            found[order] = max(found.get(order, 0.0), size)
     top = max(found.values(), default=0.0)
     strong = sorted((order for order, size in found.items() if size > MAIN_SHARE * top > 0.0), key=lambda o: -found[o])
     return tuple(strong[:MOST_ORDERS])

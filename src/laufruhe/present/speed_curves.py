@@ -40,10 +40,12 @@ def transmissibility_of(
 
     None of a design on a resonance that nothing damps.
     """
+    loads = split_loads(design.engine, point, design.fidelity)
     try:
-        field = speed_map(mounting_in(design.engine), *split_loads(design.engine, point, design.fidelity), speeds)
+        field = speed_map(mounting_in(design.engine), *loads, speeds, wanted=orders)
     except ModelError:
         return
+    curves = field.transmissibility
     for k, order in enumerate(orders):
         for column in np.flatnonzero(orders_equal(field.orders, order))[:1]:
-            yield k, field.transmissibility[:, column]
+            yield k, curves[:, column]

@@ -8,12 +8,13 @@ from typing import Any
 
 import xarray as xr
 
-from laufruhe.report import files, tables
+from laufruhe.report import files
 from laufruhe.report.document import Block, Bullets, Document, Heading, Illustration, Paragraph
 from laufruhe.report.grid import Grid
 from laufruhe.report.sheet import Sheet
 from laufruhe.report.strict_json import strict
 from laufruhe.report.web_page import as_html
+from laufruhe.report.workbook import write_book
 from laufruhe.studies.part import Part
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.reader import StudyFile
@@ -63,7 +64,7 @@ def write_study(
         if "png" in part.ends:
             drawn[name] = draw(part.picture(data), folder / name)
     if sheets:
-        tables.write_book(sheets, folder / files.BOOK)
+        write_book(sheets, folder / files.BOOK)
     document = study_document(study, datasets, seconds, command)
     pictures = {name: picture() for name, picture in drawn.items()}
     files.write(folder / files.REPORT, document.as_markdown(ending))

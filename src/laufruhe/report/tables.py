@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import csv
 import math
-import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import astuple, fields
-from datetime import UTC, datetime
-from itertools import count
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -26,10 +22,10 @@ from laufruhe.report import files
 from laufruhe.report.curves import CURVES
 from laufruhe.report.sections import SECTIONS
 from laufruhe.report.sheet import Sheet, Sheets
+from laufruhe.report.workbook import write_book
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result
 
 MOST_ROWS = 20 * STEPS
-_WHENEVER = datetime(2000, 1, 1, tzinfo=UTC)
 
 
 def sheets_of(result: Result) -> dict[str, Sheet]:
@@ -157,41 +153,6 @@ def write_csv(sheet: Sheet, path: Path) -> None:
     with path.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(sheet.head)
-        writer.writerows([_plain(cell) for cell in row] for row in sheet.rows)
-
-
-def write_book(sheets: Mapping[str, Sheet], path: Path) -> None:
-    """All sheets as one workbook, heads held in view."""
-    from xlsxwriter import Workbook
-
-    plainly = {"constant_memory": True, "strings_to_formulas": False, "strings_to_urls": False}
-    with Workbook(str(path), plainly) as book:
-        # the same numbers make the same file, whenever they are written
-        book.set_properties({"created": _WHENEVER})
-        for name, sheet in zip(_page_names(sheets), sheets.values(), strict=True):
-            page = book.add_worksheet(name)
-            page.freeze_panes(1, 0)
-            page.write_row(0, 0, [_text(head) for head in sheet.head])
-            for k, row in enumerate(sheet.rows, 1):
-                page.write_row(
-                    k, 0, [_text(plain) if isinstance(plain := _plain(cell), str) else plain for cell in row]
-                )
-
-
-def _page_names(names: Iterable[str]) -> list[str]:
-    """Names of pages: at most 31 letters, none that a workbook forbids, no two that differ in capitals alone."""
-    found: list[str] = []
-    for name in names:
-        whole = re.sub(r"[\[\]:*?/\\]|^'|'$", "-", name)
-        tries = (f"{whole[: 31 - len(end)]}{end}" for k in count(1) for end in [f" {k}" if k > 1 else ""])
-        found.append(next(each for each in tries if each.lower() not in {one.lower() for one in found}))
-    return found
-
-
-def _plain(value: Any) -> Any:
-    return "" if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _text(text: str) -> str:
-    """A text that no spreadsheet takes for a formula."""
-    return f"'{text}" if text[:1] in "=+-@" and text[:1] else text
+        writer.writerows(
+            ["" if isinstance(cell, float) and not math.isfinite(cell) else cell for cell in row] for row in sheet.rows
+        )
