@@ -52,6 +52,7 @@ def test_trade_measures_every_fidelity(tmp_path: Path) -> None:
     for row in data["rows"]:
         assert row["error"] <= row["estimate"], row["name"]
         assert row["regret"] >= -1e-7, row["name"]
+        assert row["optimum"] == pytest.approx((1.0 + row["regret"]) * data["reference"]["optimum"])
         assert min(row["evaluation"], row["gradient"], row["solve"], row["fresh"], row["memory"]) > 0.0
     named = {row["name"]: row for row in data["rows"]}
     assert named["two-order, 720 steps"]["error"] > 1e-4 > named["exact, 2880 steps"]["error"]

@@ -20,20 +20,10 @@ ROWS = 16
 
 def _trade(errors: list[float]) -> Trade:
     rows = tuple(
-        Row(
-            f"fidelity {k}, 720 steps",
-            error,
-            error,
-            1e-5 * (k + 1.0),
-            2e-5,
-            0.01,
-            1e-3,
-            1e5,
-            1e-3 if k % 3 else math.nan,
-            0.0,
-        )
+        Row(f"fidelity {k}, 720 steps", error, error, 1e-5 * (k + 1.0), 2e-5, 0.01, 1e-3, 100_000, 0.5, 0.0,
+            1e-3 if k % 3 else math.nan)
         for k, error in enumerate(errors)
-    )
+    )  # fmt: skip
     unused = cast(Any, None)
     return Trade(scenes.problem_of(scenes.PARTS), rows, 1.0, 0.5, unused, unused, unused)
 

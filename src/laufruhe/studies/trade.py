@@ -54,10 +54,11 @@ class Row:
         where nothing is open, or this fidelity cannot decide it.
     memory
         Largest of an evaluation from nothing [byte].
+    optimum, excess
+        Reference objective of the design that this fidelity decides, and the largest share by which that is beyond a
+        limit at the reference; NaN as above.
     regret
-        Reference objective of this fidelity's optimum over that of the best design known, less one; NaN as above.
-    excess
-        Largest share by which that optimum is beyond a limit at the reference; NaN as above.
+        That objective over the one of the best design known, less one; NaN as above, and where that is zero.
     """
 
     name: str
@@ -68,8 +69,9 @@ class Row:
     solve: float
     fresh: float
     memory: int
-    regret: float
+    optimum: float
     excess: float
+    regret: float = math.nan
 
     @property
     def decides(self) -> bool:
@@ -230,22 +232,22 @@ class _Decided:
         return None
 
     def regretted(self, row: Row) -> Row:
-        """A row with the regret of the objective that it has found."""
-        return replace(row, regret=row.regret / self.least - 1.0 if self.least > 0.0 else math.nan)
+        """A row with its regret, once all designs are known."""
+        return replace(row, regret=row.optimum / self.least - 1.0) if self.least > 0.0 else row
 
 
 def _row(name: str, own: Problem, scale: Scale, decided: _Decided) -> Row:
-    """What is measured of a fidelity; of its design the objective itself, until the best of all is known."""
+    """What is measured of a fidelity; its regret comes when the best of all designs is known."""
     evaluation, truth = evaluate(own), decided.given
     value = objective_value(own, evaluation)
     prepared, gradient = _prepared_times(own)
-    solve_time = found = excess = math.nan
+    solve_time = optimum = excess = math.nan
     if is_open(own) and own.fidelity.mounts != "time":
         started = time.process_time()
         engine = decided.by(own)
         if engine is not None:
             solve_time = time.process_time() - started
-            found, excess = decided.of(engine)
+            optimum, excess = decided.of(engine)
     fresh = seconds(lambda: _from_nothing(own))
     return Row(
         name=name,
@@ -257,7 +259,7 @@ def _row(name: str, own: Problem, scale: Scale, decided: _Decided) -> Row:
         solve=solve_time,
         fresh=fresh,
         memory=_memory(lambda: _from_nothing(own)),
-        regret=found,
+        optimum=optimum,
         excess=excess,
     )
 

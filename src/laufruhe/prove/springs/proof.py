@@ -72,30 +72,27 @@ def is_bounded(problem: Problem) -> bool:
 
 @dataclass(frozen=True)
 class _Ladder:
-    """Shares of the value that are shown one after the other to be out of reach.
-
-    Attributes
-    ----------
-    look
-        With which the whole is looked at before all.
-    most
-        Relaxations.
-    """
+    """Shares of the value that are shown one after the other to be out of reach, in so many relaxations at most."""
 
     shares: tuple[float, ...]
-    look: float
     most: int
+
+    @property
+    def look(self) -> float:
+        """With which the whole is looked at before all: the first that says much of the best design."""
+        return next(share for share in self.shares if share <= LEVELS[0])
 
 
 def _ladder(boxes: SpringBoxes, of_many: bool) -> _Ladder:
     """Straight for the value, but where a box tells little of it: where modes count, or odd multiples hide a mean."""
     asked_for = boxes.problem.search.boxes
     if boxes.modes:
-        return _Ladder(LEVELS, LEVELS[0], MOST_RELAXED if asked_for is None else asked_for)
-    if boxes.takes_off:
-        return _Ladder((*FIRST, *LEVELS), LEVELS[0], FEW_RELAXED if asked_for is None else asked_for)
-    shares = (OF_MANY, 0.0) if of_many else (0.0,)
-    return _Ladder(shares, shares[0], boxes.most_boxes)
+        shares, most = LEVELS, MOST_RELAXED
+    elif boxes.takes_off:
+        shares, most = (*FIRST, *LEVELS), FEW_RELAXED
+    else:
+        shares, most = (OF_MANY, 0.0) if of_many else (0.0,), boxes.most_boxes
+    return _Ladder(shares, most if asked_for is None else asked_for)
 
 
 def _by_levels(boxes: SpringBoxes, room: float, ladder: _Ladder) -> Divided:
