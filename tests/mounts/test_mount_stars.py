@@ -239,7 +239,7 @@ def test_throws_between_bounds_of_their_own_are_decided_with_the_mounts(tmp_path
         assert turned <= high + 1e-7
 
 
-# stiffness of two mounts open together
+# one number is open, the stiffness of both mounts behind
 ONE_OPEN = MOUNTS.replace(OPEN, '"400 N/mm"', 1)
 RADIAL = """
 title = "five in one row"

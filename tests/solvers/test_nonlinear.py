@@ -229,10 +229,6 @@ def test_workers_at_hand_find_what_one_process_finds():
     assert [sum(end[1] for end in ends) for ends in found[:3]] == [1, 7, 13]
 
 
-def total(ends):
-    return sum(end.starts for end in ends)
-
-
 def test_an_optimum_that_one_start_met_is_not_the_last_word():
     x = ca.SX.sym("x", 1)
     bowl = NonlinearProgram(x, (x[0] - 0.3) ** 2, np.array([-4.0]), np.array([4.0]))

@@ -16,7 +16,7 @@ from laufruhe.errors import SolverError
 from laufruhe.machine.block import Block
 from laufruhe.machine.load_case import LoadCase
 from laufruhe.machine.mount import every_spring
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.modes import GRAVITY
 
@@ -43,8 +43,12 @@ class Stops:
     directions: Array
 
     def beyond(self, travel: Array) -> Array:
-        """What of a travel is beyond the gaps, shape (3 springs,)."""
+        """What of travels is beyond the gaps, shape (..., 3 springs)."""
         return np.asarray(travel - np.clip(travel, -self.gaps, self.gaps))
+
+    def added(self, met: Mask) -> Array:
+        """Stiffness of those that are met, shape (..., 6, 6), of a mask (..., 3 springs)."""
+        return np.asarray((self.rows.T * (met * self.stiffness)[..., None, :]) @ self.rows)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +119,7 @@ def _balanced(stiffness: Array, stops: Stops, wrench: Array) -> Array:
     for _ in range(MOST_STEPS):
         over = stops.beyond(stops.rows @ q)
         pull = wrench - stiffness @ q - stops.rows.T @ (stops.stiffness * over)
-        met = stops.rows * (stops.stiffness * (over != 0.0))[:, None]
-        step: Array = np.asarray(np.linalg.solve(stiffness + met.T @ stops.rows, pull), dtype=np.float64)
+        step: Array = np.asarray(np.linalg.solve(stiffness + stops.added(over != 0.0), pull), dtype=np.float64)
         if np.linalg.norm(step) <= CLOSED * np.linalg.norm(q):
             return q
         here, share = energy(q), 1.0

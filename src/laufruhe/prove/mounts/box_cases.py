@@ -8,12 +8,11 @@ its gap. Travels stay within any bounds that are wider than what these make of t
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
-from laufruhe.numerics.arrays import Array, Mask
-from laufruhe.physics.static_cases import case_wrench, stops_of
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.static_cases import Stops, case_wrench, stops_of
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, counted_cases
 from laufruhe.problem.measure import Measure
@@ -32,30 +31,13 @@ _AS_LOADS: Mapping[Channel, Channel] = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class _Stops:
-    """Bump stops in coordinates in which the mass is one: travel per motion, (k, 6), gaps, stiffness and directions."""
-
-    rows: Array
-    gaps: Array
-    stiffness: Array
-    directions: Array
-
-    def beyond(self, travel: Array) -> Array:
-        """What of travels is beyond the gaps, shape (..., k)."""
-        return np.asarray(travel - np.clip(travel, -self.gaps, self.gaps))
-
-    def added(self, which: Mask) -> Array:
-        """Stiffness of those that count, shape (boxes, 6, 6)."""
-        return np.asarray(np.einsum("bk,ki,kj->bij", which * self.stiffness, self.rows, self.rows))
-
-
 def held_loads(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
     """Least of the largest travel or force under load cases over boxes, shape (boxes,) (E60)."""
     mounting, best = model.mounting(model.lower), np.zeros(len(lower))
     found = stops_of(mounting)
     some = found.stiffness > 0.0
-    stops = _Stops(found.rows[some] @ model.root.T, found.gaps[some], found.stiffness[some], found.directions[:, some])
+    # in coordinates in which the mass is one
+    stops = Stops(found.rows[some] @ model.root.T, found.gaps[some], found.stiffness[some], found.directions[:, some])
     for case in counted_cases(asked, model.problem.engine):
         load = model.root @ case_wrench(mounting.block, case)
         with np.errstate(invalid="ignore", over="ignore"):
@@ -63,7 +45,7 @@ def held_loads(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> A
     return best
 
 
-def _least(model: BoxModel, asked: Measure, stops: _Stops, load: Array, lower: Array, upper: Array) -> Array:
+def _least(model: BoxModel, asked: Measure, stops: Stops, load: Array, lower: Array, upper: Array) -> Array:
     """Under one load case."""
     centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
     matrices, soft = model.stiffness(centres), model.stiffness(lower)
@@ -81,7 +63,7 @@ def _least(model: BoxModel, asked: Measure, stops: _Stops, load: Array, lower: A
 
 
 def _with_stops(
-    model: BoxModel, asked: Measure, stops: _Stops, load: Array, boxes: tuple[Array, ...], signs: Array
+    model: BoxModel, asked: Measure, stops: Stops, load: Array, boxes: tuple[Array, ...], signs: Array
 ) -> tuple[Array, Array]:
     """With some stops as springs, by the signs of their travel; and what travels differ by all over a box at first."""
     centres, halves, matrices, soft, met = boxes
@@ -113,7 +95,7 @@ def _with_stops(
     return np.asarray(np.maximum(least.max(axis=1), 0.0)), first
 
 
-def _balanced(matrices: Array, stops: _Stops, load: Array) -> Array:
+def _balanced(matrices: Array, stops: Stops, load: Array) -> Array:
     """Motion at designs, shape (boxes, 6); nothing depends on how near it comes."""
 
     def energy(y: Array) -> Array:
@@ -135,7 +117,7 @@ def _balanced(matrices: Array, stops: _Stops, load: Array) -> Array:
     return np.asarray(y)
 
 
-def _strayed(stops: _Stops, at: Expansion, corner: Array, signs: Array, met: Array) -> tuple[Array, Array]:
+def _strayed(stops: Stops, at: Expansion, corner: Array, signs: Array, met: Array) -> tuple[Array, Array]:
     """What the force of stops may differ from that of springs or of nothing, (boxes, k), infinite if not known; E60."""
     none = np.zeros((len(signs), 1, at.first.shape[2], *stops.rows.shape))
     told = mapped(at, np.broadcast_to(stops.rows, (len(signs), 1, *stops.rows.shape)), none)

@@ -95,7 +95,7 @@ class Replication(Part):
 
     def size(self) -> int:
         """Every case at every combination of its swept numbers, in every reading."""
-        one = sum(math.prod(len(g.values or ()) or g.points or 1 for g in c.sweep.values()) for c in self.cases)
+        one = sum(math.prod(numbers.count for numbers in case.sweep.values()) for case in self.cases)
         return one * len(self._all_readings())
 
     @property

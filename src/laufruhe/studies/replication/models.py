@@ -43,6 +43,11 @@ class GridTable(Table):
             raise f.refusal("is no grid; give values, or from, to and points")
         return self
 
+    @property
+    def count(self) -> int:
+        """How many there are."""
+        return len(self.values or ()) or self.points or 0
+
 
 class ReplicaCase(CaseTable):
     """One case, its numbers in place of those of the part."""
