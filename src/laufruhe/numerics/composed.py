@@ -81,6 +81,9 @@ class Mapped(Composed):
         return self.linear(self.source.sample(samples))
 
 
+_NEVER = object()
+
+
 class Held(Spectrum):
     """A signal that many others have a part in."""
 
@@ -90,8 +93,8 @@ class Held(Spectrum):
 
     def once(self, what: str, asked: Any, made: Callable[[Spectrum], T]) -> T:
         """What is made of it; kept until something else is asked for by the same name."""
-        known, found = self._last.get(what, (None, None))
-        if known is not asked and (known is None or known != asked):
+        known, found = self._last.get(what, (_NEVER, None))
+        if known is not asked and known != asked:
             found = made(self)
             self._last[what] = asked, found
         return cast(T, found)

@@ -85,14 +85,14 @@ class _Ladder:
 
 def _ladder(boxes: SpringBoxes, of_many: bool) -> _Ladder:
     """Straight for the value, but where a box tells little of it: where modes count, or odd multiples hide a mean."""
-    asked_for = boxes.problem.search.boxes
     if boxes.modes:
-        shares, most = LEVELS, MOST_RELAXED
+        found = _Ladder(LEVELS, MOST_RELAXED)
     elif boxes.takes_off:
-        shares, most = (*FIRST, *LEVELS), FEW_RELAXED
+        found = _Ladder((*FIRST, *LEVELS), FEW_RELAXED)
     else:
-        shares, most = (OF_MANY, 0.0) if of_many else (0.0,), boxes.most_boxes
-    return _Ladder(shares, most if asked_for is None else asked_for)
+        found = _Ladder((OF_MANY, 0.0) if of_many else (0.0,), boxes.most_boxes)
+    asked_for = boxes.problem.search.boxes
+    return found if asked_for is None else replace(found, most=asked_for)
 
 
 def _by_levels(boxes: SpringBoxes, room: float, ladder: _Ladder) -> Divided:
