@@ -1,17 +1,34 @@
-"""Pressure of one cylinder over a cycle, and its loads by order of its own crank angle, as tests compare them."""
+"""Pressure and loads of one cylinder, and loads of rods and rotors by themselves, as tests compare them."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.machine import Cycle, SliderCrank
+from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.cylinder_volume import swept_rate
+from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import OneChamber, pressure_at
 from laufruhe.physics.mechanism import mass_effects, rod_effects
-from laufruhe.physics.star_loads import square_of
+from laufruhe.physics.shaking_loads import rotor_loads
+from laufruhe.physics.star_loads import square_of, star_loads
+
+
+def rod_inertia_loads(engine: Engine, speed: float) -> Spectrum:
+    """Roll moment of the rods' inertia deficits, Mx = -dTheta psi'' (1 + n psi') (L4; eqs. 10-12)."""
+    return star_loads(engine, speed, lambda part: rod_effects(part, EXACT))
+
+
+def rotating_loads(engine: Engine, speed: float) -> Spectrum:
+    """Loads of rotating masses at the crank pins and of every rotor (L1)."""
+    return rotor_loads((*engine.pins, *engine.rotors), speed, engine.cycle)
+
+
+def swept_rate(part: SliderCrank, angles: Array) -> Array:
+    """Derivative of `swept_volume` by the crank angle, exact, shape of `angles`."""
+    ratio = part.shaft.ratio
+    return np.asarray(-ratio * part.velocity(np, part.fires_at + ratio * angles) / part.stroke)
 
 
 def indicated_mean_pressure(pressures: Array, part: SliderCrank, cycle: Cycle) -> float:

@@ -21,8 +21,9 @@ from laufruhe.machine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.layouts import Layout, Mechanism, build, even_throws, inline, vee
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
-from laufruhe.physics.shaking_loads import rotating_loads, shaking_loads
+from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.studies.kinds.free_forces import FreeLoad, free_load
+from one_cylinder import rotating_loads
 from problem_files import PROBLEMS
 
 TWO_ORDER = Fidelity(kinematics="two-order")

@@ -22,7 +22,8 @@ from laufruhe.physics.bearing_loads import pin_forces
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import pressure_at
 from laufruhe.physics.gas_loads import gas_loads
-from laufruhe.physics.shaking_loads import reciprocating_loads, rotating_loads
+from laufruhe.physics.shaking_loads import reciprocating_loads
+from one_cylinder import rotating_loads
 
 TWO_ORDER = Fidelity(kinematics="two-order")
 

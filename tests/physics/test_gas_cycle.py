@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle, PressureTrace, Seiliger, Shaft, SliderCrank, Wiebe
-from laufruhe.physics.cylinder_volume import dead_centres, swept_rate, swept_volume
+from laufruhe.physics.cylinder_volume import dead_centres, swept_volume
 from laufruhe.physics.pressure_trace import trace_pressure
 from laufruhe.physics.seiliger_cycle import (
     compression_end_pressure,
@@ -25,7 +25,7 @@ from laufruhe.physics.seiliger_cycle import (
     seiliger_pressure,
 )
 from laufruhe.physics.wiebe_cycle import wiebe_heat, wiebe_pressure
-from one_cylinder import cylinder_pressure, indicated_mean_pressure
+from one_cylinder import cylinder_pressure, indicated_mean_pressure, swept_rate
 
 BAR, AT = 1e5, 98_066.5
 RADIUS = 0.06

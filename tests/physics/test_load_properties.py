@@ -38,10 +38,9 @@ from laufruhe.physics.shaking_loads import (
     EXACT,
     Fidelity,
     reciprocating_loads,
-    rod_inertia_loads,
-    rotating_loads,
     shaking_loads,
 )
+from one_cylinder import rod_inertia_loads, rotating_loads
 
 SPEED = 260.0
 GAS = Seiliger(peak_pressure=78.5e5, imep=5.4e5)

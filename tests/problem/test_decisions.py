@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 
 from laufruhe.files.reader import load
 from laufruhe.machine import Role
-from laufruhe.physics.shaking_loads import rotating_loads, rotor_loads
+from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
+from one_cylinder import rotating_loads
 from problem_files import PROBLEMS, changed, loaded, open_unbalance, shaft, written
 
 ENGINE = """

@@ -31,13 +31,11 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_cycle import thrust_at
 from laufruhe.physics.shaking_loads import (
     reciprocating_loads,
-    rod_inertia_loads,
-    rotating_loads,
     shaking_loads,
 )
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
-from one_cylinder import inertia_coefficients
+from one_cylinder import inertia_coefficients, rod_inertia_loads, rotating_loads
 from problem_files import PROBLEMS, changed, loaded
 from ready import solved
 

@@ -30,12 +30,6 @@ def swept_volume(part: SliderCrank, angles: Array) -> Array:
     return np.asarray((part.travel(np, part.fires_at + _ratio(part) * angles) - highest) / part.stroke)
 
 
-def swept_rate(part: SliderCrank, angles: Array) -> Array:
-    """Derivative of `swept_volume` by the crank angle, exact, shape of `angles`."""
-    ratio = _ratio(part)
-    return np.asarray(-ratio * part.velocity(np, part.fires_at + ratio * angles) / part.stroke)
-
-
 def chamber_volume(part: SliderCrank, since: Array) -> Array:
     """Volume of a chamber over its least [m3], some crank angles after it fired [rad] (Y3)."""
     own = part.swept.chamber

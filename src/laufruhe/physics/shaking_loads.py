@@ -22,7 +22,7 @@ from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_moment
-from laufruhe.physics.mechanism import effects_of, mass_effects, rod_effects
+from laufruhe.physics.mechanism import effects_of, mass_effects
 from laufruhe.physics.star_loads import order_index, star_loads
 from laufruhe.physics.uneven_speed import uneven_geared_loads, uneven_loads, uneven_rotor_loads
 from laufruhe.physics.wrench import plane_parts
@@ -70,16 +70,6 @@ def forget() -> None:
 def reciprocating_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) -> Spectrum:
     """Inertia of the reciprocating masses: F = -m s'' along each axis, and its roll moment (L2, L3, L7)."""
     return star_loads(engine, speed, lambda part: mass_effects(part, fidelity))
-
-
-def rod_inertia_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Roll moment of the rods' inertia deficits, Mx = -dTheta psi'' (1 + n psi') (L4; eqs. 10-12)."""
-    return star_loads(engine, speed, lambda part: rod_effects(part, fidelity))
-
-
-def rotating_loads(engine: Engine, speed: float) -> Spectrum:
-    """Loads of rotating masses at the crank pins and of every rotor (L1)."""
-    return rotor_loads((*engine.pins, *engine.rotors), speed, engine.cycle)
 
 
 def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum:
