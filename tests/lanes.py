@@ -27,4 +27,4 @@ def first_fast(values: Iterable[Any], fast: int, long: Collection[Any] = ()) -> 
 def of_clusters(*libraries: str) -> pytest.MarkDecorator:
     """Skipped where one of these is not installed; imported only where a test runs, which takes every process time."""
     missing = [name for name in libraries if find_spec(name) is None]
-    return pytest.mark.skipif(bool(missing), reason="Dask is not installed: pip install 'laufruhe[cluster]'")
+    return pytest.mark.skipif(bool(missing), reason=f"without {' and '.join(missing)}: pip install 'laufruhe[cluster]'")
