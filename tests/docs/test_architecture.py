@@ -5,6 +5,9 @@ from __future__ import annotations
 import re
 import tomllib
 from pathlib import Path
+from pkgutil import resolve_name
+
+import pytest
 
 from laufruhe.solvers import METHODS
 
@@ -30,6 +33,11 @@ def layers() -> list[set[str]]:
 
 def test_methods_stand_in_the_order_in_which_they_are_asked() -> None:
     assert first_cells("| method | may be open together") == [method.name for method in METHODS]
+
+
+@pytest.mark.slow
+def test_every_method_has_its_home() -> None:
+    assert all(callable(resolve_name(f"laufruhe.solvers.{method.home}")) for method in METHODS)
 
 
 def test_rooms_stand_in_the_order_of_their_imports() -> None:

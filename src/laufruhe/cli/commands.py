@@ -133,7 +133,8 @@ def solve(
     with (
         exit_statuses(problem), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler), artist(kinds) as ask
     ):  # fmt: skip
-        from laufruhe.cli.solve import Request, run, solved
+        from laufruhe.cli.request import Request
+        from laufruhe.cli.solve import run, solved
 
         run(Request("solve", problem, json, out, kinds, ask, animate, tolerance, series), solved)
 
@@ -156,7 +157,8 @@ def evaluate(
     """
     kinds = () if no_plots else kind.kinds
     with exit_statuses(problem), spoken(quiet, verbose), artist(kinds) as ask:
-        from laufruhe.cli.solve import Request, run, stated
+        from laufruhe.cli.request import Request
+        from laufruhe.cli.solve import run, stated
 
         run(Request("evaluate", problem, json, out, kinds, ask, animate, series=series), stated)
 

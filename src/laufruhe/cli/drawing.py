@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 MOST = 3
 """Processes that draw the pictures of a result: what one has imported, its twins need not."""
-SELDOM = 50_000
+SELDOM = 200_000
 """New objects after which a process looks for garbage: marks of pictures are many, and none of them is."""
 
 Ask: TypeAlias = Callable[..., Callable[[], Any]]

@@ -7,10 +7,13 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.load_models.run_look import asks_runs
 from laufruhe.numerics.budget import limited, passed
+from laufruhe.numerics.processes import called
 from laufruhe.numerics.progress import Listener, listening, tell
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import objective_value
@@ -19,25 +22,14 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
 from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.apart import is_apart, solve_apart
-from laufruhe.solvers.boxes.flywheel import solve_flywheel
-from laufruhe.solvers.boxes.leads import solve_leads
-from laufruhe.solvers.boxes.places import solve_places
-from laufruhe.solvers.boxes.shared_leads import solve_shared_leads
-from laufruhe.solvers.boxes.sizes import solve_sizes
-from laufruhe.solvers.boxes.torsion import solve_torsion
-from laufruhe.solvers.conclusion import KEPT, Shown, concluded, judged, none_within, state, with_limits
+from laufruhe.solvers.conclusion import KEPT, Shown, concluded, judged, none_within, with_limits
 from laufruhe.solvers.cones.equal_designs import free_decisions
-from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_sharply
+from laufruhe.solvers.cones.unbalances import beyond_mounts
 from laufruhe.solvers.in_order import solve_in_order
-from laufruhe.solvers.mounts.convex import is_convex, solve_convex_mounts
+from laufruhe.solvers.mounts.convex import is_convex
 from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.runs import solve_runs
-from laufruhe.solvers.stars.phasing import solve_phasing
 from laufruhe.solvers.stars.rooms import surely_broken, with_room
-from laufruhe.solvers.stars.sizes import solve_star_sizes
-from laufruhe.solvers.tolerances.assembly import solve_assembly
-from laufruhe.solvers.tolerances.robust import solve_robust
 
 LIBRARIES = ("casadi", "clarabel", "cvxpy", "pyscipopt")
 """Packages that are imported where something open needs them, named as their modules."""
@@ -58,8 +50,8 @@ class Method:
         Whether what is asked suits it.
     reach
         What its bounds can prove.
-    solve
-        The design, proven as far as it is.
+    home
+        The function below `laufruhe.solvers` that finds the design, proven as far as it is.
     judges_fidelity
         Whether the fidelity is chosen again where the design needs a better one than that given (F11).
     """
@@ -68,36 +60,24 @@ class Method:
     decides: frozenset[Kind]
     suits: Callable[[Problem], bool]
     reach: Reach
-    solve: Callable[[Problem], Result]
+    home: str
     judges_fidelity: bool = False
 
     def decided(self, problem: Problem) -> Result:
-        """The design, accurate as far as that is looked at."""
-        return solve_within(problem, self.solve) if self.judges_fidelity else self.solve(problem)
+        """The design, accurate as far as that is looked at; what decides is imported when it first does."""
+        solve = partial(_by, self.home)
+        return solve_within(problem, solve) if self.judges_fidelity else solve(problem)
+
+
+def _by(home: str, *asked: Any) -> Result:
+    found: Result = called(f"laufruhe.solvers.{home}", *asked)
+    return found
 
 
 def kinds_of(problem: Problem) -> frozenset[Kind]:
     """Kinds of what is open."""
     stars = [Kind.STAR] if problem.phasing is not None else []
     return frozenset([*stars, *(decision.kind for decision in problem.decisions)])
-
-
-def _smooth(problem: Problem) -> Result:
-    from laufruhe.solvers.mounts.nonlinear import solve_joint
-
-    return solve_joint(problem)
-
-
-def _stars_on_mounts(problem: Problem) -> Result:
-    from laufruhe.solvers.mounts.stars import solve_star_mounts
-
-    return solve_star_mounts(problem)
-
-
-def _mounted_sizes(problem: Problem) -> Result:
-    from laufruhe.solvers.mounts.sizes import solve_mounted_sizes
-
-    return solve_mounted_sizes(problem)
 
 
 def _asks_mounted_sizes(problem: Problem) -> bool:
@@ -120,7 +100,8 @@ def _asks_sizes(problem: Problem) -> bool:
     )
 
 
-def _apart(problem: Problem) -> Result:
+def solve_each_apart(problem: Problem) -> Result:
+    """Parts of what is open, each by its own method."""
     return solve_apart(problem, _decided)
 
 
@@ -184,30 +165,33 @@ def _asks_loads(problem: Problem) -> bool:
 
 _U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.FLYWHEEL
 _T = Kind.TORSION
+_CONES, _JOINT = "cones.unbalances:solve_sharply", "mounts.nonlinear:solve_joint"
 METHODS: tuple[Method, ...] = (
-    Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, state),
+    Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, "conclusion:state"),
     Method("boxes of the flywheel", frozenset({_F}), lambda p: all(m.channel.is_flywheel for m in p.measures),
-           Reach.WHOLE, solve_flywheel),
-    Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, solve_torsion, True),
-    Method("boxes of sizes", frozenset({Kind.SIZE, _U}), _asks_sizes, Reach.WHOLE, solve_sizes, True),
-    Method("second-order cones", frozenset({_U, Kind.SHARE}), _asks_loads, Reach.WHOLE, solve_sharply, True),
-    Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE, solve_sharply,
-           True),
-    Method("boxes of leads", frozenset({_U, Kind.LEAD}), _asks_led, Reach.WHOLE, solve_leads, True),
+           Reach.WHOLE, "boxes.flywheel:solve_flywheel"),
+    Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, "boxes.torsion:solve_torsion", True),
+    Method("boxes of sizes", frozenset({Kind.SIZE, _U}), _asks_sizes, Reach.WHOLE, "boxes.sizes:solve_sizes", True),
+    Method("second-order cones", frozenset({_U, Kind.SHARE}), _asks_loads, Reach.WHOLE, _CONES, True),
+    Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE, _CONES, True),
+    Method("boxes of leads", frozenset({_U, Kind.LEAD}), _asks_led, Reach.WHOLE, "boxes.leads:solve_leads", True),
     Method("boxes of leads between shared chambers", frozenset({Kind.LEAD}), _asks_shared, Reach.WHOLE,
-           solve_shared_leads, True),
-    Method("cones over boxes of places", frozenset({_U, _P}), _asks_places, Reach.WHOLE, solve_places, True),
-    Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, solve_phasing, True),
+           "boxes.shared_leads:solve_shared_leads", True),
+    Method("cones over boxes of places", frozenset({_U, _P}), _asks_places, Reach.WHOLE, "boxes.places:solve_places",
+           True),
+    Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, "stars.phasing:solve_phasing",
+           True),
     Method("stars, each with boxes of sizes", frozenset({_S, _U, Kind.SIZE}), _asks_sizes, Reach.WHOLE,
-           solve_star_sizes, True),
-    Method("linear matrix inequalities", frozenset({_K}), is_convex, Reach.WHOLE, solve_convex_mounts),
-    Method("smooth program, boxes of stiffness", frozenset({_K}), _adds_points, Reach.NEAR, _smooth),
-    Method("smooth program", frozenset({_U, _K, _M}), _adds_points, Reach.ASIDE, _smooth),
-    Method("flywheel, crankshaft and the rest apart", frozenset(Kind) - {_S}, is_apart, Reach.ASIDE, _apart),
+           "stars.sizes:solve_star_sizes", True),
+    Method("linear matrix inequalities", frozenset({_K}), is_convex, Reach.WHOLE, "mounts.convex:solve_convex_mounts"),
+    Method("smooth program, boxes of stiffness", frozenset({_K}), _adds_points, Reach.NEAR, _JOINT),
+    Method("smooth program", frozenset({_U, _K, _M}), _adds_points, Reach.ASIDE, _JOINT),
+    Method("flywheel, crankshaft and the rest apart", frozenset(Kind) - {_S}, is_apart, Reach.ASIDE,
+           "methods:solve_each_apart"),
     Method("local programs of sizes and mounts", frozenset({Kind.SIZE, _U, _K, _M}), _asks_mounted_sizes, Reach.ASIDE,
-           _mounted_sizes),
+           "mounts.sizes:solve_mounted_sizes"),
     Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), _asks_stars_on_mounts, Reach.ASIDE,
-           _stars_on_mounts),
+           "mounts.stars:solve_star_mounts"),
 )  # fmt: skip
 """Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
 
@@ -280,9 +264,9 @@ def _decided(problem: Problem) -> Result:
     if problem.ranks:
         return solve_in_order(problem, _decided)
     if problem.assembly is not None:
-        return solve_assembly(problem)
+        return _by("tolerances.assembly:solve_assembly", problem)
     if problem.over is not None:
-        return solve_robust(problem, _decided)
+        return _by("tolerances.robust:solve_robust", problem, _decided)
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
     kinds = kinds_of(problem)
@@ -298,7 +282,7 @@ def _decided(problem: Problem) -> Result:
         moved = tuple(limit for limit in problem.limits if limit not in fixed)
         return with_limits(_decided(problem.changed(limits=moved)), problem.limits)
     if kinds and asks_runs(problem):
-        return solve_runs(problem, kinds, _decided)
+        return _by("runs:solve_runs", problem, kinds, _decided)
     if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
         raise ModelError("flywheel is open, and nothing that is asked depends on it; fix it, or ask for its inertia")
     moving = any(term.measure.channel.is_moved_by(kinds) for term in problem.objective)

@@ -1,0 +1,77 @@
+"""The files of a result, and what of it is shown; imported while its pictures are drawn."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+from laufruhe.cli.request import Request, timed
+from laufruhe.cli.screen import complain, is_quiet
+from laufruhe.live import live_model
+from laufruhe.present.pictures import PICTURES
+from laufruhe.report import files
+from laufruhe.report.json_result import as_json
+from laufruhe.report.result_report import result_document
+from laufruhe.report.tables import write_tables
+from laufruhe.report.web_page import as_html, template
+from laufruhe.solvers.result import Result, Status
+
+
+def write_results(
+    request: Request,
+    result: Result,
+    stage: Path,
+    copy: Path | None,
+    drawn: Callable[[], dict[str, str]],
+    say: Callable[[str], None],
+) -> None:
+    """All files of a result into a folder that exists, and into a copy of the JSON; its times are those of all parts.
+
+    Parameters
+    ----------
+    drawn
+        Waits for the pictures: SVG by their names.
+    """
+    if request.animated:
+        from laufruhe.plots.motion import animate
+
+        say("animating")
+        with timed(result.timing, "animation"):
+            animate(result, stage / files.MOTION)
+    say("writing tables")
+    with timed(result.timing, "tables"):
+        write_tables(result, stage)
+    live, document = live_model(result.problem, result), result_document(result, list(PICTURES), request.command)
+    if request.kinds:
+        say("drawing")
+    with timed(result.timing, "plots"):
+        _get_ready()
+        pictures = drawn()
+    document = document.showing(pictures)
+    files.write(stage / files.REPORT, document.as_markdown(f".{request.kinds[0]}" if request.kinds else ""))
+    files.write(stage / files.PAGE, as_html(document, pictures, live))
+    for place in filter(None, (stage / files.RESULT, copy)):
+        files.write(place, as_json(result, request.series))
+
+
+def _get_ready() -> None:
+    """Load what makes the page and the tables on the screen, while pictures are drawn."""
+    template()
+    if not is_quiet():
+        import_module("laufruhe.report.screen")
+
+
+def show(request: Request, result: Result, folder: Path) -> None:
+    """Tables on the screen, or JSON there and tables beside it."""
+    text = as_json(result, request.series) if request.json == "-" else None
+    if text is not None:
+        sys.stdout.write(text)
+        sys.stdout.flush()
+    if not is_quiet():
+        from laufruhe.report import screen
+
+        screen.show(result, sys.stdout if text is None else sys.stderr, folder)
+    if result.status in (Status.INFEASIBLE, Status.FAILED):
+        complain(f"{result.problem.name}: {result.status}: {result.message}")
