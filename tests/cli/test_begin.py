@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import re
+import shlex
 import tomllib
 from pathlib import Path
 
@@ -11,6 +14,7 @@ from typer.testing import CliRunner
 from laufruhe.cli import app
 from laufruhe.files.reader import load
 from laufruhe.files.ready import SCHEMAS, ready
+from laufruhe.report import files
 from laufruhe.studies.reader import load_study
 from problem_files import PROBLEMS
 
@@ -105,6 +109,55 @@ def test_nothing_is_asked_for_a_file_that_is_there(here: Path, monkeypatch: pyte
     (here / "problem.toml").write_text("mine", encoding="utf-8")
     found = run.invoke(app, ["init"])
     assert (found.exit_code, found.output.count("\n")) == (2, 1)
+
+
+def test_ctrl_c_at_a_question_ends_as_everywhere(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("laufruhe.cli.begin._someone_answers", lambda: True)
+    # an end of what is typed is told in the same way
+    found = run.invoke(app, ["init"], input="\n")
+    assert found.exit_code == 130
+    assert found.stderr == "\nlaufruhe: interrupted, nothing was written\n"
+    assert list(here.iterdir()) == []
+
+
+def test_a_new_folder_is_made_and_the_next_command_can_be_pasted(here: Path) -> None:
+    found = run.invoke(app, ["init", "new folder/it's mine.toml", "--from", "bmw-b48"])
+    assert found.exit_code == 0
+    *_, verb, named = shlex.split(found.output.partition("; then: ")[2])
+    assert (verb, (here / named).is_file()) == ("solve", True)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["init", ".", "--from", "bmw-b48"], "file = .: is a folder; name a file in it"),
+        (["init", "file/x.toml", "--from", "bmw-b48"], "'file' is not a folder); name another place"),
+        (["examples", "tractor-single", "--to", "file"], "'file' is not a folder); name another place"),
+    ],
+)
+def test_what_cannot_be_written_is_refused_before(here: Path, words: list[str], said: str) -> None:
+    (here / "file").write_text("mine", encoding="utf-8")
+    found = run.invoke(app, words)
+    assert (found.exit_code, found.output.count("\n")) == (2, 1)
+    assert said in found.output
+    assert [path.name for path in here.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("words", [["init", "a/b/mine.toml", "--from", "bmw-b48"], ["examples", "tractor-sweeps"]])
+def test_a_full_disk_leaves_nothing_half_written(here: Path, monkeypatch: pytest.MonkeyPatch, words: list[str]) -> None:
+    write = files.write
+
+    def full(path: Path, text: str) -> None:
+        write(path, text[:10])
+        if len([*here.rglob(".unfinished-*")]) == 2:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(files, "write", full)
+    found = run.invoke(app, words)
+    assert (found.exit_code, found.output.count("\n")) == (1, 1)
+    assert re.search(r"'[^']*(schema\.json|\.toml)' cannot be written \(No space left", found.output)
+    assert found.output.endswith("; make room, or name another place\n")
+    assert list(here.iterdir()) == []
 
 
 def test_what_begins_as_a_study_is_run_as_one(here: Path) -> None:

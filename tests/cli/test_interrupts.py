@@ -57,6 +57,36 @@ def test_interrupted_within_seconds(code: str, number: signal.Signals, tmp_path:
     assert {entry.name for entry in (tmp_path / "results").iterdir()} == {"scene"}
 
 
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", None)])
+def test_a_signal_to_the_whole_group_is_an_interrupt(number: signal.Signals, tmp_path: Path) -> None:
+    """As a terminal that is closed, a time limit or a batch system sends it: both processes hear it."""
+    running = started(tmp_path, "import os; os.setpgid(0, 0)\n" + ASLEEP)
+    os.killpg(running.pid, number)
+    out, err = running.communicate(timeout=60)
+    assert (running.returncode, out, err) == (130, "", "laufruhe: interrupted, nothing was written\n")
+    assert {entry.name for entry in tmp_path.rglob("*")} == {"scene.toml"}
+
+
+# before anything is told to be loaded, before the command is known, while pydantic makes something else of it
+EARLY = {
+    "loading": "import builtins, sys\nhere = builtins.__import__\ndef stop(name, *rest):\n    if name == 'laufruhe.cli':\n"
+    "        raise KeyboardInterrupt\n    return here(name, *rest)\nbuiltins.__import__ = stop\n",
+    "typed": "import typer.main as t, os, signal\nt.get_command = lambda *_: os.kill(os.getpid(), signal.SIGINT)\n",
+    "wrapped": "import laufruhe.files.reader as r, os, signal\ndef load(*_):\n    try:\n        os.kill(os.getpid(), signal.SIGINT)"
+    "\n    except KeyboardInterrupt:\n        raise RuntimeError('schema') from None\nr.load = load\n",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("code", EARLY.values(), ids=EARLY)
+def test_an_interrupt_at_any_moment_is_one_line(code: str, tmp_path: Path) -> None:
+    path = written(tmp_path, scenes.TIGHT)
+    words = [sys.executable, "-c", code + "from laufruhe.__main__ import main; main()", "solve", str(path)]
+    found = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+    assert (found.returncode, found.stdout) == (130, "")
+    assert found.stderr == "laufruhe: interrupted, nothing was written\n"
+    assert list(tmp_path.iterdir()) == [path]
+
+
 @pytest.mark.parametrize(
     ("end", "said"), [("os.abort()", "signal 6"), ("(_ for _ in ()).throw(MemoryError())", "more memory")]
 )

@@ -47,6 +47,16 @@ def test_every_command_is_documented() -> None:
         assert f"| {status} |" in page
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs a device that is full")
+def test_output_that_nobody_can_take_is_told(here: Path) -> None:
+    words = [sys.executable, "-m", "laufruhe", "check", str(SINGLE)]
+    with Path("/dev/full").open("w") as full:
+        found = subprocess.run(words, cwd=here, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert found.returncode == 1
+    assert found.stderr.startswith("laufruhe: the output cannot be written (No space left")
+    assert found.stderr.count("\n") == 1
+
+
 def test_quiet_says_nothing_and_writes_all(here: Path) -> None:
     found = run.invoke(app, ["evaluate", str(SINGLE), "-q", "--no-plots"])
     assert (found.exit_code, found.output) == (0, "")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import random
 import signal
 import subprocess
@@ -50,6 +51,18 @@ def held(folder: Path) -> tuple[set[str], set[str]]:
     """Names and contents of a set."""
     found = {path.name: path.read_text() for path in folder.glob("file-*")}
     return set(found), set(found.values())
+
+
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_full_disk_is_told_by_the_folder_that_was_named(inside: bool, tmp_path: Path) -> None:
+    def full() -> None:
+        with staged(Set(tmp_path / "out", "--out", "solve", NAMES)) as stage:
+            raise OSError(errno.ENOSPC, "No space left on device", *([str(stage / NAMES[0])] if inside else []))
+
+    with pytest.raises(OSError, match="No space left") as caught:
+        full()
+    assert caught.value.filename == str(tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from itertools import groupby
@@ -27,7 +28,7 @@ def begun(file: Path, name: str | None) -> str:
     _write({file.parent / other: text for other, text in texts.items()})
     known = ready.ready().get((source or "").removesuffix(".toml"))
     command = "study" if known is not None and known.is_study else "solve"
-    return f"{file}: ready to be changed; then: laufruhe {command} {file}\n"
+    return f"{file}: ready to be changed; then: {shlex.join(['laufruhe', command, str(file)])}\n"
 
 
 def _texts(file: Path, source: str | None) -> dict[str, str]:
@@ -66,7 +67,6 @@ def _known(source: str) -> str:
 def copied(names: Sequence[str], folder: Path) -> str:
     """Ready problems in a folder, with what they refer to; what to say of them."""
     texts = ready.copies(names)
-    folder.mkdir(parents=True, exist_ok=True)
     _write({folder / name: text for name, text in texts.items()})
     return "".join(f"{folder / name}\n" for name in texts)
 
@@ -74,11 +74,15 @@ def copied(names: Sequence[str], folder: Path) -> str:
 def _write(texts: Mapping[Path, str]) -> None:
     """All of them, or none where one would take the place of another file."""
     for path, text in texts.items():
+        above = next(above for above in (path, *path.parents) if above.exists())
+        if path.is_dir():
+            raise refused("file", str(path), "is a folder", "name a file in it")
+        if above != path and not above.is_dir():
+            raise refused("file", str(path), f"cannot be written ('{above}' is not a folder)", "name another place")
         kept = path.name in ready.SCHEMAS
         if path.exists() and not kept and path.read_bytes() != text.encode():
             raise refused("file", str(path), *_TAKEN)
-    for path, text in texts.items():
-        files.write(path, text)
+    files.write_all(texts)
 
 
 def listed() -> str:

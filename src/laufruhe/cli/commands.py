@@ -24,13 +24,14 @@ from laufruhe.cli.screen import (
     INTERRUPTED,
     above_zero,
     at_work,
+    complain,
     exit_statuses,
     handing_out,
     in_time,
     progress,
     spoken,
 )
-from laufruhe.cli.supervised import supervised
+from laufruhe.cli.supervised import is_interrupted, supervised
 from laufruhe.errors import refused
 from laufruhe.numerics.cores import ONE_THREAD
 
@@ -50,6 +51,16 @@ class _Commands(TyperGroup):
                 with exit_statuses(Path("laufruhe")):
                     raise refused(option, "", "stands behind the command", remedy)
         return super().parse_args(ctx, args)
+
+    def make_context(self, *args: Any, **kwargs: Any) -> Any:
+        """As typer, which says nothing of an interrupt while it reads what was typed."""
+        with exit_statuses(Path("laufruhe")):
+            return super().make_context(*args, **kwargs)
+
+    def invoke(self, ctx: Any) -> Any:
+        """As typer, which says nothing of an interrupt before the command has begun."""
+        with exit_statuses(Path("laufruhe")):
+            return super().invoke(ctx)
 
 
 app = typer.Typer(
@@ -303,7 +314,11 @@ def _run() -> NoReturn:
         app()
     except SystemExit as end:
         _leave(end.code if isinstance(end.code, int) else DONE)
-    except KeyboardInterrupt:
+    except BaseException:
+        # a library may make something else of it
+        if not is_interrupted():
+            raise
+        complain("laufruhe: interrupted, nothing was written")
         _leave(INTERRUPTED)
     _leave(DONE)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import math
 import sys
 import time
@@ -19,6 +20,7 @@ QUIET, PLAIN, VERBOSE = -1, 0, 1
 _loudness: ContextVar[int] = ContextVar("loudness", default=PLAIN)
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+_FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
 @contextmanager
@@ -100,8 +102,9 @@ def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was writt
     except SolverError as error:
         complain(printed(f"{path}: {error}"))
         raise typer.Exit(FAILED) from None
-    except KeyboardInterrupt:
-        complain(f"laufruhe: {interrupted}")
+    except (KeyboardInterrupt, typer.Abort) as end:
+        # the latter at a question, which stands on the line before
+        complain("\n" * isinstance(end, typer.Abort) + f"laufruhe: {interrupted}")
         raise typer.Exit(INTERRUPTED) from None
     except MemoryError:
         complain(f"{printed(str(path))}: needs more memory than there is; ask for less at once")
@@ -110,8 +113,10 @@ def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was writt
         # whoever read the output has gone; click ends quietly
         raise
     except OSError as error:
-        what = f"'{printed(str(error.filename))}'" if error.filename else "results"
-        complain(f"laufruhe: {what} cannot be written ({error.strerror or error})")
+        # what has no name of its own goes to the screen, or to where that was sent
+        what = f"'{printed(str(error.filename))}'" if error.filename else "the output"
+        remedy = "make room, or name another place" if error.errno in _FULL else "name another place"
+        complain(f"laufruhe: {what} cannot be written ({error.strerror or error}); {remedy}")
         raise typer.Exit(FAILED) from None
 
 

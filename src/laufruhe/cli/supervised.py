@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from types import FrameType
 from typing import NoReturn
 
@@ -15,6 +16,7 @@ from laufruhe.numerics.cores import end_with_parent
 PATIENCE = 2
 """Seconds in which an interrupted command may tidy up; a solver that does not listen is ended then."""
 
+_heard: list[int] = []
 _HANDED_ON = (signal.SIGINT, signal.SIGTERM, *((signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()))
 
 
@@ -28,19 +30,24 @@ def supervised(work: Callable[[], NoReturn]) -> NoReturn:
     child = os.fork()
     if child == 0:
         end_with_parent(watching)
-        signal.signal(signal.SIGINT, _interrupted)
+        # a signal to the whole group comes here as well
+        for number in _HANDED_ON:
+            signal.signal(number, _interrupted)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _HANDED_ON)
         work()
     ended_here = False
 
     def interrupt(*_: object) -> None:
-        os.kill(child, signal.SIGINT)
+        # it may have just ended
+        with suppress(ProcessLookupError):
+            os.kill(child, signal.SIGINT)
         signal.alarm(PATIENCE)
 
     def end(*_: object) -> None:
         nonlocal ended_here
         ended_here = True
-        os.kill(child, signal.SIGKILL)
+        with suppress(ProcessLookupError):
+            os.kill(child, signal.SIGKILL)
 
     for number in _HANDED_ON:
         signal.signal(number, interrupt)
@@ -52,12 +59,24 @@ def supervised(work: Callable[[], NoReturn]) -> NoReturn:
     if ended_here:
         sys.stderr.write("laufruhe: interrupted\n")
         os._exit(INTERRUPTED)
-    ended = f"by signal {os.WTERMSIG(status)}, most likely for want of memory; ask for less at once"
-    sys.stderr.write(f"laufruhe: the computation was ended {ended}\n")
+    number = os.WTERMSIG(status)
+    why = (
+        "most likely for want of memory; ask for less at once"
+        if number == signal.SIGKILL
+        else "which is a defect; report it"
+    )
+    sys.stderr.write(f"laufruhe: the computation was ended by signal {number}, {why}\n")
     os._exit(FAILED)
 
 
-def _interrupted(_: int, __: FrameType | None) -> None:
+def _interrupted(number: int, _: FrameType | None) -> None:
     """Once: what tidies up is not interrupted again."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    raise KeyboardInterrupt
+    first = not is_interrupted()
+    _heard.append(number)
+    if first:
+        raise KeyboardInterrupt
+
+
+def is_interrupted() -> bool:
+    """Whether this command was told to end."""
+    return bool(_heard)

@@ -8,7 +8,7 @@ import json
 import os
 import secrets
 import shutil
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -112,7 +112,8 @@ def staged(wanted: Set) -> Iterator[Path]:
             # there may be none, or none while another run puts its own there
             with suppress(FileNotFoundError):
                 shutil.copymode(wanted.folder, stage)
-        yield stage
+        with _named(stage, wanted.folder):
+            yield stage
         with held(wanted.folder.parent):
             made = wanted.checked()
             if wanted.adds:
@@ -130,6 +131,17 @@ def _reporting(wanted: Set) -> Iterator[None]:
         yield
     except OSError as error:
         raise wanted.refused(f"cannot be written ({error.strerror or error})") from None
+
+
+@contextmanager
+def _named(stage: Path, wanted: Path) -> Iterator[None]:
+    """What cannot be written is told by the name that was asked for, not by that of its stage."""
+    try:
+        yield
+    except OSError as error:
+        if error.filename is None or stage in Path(os.fsdecode(error.filename)).parents:
+            error.filename = str(wanted)
+        raise
 
 
 @contextmanager
@@ -156,7 +168,8 @@ def staged_file(path: Path, option: str) -> Iterator[Path]:
     with ExitStack() as until_then:
         with _reporting(place):
             stage = until_then.enter_context(_stage_for(path))
-        yield stage / path.name
+        with _named(stage, path):
+            yield stage / path.name
         if (stage / path.name).exists():
             os.replace(stage / path.name, path)
 
@@ -165,6 +178,25 @@ def write(path: Path, text: str) -> None:
     """Text as UTF-8, the same on every system."""
     # a file name that is no text leaves lone surrogates behind; JSON writes them as \udcxx
     path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+
+
+def write_all(texts: Mapping[Path, str]) -> None:
+    """Texts as files, whole and all of them, or none; folders are made."""
+    with ExitStack() as undone:
+        staged = {}
+        for path, text in texts.items():
+            missing = [above for above in path.parents if not above.exists()]
+            undone.callback(_remove_empty, missing)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            stage = staged[path] = path.with_name(f".unfinished-{secrets.token_hex(8)}")
+            undone.callback(stage.unlink, missing_ok=True)
+            try:
+                write(stage, text)
+            except OSError as error:
+                error.filename = str(path)
+                raise
+        for path, stage in staged.items():
+            os.replace(stage, path)
 
 
 def _is_data(path: Path) -> bool:
