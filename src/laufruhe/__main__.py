@@ -3,18 +3,14 @@
 import os
 import sys
 
+try:
+    from laufruhe.cli import main
+except KeyboardInterrupt:
+    sys.stderr.write("laufruhe: interrupted, nothing was written\n")
+    # after an interrupted import Python would kill itself by the signal in its place
+    os._exit(130)
 
-def main() -> None:
-    """Entry point; Ctrl-C while the command line is still being loaded ends in one line too."""
-    try:
-        from laufruhe.cli import main as run
-
-        run()
-    except KeyboardInterrupt:
-        sys.stderr.write("laufruhe: interrupted, nothing was written\n")
-        # after an interrupted import Python would kill itself by the signal in its place
-        os._exit(130)
-
+__all__ = ["main"]
 
 if __name__ == "__main__":
     main()

@@ -69,12 +69,29 @@ def test_a_signal_to_the_whole_group_is_an_interrupt(number: signal.Signals, tmp
 
 # before anything is told to be loaded, before the command is known, while pydantic makes something else of it
 EARLY = {
-    "loading": "import builtins, sys\nhere = builtins.__import__\ndef stop(name, *rest):\n    if name == 'laufruhe.cli':\n"
-    "        raise KeyboardInterrupt\n    return here(name, *rest)\nbuiltins.__import__ = stop\n",
-    "typed": "import typer.main as t, os, signal\nt.get_command = lambda *_: os.kill(os.getpid(), signal.SIGINT)\n",
-    "wrapped": "import laufruhe.files.reader as r, os, signal\ndef load(*_):\n    try:\n        os.kill(os.getpid(), signal.SIGINT)"
-    "\n    except KeyboardInterrupt:\n        raise RuntimeError('schema') from None\nr.load = load\n",
-}  # fmt: skip
+    "loading": """
+import builtins
+here = builtins.__import__
+def stop(name, *rest):
+    if name == "laufruhe.cli":
+        raise KeyboardInterrupt
+    return here(name, *rest)
+builtins.__import__ = stop
+""",
+    "typed": """
+import os, signal, typer.main
+typer.main.get_command = lambda *_: os.kill(os.getpid(), signal.SIGINT)
+""",
+    "wrapped": """
+import os, signal, laufruhe.files.reader
+def load(*_):
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+    except KeyboardInterrupt:
+        raise RuntimeError("schema") from None
+laufruhe.files.reader.load = load
+""",
+}
 
 
 @pytest.mark.parametrize("code", EARLY.values(), ids=EARLY)

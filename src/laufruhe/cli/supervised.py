@@ -54,19 +54,16 @@ def supervised(work: Callable[[], NoReturn]) -> NoReturn:
     signal.signal(signal.SIGALRM, end)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, _HANDED_ON)
     _, status = os.waitpid(child, 0)
-    if os.WIFEXITED(status):
-        os._exit(os.WEXITSTATUS(status))
-    if ended_here:
-        sys.stderr.write("laufruhe: interrupted\n")
-        os._exit(INTERRUPTED)
-    number = os.WTERMSIG(status)
-    why = (
-        "most likely for want of memory; ask for less at once"
-        if number == signal.SIGKILL
-        else "which is a defect; report it"
-    )
-    sys.stderr.write(f"laufruhe: the computation was ended by signal {number}, {why}\n")
-    os._exit(FAILED)
+    if not os.WIFEXITED(status):
+        sys.stderr.write("laufruhe: interrupted\n" if ended_here else _sudden(os.WTERMSIG(status)))
+    os._exit(os.WEXITSTATUS(status) if os.WIFEXITED(status) else INTERRUPTED if ended_here else FAILED)
+
+
+def _sudden(number: int) -> str:
+    """What is said of an end that nobody asked for."""
+    for_want = "most likely for want of memory; ask for less at once"
+    why = for_want if number == signal.SIGKILL else "which is a defect; report it"
+    return f"laufruhe: the computation was ended by signal {number}, {why}\n"
 
 
 def _interrupted(number: int, _: FrameType | None) -> None:
