@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from laufruhe.numerics.workers import HERE, working_on
-from laufruhe.prove.springs.ends import ends_ahead
+from laufruhe.prove.springs.ends import Aims, ends_ahead
+from laufruhe.prove.springs.program import Stated
 from laufruhe.prove.springs.proof import narrowed, spring_bound
 from laufruhe.prove.springs.search import SpringBoxes
 from prove.test_mode_boxes import NEAR, decoupled, designs_about
@@ -29,3 +30,18 @@ def test_whoever_works_them_out() -> None:
     (box, solved, bound), (other, counted, proven) = found
     assert np.array_equal(box, other)
     assert (solved, bound) == (counted, proven)
+
+
+def test_aims_are_those_of_their_own_program_and_box() -> None:
+    """Whatever was stated, or looked at, before."""
+    problem = decoupled(2)
+    best, least = min(designs_about(problem, NEAR[:2], 6), key=lambda pair: pair[1])
+    boxes, anew = (SpringBoxes(problem, 1.02 * least, 1e-3, best.tolist()) for _ in range(2))
+    middle = 0.5 * (boxes.lower + boxes.upper)
+    boxes.look(boxes.lower, middle)
+    half, whole = (boxes.left(boxes.lower, upper)[0] for upper in (middle, boxes.upper))
+    aim = np.eye(whole.numbers + 5 * len(boxes.modes))[0]
+    found = [Aims(program, None).least(0, aim)[0] for program in (whole, half, whole)]
+    alone = [Stated(program).least(aim)[0] for program in (anew.left(boxes.lower, boxes.upper)[0], half)]
+    assert found == [*alone, alone[0]]
+    assert alone[0] != alone[1]

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from laufruhe.machine import Engine, Role
+from laufruhe.machine import Engine, OperatingPoint, Role
 from laufruhe.machine.clearances import Span, distances, reaches
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.bearing_loads import (
@@ -24,15 +24,12 @@ from laufruhe.physics.bearing_loads import (
     piston_pin_forces,
 )
 from laufruhe.physics.crank_torque import crank_torque
+from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.apexes import OF_APEXES
 from laufruhe.problem.channels.flywheel import OF_FLYWHEEL
 from laufruhe.problem.channels.kinds import (
-    AT_BEARINGS,
-    AT_CYLINDERS,
     AT_MOUNTS,
-    IN_CYLINDERS,
-    OF_BEARINGS,
     OF_MOUNTS,
     ON_BLOCK,
     Channel,
@@ -43,7 +40,6 @@ from laufruhe.problem.channels.kinds import (
     NumberChannel,
     PlaceChannel,
     SizeChannel,
-    of_what_moves,
 )
 from laufruhe.problem.channels.mounting import (
     DECOUPLING,
@@ -62,7 +58,15 @@ from laufruhe.problem.channels.mounting import (
     mounting_in,
 )
 from laufruhe.problem.channels.runs import OF_RUNS, RUN_FORCE, RUN_TRAVEL, RUN_TWIST
-from laufruhe.problem.channels.sizes import OF_SIZES, names_of_bearings, names_of_cylinders, sized
+from laufruhe.problem.channels.sizes import (
+    AT_EACH_BEARING,
+    AT_EACH_CRANK_PIN,
+    IN_EACH_CYLINDER,
+    OF_EACH_BEARING,
+    OF_SIZES,
+    Where,
+    inside,
+)
 from laufruhe.problem.channels.torsional import TORSIONAL
 from laufruhe.problem.loads import PointLoads
 
@@ -114,12 +118,15 @@ def _on_mounts(name: str, unit: str, needs: Needs, signal: Callable[[PointLoads]
     return LoadChannel(name, unit, AT_MOUNTS, needs, signal=found, places=_names_of_mounts)
 
 
-def _inside(
-    name: str, unit: str, keys: tuple[str, ...], needs: Needs, places: Callable[[Engine], Sequence[str]],
-    signal: Callable[[Engine, PointLoads], Spectrum],
-) -> LoadChannel:  # fmt: skip
-    found = of_what_moves(name, signal)
-    return LoadChannel(name, unit, keys, needs, signal=found, places=places, is_inside=True)
+_ON_CRANK: Where = (ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",))
+
+
+def _crank_torque(moving: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    return crank_torque(moving, point, fidelity).each(lambda values: values[:, None, None])
+
+
+def _side_forces(moving: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    return piston_pin_forces(moving, point, fidelity).each(lambda values: values[..., 1:])
 
 
 def _names_of_mounts(engine: Engine) -> Sequence[str]:
@@ -140,43 +147,17 @@ ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6), lever=1)
 ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4))
 SURGING_FORCE = _on_block("surging force", "N", slice(1, 2), lever=0)
 SWAYING_COUPLE = _on_block("swaying couple", "N m", slice(5, 6), lever=1)
-MAIN_BEARING_FORCE = _inside(
-    "main-bearing force", "N", AT_BEARINGS, Needs.BEARINGS, names_of_bearings,
-    lambda moving, at: main_bearing_forces(moving, at.point, at.fidelity),
-)  # fmt: skip
-MAIN_BEARING_PRESSURE = sized(
-    "main-bearing pressure", "Pa", AT_BEARINGS, Needs.BEARINGS, names_of_bearings, main_bearing_forces, bearing_factors
-)
-HAMMER_BLOW = _inside(
-    "hammer blow", "N", OF_BEARINGS, Needs.BEARINGS, names_of_bearings,
-    lambda moving, at: hammer_blows(moving, at.point, at.fidelity),
-)  # fmt: skip
-CRANK_TORQUE = _inside(
-    "crank torque", "N m", ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",),
-    lambda moving, at: crank_torque(moving, at.point, at.fidelity).each(lambda values: values[:, None, None]),
-)  # fmt: skip
-STORED_WORK = _inside(
-    "stored work", "J", ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",),
-    lambda moving, at: crank_torque(moving, at.point, at.fidelity).integral.each(lambda values: values[:, None, None]),
-)  # fmt: skip
-CRANK_PIN_FORCE = _inside(
-    "crank-pin force", "N", AT_CYLINDERS, Needs.NOTHING, names_of_cylinders,
-    lambda moving, at: pin_forces(moving, at.point, at.fidelity),
-)  # fmt: skip
-CRANK_PIN_PRESSURE = sized(
-    "crank-pin pressure", "Pa", AT_CYLINDERS, Needs.NOTHING, names_of_cylinders, pin_forces, crank_pin_factors
-)
-SIDE_FORCE = _inside(
-    "side force", "N", IN_CYLINDERS, Needs.NOTHING, names_of_cylinders,
-    lambda moving, at: piston_pin_forces(moving, at.point, at.fidelity).each(lambda values: values[..., 1:]),
-)  # fmt: skip
-ROD_FORCE = _inside(
-    "rod force", "N", IN_CYLINDERS, Needs.NOTHING, names_of_cylinders,
-    lambda moving, at: piston_pin_forces(moving, at.point, at.fidelity),
-)  # fmt: skip
+MAIN_BEARING_FORCE = inside("main-bearing force", "N", AT_EACH_BEARING, main_bearing_forces)
+MAIN_BEARING_PRESSURE = inside("main-bearing pressure", "Pa", AT_EACH_BEARING, main_bearing_forces, bearing_factors)
+HAMMER_BLOW = inside("hammer blow", "N", OF_EACH_BEARING, hammer_blows)
+CRANK_TORQUE = inside("crank torque", "N m", _ON_CRANK, _crank_torque)
+STORED_WORK = inside("stored work", "J", _ON_CRANK, lambda *asked: _crank_torque(*asked).integral)
+CRANK_PIN_FORCE = inside("crank-pin force", "N", AT_EACH_CRANK_PIN, pin_forces)
+CRANK_PIN_PRESSURE = inside("crank-pin pressure", "Pa", AT_EACH_CRANK_PIN, pin_forces, crank_pin_factors)
+SIDE_FORCE = inside("side force", "N", IN_EACH_CYLINDER, _side_forces)
+ROD_FORCE = inside("rod force", "N", IN_EACH_CYLINDER, piston_pin_forces)
 FRICTION_POWER = replace(
-    sized("friction power", "W", OF_BEARINGS, Needs.BEARINGS, names_of_bearings, main_bearing_forces, drag_factors),
-    adds_up=True,
+    inside("friction power", "W", OF_EACH_BEARING, main_bearing_forces, drag_factors), adds_up=True
 )
 
 COUNTERWEIGHT_MASS = MassChannel("counterweight mass", "kg", roles=(Role.COUNTERWEIGHT,))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
@@ -15,6 +16,7 @@ from laufruhe.problem.channels.kinds import (
     AT_CYLINDERS,
     AT_WEBS,
     IN_CYLINDERS,
+    OF_BEARINGS,
     LoadChannel,
     Needs,
     SizeChannel,
@@ -23,13 +25,11 @@ from laufruhe.problem.channels.kinds import (
 from laufruhe.problem.loads import PointLoads
 
 
-def names_of_bearings(engine: Engine) -> Sequence[str]:
-    """Of every main bearing."""
+def _names_of_bearings(engine: Engine) -> Sequence[str]:
     return [bearing.name for bearing in engine.bearings]
 
 
-def names_of_cylinders(engine: Engine) -> Sequence[str]:
-    """Of every cylinder."""
+def _names_of_cylinders(engine: Engine) -> Sequence[str]:
     return [part.name for part in engine.slider_cranks]
 
 
@@ -38,19 +38,31 @@ def _names_of_sides(engine: Engine) -> Sequence[str]:
     return [f"{part.name} {side}" for part in engine.slider_cranks for side in ("front", "rear")]
 
 
-def sized(
-    name: str, unit: str, keys: tuple[str, ...], needs: Needs, places: Callable[[Engine], Sequence[str]],
-    load: Callable[[Engine, OperatingPoint, Fidelity], Spectrum], factor: strength.Factor,
-) -> LoadChannel:  # fmt: skip
-    """A load of every place, times a factor of its sizes."""
+Where: TypeAlias = tuple[tuple[str, ...], Needs, Callable[[Engine], Sequence[str]]]
+"""Keys that narrow a load, what it needs, and the names of its places."""
+IN_EACH_CYLINDER: Where = (IN_CYLINDERS, Needs.NOTHING, _names_of_cylinders)
+AT_EACH_CRANK_PIN: Where = (AT_CYLINDERS, Needs.NOTHING, _names_of_cylinders)
+AT_EACH_BEARING: Where = (AT_BEARINGS, Needs.BEARINGS, _names_of_bearings)
+OF_EACH_BEARING: Where = (OF_BEARINGS, Needs.BEARINGS, _names_of_bearings)
+_BETWEEN_BEARINGS: Where = (AT_CYLINDERS, Needs.BEARINGS, _names_of_cylinders)
+_AT_EACH_WEB: Where = (AT_WEBS, Needs.BEARINGS, _names_of_sides)
+Load: TypeAlias = Callable[[Engine, OperatingPoint, Fidelity], Spectrum]
+
+
+def inside(name: str, unit: str, where: Where, load: Load, factor: strength.Factor | None = None) -> LoadChannel:
+    """A load inside the crankcase, of every place, times a factor of its sizes where one is given."""
 
     def signal(moving: Engine, at: PointLoads) -> Spectrum:
+        found = load(moving, at.point, at.fidelity)
+        if factor is None:
+            return found
         factors = factor(moving, at.point)
         by = factors if factors.ndim > 1 else factors[:, None]
-        return load(moving, at.point, at.fidelity).each(lambda values: values * by)
+        return found.each(lambda values: values * by)
 
-    found = of_what_moves(name, signal)
-    return LoadChannel(name, unit, keys, needs, signal=found, places=places, is_inside=True, of_sizes=factor)
+    keys, needs, places = where
+    told = of_what_moves(name, signal)
+    return LoadChannel(name, unit, keys, needs, signal=told, places=places, is_inside=True, of_sizes=factor)
 
 
 def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
@@ -69,50 +81,24 @@ def _number(
     )  # fmt: skip
 
 
-CRANK_PIN_STRESS = sized(
-    "crank-pin bending stress", "Pa", AT_CYLINDERS, Needs.BEARINGS, names_of_cylinders,
-    strength.pin_moments, strength.big_end_factors,
-)  # fmt: skip
-WEB_STRESS = sized(
-    "web stress", "Pa", AT_WEBS, Needs.BEARINGS, _names_of_sides, strength.side_forces, strength.web_factors
+CRANK_PIN_STRESS = inside(
+    "crank-pin bending stress", "Pa", _BETWEEN_BEARINGS, strength.pin_moments, strength.big_end_factors
 )
-JOURNAL_TORSION = sized(
-    "journal torsion stress", "Pa", AT_BEARINGS, Needs.BEARINGS, names_of_bearings, _torques, strength.journal_factors
+WEB_STRESS = inside("web stress", "Pa", _AT_EACH_WEB, strength.side_forces, strength.web_factors)
+JOURNAL_TORSION = inside("journal torsion stress", "Pa", AT_EACH_BEARING, _torques, strength.journal_factors)
+JOURNAL_STRESS = inside("journal stress", "Pa", _AT_EACH_WEB, strength.side_loads, strength.side_factors)
+MAIN_BEARING_PV = inside(
+    "main-bearing pressure times speed", "W/m^2", AT_EACH_BEARING, main_bearing_forces, strength.journal_speeds
 )
-JOURNAL_STRESS = sized(
-    "journal stress", "Pa", AT_WEBS, Needs.BEARINGS, _names_of_sides, strength.side_loads, strength.side_factors
+ROD_STRESS = inside("rod stress", "Pa", IN_EACH_CYLINDER, piston_pin_forces, strength.rod_stress_factors)
+ROD_BUCKLING = inside("share of the buckling load", "", IN_EACH_CYLINDER, piston_pin_forces, strength.buckling_factors)
+BOLT_STRESS = inside("bolt stress", "Pa", IN_EACH_CYLINDER, strength.cap_forces, strength.bolt_factors)
+PIN_PRESSURE = inside("piston-pin pressure", "Pa", IN_EACH_CYLINDER, piston_pin_forces, strength.boss_factors)
+PIN_STRESS = inside(
+    "piston-pin bending stress", "Pa", IN_EACH_CYLINDER, piston_pin_forces, strength.pin_bending_factors
 )
-MAIN_BEARING_PV = sized(
-    "main-bearing pressure times speed", "W/m^2", AT_BEARINGS, Needs.BEARINGS, names_of_bearings,
-    main_bearing_forces, strength.journal_speeds,
-)  # fmt: skip
-ROD_STRESS = sized(
-    "rod stress", "Pa", IN_CYLINDERS, Needs.NOTHING, names_of_cylinders,
-    piston_pin_forces, strength.rod_stress_factors,
-)  # fmt: skip
-ROD_BUCKLING = sized(
-    "share of the buckling load", "", IN_CYLINDERS, Needs.NOTHING, names_of_cylinders,
-    piston_pin_forces, strength.buckling_factors,
-)  # fmt: skip
-BOLT_STRESS = sized(
-    "bolt stress", "Pa", IN_CYLINDERS, Needs.NOTHING, names_of_cylinders, strength.cap_forces, strength.bolt_factors
-)
-PIN_PRESSURE = sized(
-    "piston-pin pressure", "Pa", IN_CYLINDERS, Needs.NOTHING, names_of_cylinders,
-    piston_pin_forces, strength.boss_factors,
-)  # fmt: skip
-PIN_STRESS = sized(
-    "piston-pin bending stress", "Pa", IN_CYLINDERS, Needs.NOTHING, names_of_cylinders,
-    piston_pin_forces, strength.pin_bending_factors,
-)  # fmt: skip
-PIN_DEFLECTION = sized(
-    "piston-pin deflection", "m", IN_CYLINDERS, Needs.NOTHING, names_of_cylinders,
-    piston_pin_forces, strength.deflection_factors,
-)  # fmt: skip
-PIN_OVALITY = sized(
-    "piston-pin ovality", "m", IN_CYLINDERS, Needs.NOTHING, names_of_cylinders,
-    piston_pin_forces, strength.ovality_factors,
-)  # fmt: skip
+PIN_DEFLECTION = inside("piston-pin deflection", "m", IN_EACH_CYLINDER, piston_pin_forces, strength.deflection_factors)
+PIN_OVALITY = inside("piston-pin ovality", "m", IN_EACH_CYLINDER, piston_pin_forces, strength.ovality_factors)
 THROW_CLEARANCE = _number("throw clearance", "m", Needs.BEARINGS, ("min",), strength.throw_clearance)
 GEAR_MASS = _number("running-gear mass", "kg", Needs.NOTHING, ("max",), strength.gear_mass)
 OF_SIZES = (
