@@ -9,8 +9,10 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+import laufruhe
 from cli import scenes
 from laufruhe.cli import app
+from laufruhe.numerics.workers import HERE, working_on
 from problem_files import PROBLEMS, written
 
 RUN = CliRunner()
@@ -57,6 +59,23 @@ def test_trade_measures_every_fidelity(tmp_path: Path) -> None:
     named = {row["name"]: row for row in data["rows"]}
     assert named["two-order, 720 steps"]["error"] > 1e-4 > named["exact, 2880 steps"]["error"]
     assert named["auto 0.001"]["error"] <= 1e-3
+
+
+@pytest.mark.slow
+def test_trade_of_several_tells_each_by_its_name(tmp_path: Path) -> None:
+    """Whatever is measured first: what takes long, which is named last here."""
+    paths = [written(tmp_path, text, name) for name, text in (("given", scenes.GIVEN), ("open", scenes.TIGHT))]
+    out = tmp_path / "trade.json"
+    with working_on(HERE):
+        words = ["trade", *map(str, paths), "--out", str(tmp_path / "trade"), "--json", str(out)]
+        answer = RUN.invoke(app, words)
+    assert answer.exit_code == 0, answer.output
+    told = json.loads(out.read_text(encoding="utf-8"))
+    assert [one["problem"] for one in told] == ["given", "open"]
+    assert [one["reference"]["optimum"] is None for one in told] == [True, False]
+    for one, path in zip(told, paths, strict=True):
+        assert one["reference"]["objective"] == pytest.approx(laufruhe.evaluate(path).objective.value, rel=1e-3)
+        assert one["problem"] in (tmp_path / f"trade/{path.stem}.md").read_text(encoding="utf-8")
 
 
 def test_trade_of_a_damaged_file(tmp_path: Path) -> None:

@@ -193,6 +193,24 @@ def test_signals_made_of_others_are_those_that_their_coefficients_tell(highest: 
         summed.held.sample(48)[0] = 1.0
 
 
+def test_what_is_kept_of_a_shared_part_is_not_taken_for_another_sum() -> None:
+    """Sums repeat as often as their own parts let them, in whatever order these come."""
+
+    def at_every(step: int) -> Spectrum:
+        coefficients = np.zeros((1 + 2 * step, 2), dtype=complex)
+        coefficients[::step] = 1.0
+        return Spectrum(Fraction(1, 2), coefficients)
+
+    shared = held(at_every(12))
+    for step in (4, 6, 4, 1, 12):
+        for also in ((), (Fraction(3, 4),), ()):
+            summed, plain = Summed(shared, at_every(step)), at_every(12) + at_every(step)
+            base = summed.repeats(also)
+            assert base == plain.repeats(also) == (Fraction(1, 4) * math.gcd(2 * step, 3) if also else step / 2)
+            np.testing.assert_allclose(summed.over(base).sample(48), plain.over(base).sample(48), atol=1e-12)
+            np.testing.assert_allclose(summed.sample(48 + step), plain.sample(48 + step), atol=1e-12)
+
+
 def test_orders_are_told_apart_to_a_thousandth() -> None:
     orders = [0.0, 0.5, 1.0 / 3.0, 1.0, 1.001]
     assert orders_equal(orders, (0.3333, 1.0)).tolist() == [False, False, True, True, False]

@@ -24,6 +24,7 @@ from laufruhe.numerics.workers import (
     Here,
     TimeIsOver,
     WorkersGone,
+    at_hand,
     count_of,
     each,
     executor_for,
@@ -148,6 +149,28 @@ def test_at_the_time_limit_patience_waits_for_what_was_begun() -> None:
             list(each(time.sleep, pieces, pool))
         begun = list(each(time.sleep, pieces, pool, patient=True))
     assert 1 <= len(begun) < 50
+
+
+@pytest.mark.slow
+def test_processes_at_hand_end_with_the_searches(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also in the middle of a call."""
+    monkeypatch.setattr("laufruhe.numerics.workers.processors", lambda: 2)
+    with at_hand(abs):
+        own = given()
+        assert isinstance(own, Processes)
+        own.submit(time.sleep, 60)
+        assert own.submit(abs, -1).result() == 1
+        pids = own.pids
+        assert pids
+        with at_hand(abs):
+            assert given() is own
+    assert given() is None
+    for pid in pids:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+    monkeypatch.setattr("laufruhe.numerics.workers.processors", lambda: 1)
+    with at_hand(abs):
+        assert given() is None
 
 
 def test_a_worker_starts_no_workers() -> None:

@@ -1,16 +1,19 @@
 """Ends of sides that others work out ahead: to the last bit those of one process."""
 
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from laufruhe.numerics.workers import HERE, working_on
+from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.springs.ends import Aims, ends_ahead
 from laufruhe.prove.springs.program import Stated
 from laufruhe.prove.springs.proof import narrowed, spring_bound
 from laufruhe.prove.springs.search import SpringBoxes
 from prove.test_mode_boxes import NEAR, decoupled, designs_about
+from prove.test_spring_bound import DAMPED, LIMITS, MEANS, asked_for
 
 
 @pytest.mark.slow
@@ -32,6 +35,7 @@ def test_whoever_works_them_out() -> None:
     assert (solved, bound) == (counted, proven)
 
 
+@pytest.mark.slow
 def test_aims_are_those_of_their_own_program_and_box() -> None:
     """Whatever was stated, or looked at, before."""
     problem = decoupled(2)
@@ -45,3 +49,14 @@ def test_aims_are_those_of_their_own_program_and_box() -> None:
     alone = [Stated(program).least(aim)[0] for program in (anew.left(boxes.lower, boxes.upper)[0], half)]
     assert found == [*alone, alone[0]]
     assert alone[0] != alone[1]
+
+
+@pytest.mark.slow
+def test_roots_of_a_box_are_not_taken_for_those_of_a_wider_one(tmp_path: Path) -> None:
+    problem = asked_for(tmp_path, MEANS, LIMITS, mounts=DAMPED)
+    value, near = objective_value(problem, evaluate(problem)), [d.start for d in problem.decisions]
+    boxes, anew = (SpringBoxes(problem, value, 1e-3, near) for _ in range(2))
+    at, aim = boxes.lower + 0.9 * (boxes.upper - boxes.lower), np.eye(len(boxes.lower))[0]
+    boxes.look(at, boxes.upper)
+    found, alone = (Stated(one.left(one.lower, one.upper)[0]).least(aim)[0] for one in (boxes, anew))
+    assert found == alone

@@ -110,6 +110,9 @@ def test_ranked_stars_are_a_sheet() -> None:
     forces = [k for k, head in enumerate(found["rankings"].head) if head.startswith("free force of order")]
     assert forces
     assert all(abs(found["rankings"].rows[0][k]) < 1e-12 for k in forces)
+    # no throw may leave its step, so that nothing is known of what that buys
+    assert "uneven-firing" not in found
+    assert all(sheet.rows for sheet in found.values())
 
 
 def test_a_name_that_looks_like_a_formula_stays_text(tmp_path: Path) -> None:
