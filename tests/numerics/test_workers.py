@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -64,6 +65,44 @@ def test_processes_answer_and_pass_errors_on() -> None:
             os.kill(pid, 0)
     with pytest.raises(RuntimeError, match="after shutdown"):
         pool.submit(abs, -1)
+
+
+COPIED = """
+import os, signal, sys, tomllib
+from laufruhe.numerics.processes import Copy, Processes, WorkerDied
+
+tomllib.known = "of this process alone"
+signal.signal(signal.SIGINT, lambda *_: None)
+with Processes(1, Copy()) as pool:
+    (copy,) = pool.pids
+    assert pool.submit(os.getpid).result() == copy == pool.submit(os.getsid, 0).result() != os.getpid()
+    assert pool.submit(eval, "__import__('tomllib').known").result() == tomllib.known
+    assert pool.submit(eval, "__import__('signal').getsignal(2).name").result() == "SIG_DFL"
+    assert not Copy.can_be()
+    try:
+        pool.submit(divmod, 1, 0).result()
+    except ZeroDivisionError:
+        os.kill(copy, signal.SIGKILL)
+    try:
+        pool.submit(abs, -1).result()
+    except WorkerDied:
+        assert pool.submit(os.getpid).result() not in (copy, os.getpid())
+with Processes(1, Copy()) as pool:
+    (copy,) = pool.pids
+    pool.submit(abs, -1)
+assert Copy.can_be()
+try:
+    os.kill(copy, 0)
+except ProcessLookupError:
+    print("done")
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system copies no process")
+def test_a_copy_of_a_process_serves_with_all_that_it_had_imported() -> None:
+    told = subprocess.run([sys.executable, "-W", "error", "-c", COPIED], capture_output=True, text=True, check=False)
+    assert (told.stdout, told.stderr) == ("done\n", "")
 
 
 @pytest.mark.slow

@@ -11,11 +11,12 @@ from concurrent.futures import BrokenExecutor, Future
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
 from laufruhe.numerics.cores import processors
-from laufruhe.numerics.processes import Processes, called
+from laufruhe.numerics.processes import Copy, Processes, called
 
 if TYPE_CHECKING:
     from laufruhe.solvers.result import Result
@@ -32,12 +33,20 @@ Ask: TypeAlias = Callable[..., Callable[[], Any]]
 @contextmanager
 def artist(kinds: Sequence[str]) -> Iterator[Ask]:
     """Who draws pictures as files of these kinds: another process, or this one where that can have no other."""
-    with Processes(1) as workers:
-        is_other = bool(kinds) and processors() > 1
+    is_other = bool(kinds) and processors() > 1
+    with Processes(1, _copy() if is_other else None) as workers:
         if is_other:
             workers.submit(gc.set_threshold, SELDOM)
             workers.submit(called, "laufruhe.plots:get_ready")
         yield partial(_asked, workers if is_other else None)
+
+
+def _copy() -> Copy | None:
+    """A process that has imported what deciding and drawing both need."""
+    if not Copy.can_be():
+        return None
+    import_module("laufruhe.solvers.conclusion")
+    return Copy()
 
 
 def _asked(workers: Processes | None, name: str, *args: Any) -> Callable[[], Any]:

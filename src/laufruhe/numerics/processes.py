@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import signal
 import subprocess
 import sys
 import threading
@@ -19,7 +20,7 @@ from functools import partial
 from pkgutil import resolve_name
 from queue import Empty, SimpleQueue
 from types import TracebackType
-from typing import Any, ParamSpec, TypeAlias, TypeVar
+from typing import IO, Any, NoReturn, ParamSpec, TypeAlias, TypeVar
 
 from laufruhe.errors import SolverError
 from laufruhe.numerics.cores import ONE_THREAD, end_with_parent, processors
@@ -79,18 +80,74 @@ class WorkerDied(BrokenExecutor):
     """The process that a call was in has ended without an answer."""
 
 
+class Copy:
+    """A process that begins as a copy of this one, with all that it has imported, and serves.
+
+    Only a process without other threads can be copied: what they hold would never be let go.
+    """
+
+    def __init__(self) -> None:
+        there, asking = os.pipe()
+        answering, back = os.pipe()
+        # a signal before the copy stands by itself would end it as if it were this process
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+        parent, self.pid = os.getpid(), os.fork()
+        if self.pid == 0:
+            try:
+                os.setsid()
+                for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+                    signal.signal(number, signal.SIG_DFL)
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+                os.close(asking)
+                os.close(answering)
+                _serve(parent, os.fdopen(there, "rb"), os.fdopen(back, "wb"))
+            finally:
+                os._exit(1)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        os.close(there)
+        os.close(back)
+        self.stdin: IO[bytes] = os.fdopen(asking, "wb")
+        self.stdout: IO[bytes] = os.fdopen(answering, "rb")
+        self._is_over = False
+
+    @staticmethod
+    def can_be() -> bool:
+        """Whether this process can be copied."""
+        return hasattr(os, "fork") and threading.active_count() == 1
+
+    def kill(self) -> None:
+        """End it at once."""
+        if not self._is_over:
+            os.kill(self.pid, signal.SIGKILL)
+
+    def wait(self) -> None:
+        """Until it has ended."""
+        if not self._is_over:
+            self._is_over = True
+            os.waitpid(self.pid, 0)
+
+
+_Child: TypeAlias = subprocess.Popen[bytes] | Copy
+
+
 class Processes(Executor):
     """Up to `count` processes, started as calls come, ended with the executor or whoever has it.
 
     They have one thread each for their linear algebra and never hear Ctrl-C: who has them says when they end.
+
+    Parameters
+    ----------
+    first
+        One that is there already.
     """
 
-    def __init__(self, count: int | None = None) -> None:
+    def __init__(self, count: int | None = None, first: Copy | None = None) -> None:
         self.count = count if count is not None else processors()
+        self._first = first
         self._calls: SimpleQueue[_Call | None] = SimpleQueue()
         self._lock = threading.Lock()
         self._tenders: list[threading.Thread] = []
-        self._children: set[subprocess.Popen[bytes]] = set()
+        self._children: set[_Child] = {first} if first else set()
         self._open = 0
         self._closed = False
 
@@ -141,7 +198,7 @@ class Processes(Executor):
 
     def _tend(self) -> None:
         """Hand call after call to one process; in one thread, for the process ends with the thread that started it."""
-        child: subprocess.Popen[bytes] | None = None
+        child: _Child | None = None
         while (call := self._calls.get()) is not None:
             future, asked = call
             if future.set_running_or_notify_cancel():
@@ -160,7 +217,11 @@ class Processes(Executor):
                 self._open -= 1
         self._ended(child)
 
-    def _started(self) -> subprocess.Popen[bytes]:
+    def _started(self) -> _Child:
+        with self._lock:
+            first, self._first = self._first, None
+        if first is not None:
+            return first
         path = os.pathsep.join(p for p in sys.path if p)
         child = subprocess.Popen(
             [sys.executable, "-c", _PROGRAM.format(os.getpid())],
@@ -174,7 +235,7 @@ class Processes(Executor):
             child.kill()
         return child
 
-    def _ended(self, child: subprocess.Popen[bytes] | None) -> None:
+    def _ended(self, child: _Child | None) -> None:
         if child is not None:
             with self._lock:
                 self._children.discard(child)
@@ -187,7 +248,7 @@ class Processes(Executor):
                         stream.close()
 
 
-def _exchanged(child: subprocess.Popen[bytes], asked: bytes) -> tuple[bool, Any]:
+def _exchanged(child: _Child, asked: bytes) -> tuple[bool, Any]:
     assert child.stdin is not None
     assert child.stdout is not None
     pickle.dump(asked, child.stdin)
@@ -198,24 +259,27 @@ def _exchanged(child: subprocess.Popen[bytes], asked: bytes) -> tuple[bool, Any]
 
 def serve(parent: int) -> None:
     """Answer calls from standard input on standard output, until whoever asks is gone."""
+    _serve(parent, sys.stdin.buffer, os.fdopen(os.dup(1), "wb"))
+
+
+def _serve(parent: int, asked: IO[bytes], answers: IO[bytes]) -> NoReturn:
     global _SERVES
     _SERVES = True
-    answers = os.fdopen(os.dup(1), "wb")
     # what a library prints is no answer
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     end_with_parent(parent)
     calls: SimpleQueue[bytes] = SimpleQueue()
-    threading.Thread(target=_listen, args=(calls,), daemon=True).start()
+    threading.Thread(target=_listen, args=(asked, calls), daemon=True).start()
     while True:
         answers.write(_answered(calls.get()))
         answers.flush()
 
 
-def _listen(calls: SimpleQueue[bytes]) -> None:
+def _listen(asked: IO[bytes], calls: SimpleQueue[bytes]) -> None:
     """Take calls in, in a thread of its own: that nobody asks any more is noticed in the middle of a call too."""
     while True:
         try:
-            calls.put(pickle.load(sys.stdin.buffer))
+            calls.put(pickle.load(asked))
         except BaseException:
             os._exit(1)
 

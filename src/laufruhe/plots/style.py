@@ -57,6 +57,8 @@ _SETTINGS: Any = {
     "axes.spines.right": False, "axes.axisbelow": True, "axes.grid": True, "grid.color": "#e4e4e4",
     "grid.linewidth": 0.7, "text.color": INK, "xtick.color": FAINT, "ytick.color": FAINT, "path.simplify": True,
     "text.parse_math": False, "legend.fontsize": SMALL, "svg.hashsalt": "laufruhe",
+    # letters as they are drawn, which is as wide as they are measured; headings of panels make way for nothing
+    "text.hinting": "no_hinting", "axes.titley": 1.0,
 }  # fmt: skip
 
 
