@@ -141,3 +141,25 @@ def test_an_engine_without_points_is_refused(problem: Problem) -> None:
 def test_a_problem_goes_to_another_process(problem: Problem) -> None:
     found = pickle.loads(pickle.dumps(problem))
     assert found.fix("front web.mass", "1 kg").engine == problem.fix("front web.mass", "1 kg").engine
+
+
+@pytest.mark.parametrize(("names", "told"), [
+    ([None], ["s"]), (["a"], ["s.a"]), ([None, None], ["s.1", "s.2"]), (["a", None, "b"], ["s.a", "s.2", "s.b"]),
+])  # fmt: skip
+def test_unbalances_of_a_shaft_have_one_name_wherever_they_are_asked_for(
+    names: list[str | None], told: list[str]
+) -> None:
+    """In results, in edits and in errors of built engines."""
+    tables = tomllib.loads(LANCHESTER.read_text(encoding="utf-8"))
+    weights = [{"x": f"{10 * k} mm", "unbalance": "0.01 kg m ± 1 %"} for k in range(len(names))]
+    for weight, name in zip(weights, names, strict=True):
+        weight.update({} if name is None else {"name": name})
+    del tables["constraints"]
+    tables["balancer_shafts"] = [{"name": "s", "ratio": 2, "position": ["0 mm", "0 mm"], "unbalances": weights}]
+    found = laufruhe.load(tables)
+    assert [rotor.name for rotor in found.engine.rotors if rotor.shaft.name == "s"] == told
+    for k, name in enumerate(told):
+        other = found.with_values({f"{name}.unbalance": "0.02 kg m"})
+        moved = [one.name for one in other.engine.rotors if one.shaft.name == "s" and abs(one.unbalance) > 0.015]
+        assert moved == [told[k]]
+    assert {error.name for tolerance in found.tolerances.each for error in tolerance.errors} == set(told)
