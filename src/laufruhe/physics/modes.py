@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -117,27 +116,12 @@ def sag_for_critical_speed(speed: float, order: float) -> float:
     return GRAVITY / (speed * order) ** 2
 
 
-def torque_roll_axis(block: Block, torque_axis: Sequence[float] = (1.0, 0.0, 0.0)) -> Array:
-    """Direction about which a free block starts to turn under a torque, through its centre of gravity (E8).
+def torque_roll_axis(block: Block) -> Array:
+    """Direction about which a free block starts to turn under a torque about the crank, through its centre of gravity.
 
     Returns
     -------
-    Unit vector, shape (3,): I^-1 e over its length.
+    Unit vector, shape (3,): I^-1 e over its length (E8).
     """
-    axis = np.linalg.solve(block.tensor, np.asarray(torque_axis, dtype=float))
+    axis = np.linalg.solve(block.tensor, np.array([1.0, 0.0, 0.0]))
     return np.asarray(axis / np.linalg.norm(axis))
-
-
-def torque_roll_coupling(block: Block, stiffness: Array, torque_axis: Sequence[float] = (1.0, 0.0, 0.0)) -> float:
-    """How far turning about the torque-roll axis is from being a mode of its own (E8).
-
-    0: a torque about the crank moves the block about that axis alone, at one natural
-    frequency. 1: the mounts answer with nothing but other motions.
-    """
-    motion = np.concatenate([np.zeros(3), torque_roll_axis(block, torque_axis)])
-    inverse = np.linalg.inv(np.linalg.cholesky(block.mass_matrix))
-    along = np.linalg.solve(inverse.T, motion)
-    along /= np.linalg.norm(along)
-    answer = inverse @ stiffness @ inverse.T @ along
-    size = float(np.linalg.norm(answer))
-    return float(np.linalg.norm(answer - along * (along @ answer))) / size if size > 0.0 else 0.0

@@ -100,9 +100,7 @@ Band: TypeAlias = tuple[float, float]
 
 def relative_residual(block: Block, band: Band) -> AxisResidual:
     """|A t / w^2 - t|, t the turning of length one in coordinates in which the mass is one (E14)."""
-    root = np.linalg.cholesky(block.mass_matrix)
-    along = root.T @ _turning(block)
-    along = along / np.linalg.norm(along)
+    along = _along(block)
     return AxisResidual(np.eye(6) / (2.0 * np.pi * band[0]) ** 2, along, along, 1.0, 1.0)
 
 
@@ -114,7 +112,14 @@ def raw_residual(block: Block, band: Band) -> AxisResidual:
 
 
 def _turning(block: Block) -> Array:
+    """One radian about the torque-roll axis, shape (6,)."""
     return np.asarray(np.concatenate([np.zeros(3), torque_roll_axis(block)]), dtype=np.float64)
+
+
+def _along(block: Block) -> Array:
+    """The same of length one in coordinates in which the mass is one."""
+    found = np.linalg.cholesky(block.mass_matrix).T @ _turning(block)
+    return np.asarray(found / np.linalg.norm(found))
 
 
 def mass_root(block: Block) -> Array:
@@ -131,6 +136,18 @@ def residual_of(mounting: ElasticMounting, axis: AxisResidual) -> float:
 def torque_roll_answer(mounting: ElasticMounting) -> float:
     """|K q|: what the mounts answer to turning about the torque-roll axis by one radian (E46)."""
     return float(np.linalg.norm(mounting.stiffness @ _turning(mounting.block)))
+
+
+def torque_roll_coupling(mounting: ElasticMounting) -> float:
+    """How far turning about the torque-roll axis is from being a mode of its own (E8).
+
+    0: a torque about the crank moves the block about that axis alone, at one natural
+    frequency. 1: the mounts answer with nothing but other motions.
+    """
+    root, along = mass_root(mounting.block), _along(mounting.block)
+    answer = root @ mounting.stiffness @ root.T @ along
+    size = float(np.linalg.norm(answer))
+    return float(np.linalg.norm(answer - along * (along @ answer))) / size if size > 0.0 else 0.0
 
 
 def torque_roll_frequency(mounting: ElasticMounting) -> float:

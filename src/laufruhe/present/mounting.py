@@ -10,7 +10,7 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics import mount_numbers
 from laufruhe.physics.elastic_mounts import ElasticMounting
-from laufruhe.physics.modes import Modes, static_motion, torque_roll_axis, torque_roll_coupling, weight_wrench
+from laufruhe.physics.modes import Modes, static_motion, torque_roll_axis, weight_wrench
 from laufruhe.physics.time_model import frequencies_with_fluid
 from laufruhe.present.measures import has_mounts
 from laufruhe.problem.channels import mounting_in
@@ -78,7 +78,7 @@ def facts_of(evaluation: Evaluation) -> MountingFacts:
         mount_sag=np.asarray(-(mounting.motions @ weight)[:, 2]),
         torque_travel=float(max(travels, default=0.0)),
         torque_roll_axis=torque_roll_axis(mounting.block),
-        torque_roll_coupling=torque_roll_coupling(mounting.block, mounting.stiffness),
+        torque_roll_coupling=mount_numbers.torque_roll_coupling(mounting),
         torque_roll_frequency=mount_numbers.torque_roll_frequency(mounting),
         with_fluid=frequencies_with_fluid(mounting),
         depends_on_frequency=bool(mounting.dynamic),
