@@ -10,8 +10,7 @@ from typing import Any
 from laufruhe.errors import KeyedError
 from laufruhe.machine.drives.base import DriveKind, Sizes
 from laufruhe.machine.layouts.base import Key
-from laufruhe.machine.layouts.build import Mechanism
-from laufruhe.machine.rotor import CRANKSHAFT, Shaft
+from laufruhe.machine.layouts.build import Mechanism, numbers_of
 from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.machine.swinging_yoke import SwingingYoke
 
@@ -22,20 +21,9 @@ class Yoke(Mechanism):
 
     own: Mapping[str, float]
 
-    def cylinder(
-        self,
-        number: int,
-        x: float,
-        throw: float,
-        bank: float,
-        firing_angle: float,
-        pin_mass: float = 0.0,
-        shaft: Shaft = CRANKSHAFT,
-    ) -> SliderCrank:
+    def _made_of(self, plain: SliderCrank, number: int) -> SliderCrank:  # noqa: ARG002
         """One ram and its lever."""
-        plain = super().cylinder(number, x, throw, bank, firing_angle, pin_mass, shaft)
-        told: dict[str, Any] = {shared.name: getattr(plain, shared.name) for shared in fields(plain)}
-        return SwingingYoke(**told | dict(self.own))
+        return SwingingYoke(**numbers_of(plain) | dict(self.own))
 
 
 class SwingingYokeDrive(DriveKind):

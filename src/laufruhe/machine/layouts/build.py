@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from fractions import Fraction
+from typing import Any
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.engine import Cycle
@@ -64,7 +65,7 @@ class Mechanism:
         pin_mass
             What turns at the crank pin beside the rod's share [kg].
         """
-        return SliderCrank(
+        plain = SliderCrank(
             name=f"cylinder {number}",
             x=x,
             crank_radius=self.crank_radius,
@@ -80,6 +81,16 @@ class Mechanism:
             shaft=shaft,
             big_end=self.big_end,
         )
+        return self._made_of(plain, number)
+
+    def _made_of(self, plain: SliderCrank, number: int) -> SliderCrank:  # noqa: ARG002
+        """The mechanism of a cylinder, of the slider-crank that has what all share."""
+        return plain
+
+
+def numbers_of(plain: SliderCrank) -> dict[str, Any]:
+    """Its fields, for a mechanism that has more."""
+    return {own.name: getattr(plain, own.name) for own in fields(plain)}
 
 
 def firing_angles(

@@ -9,9 +9,8 @@ from dataclasses import dataclass, fields, replace
 from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
 from laufruhe.machine.layouts.base import Asked, Key, LayoutKind, rod_of
-from laufruhe.machine.layouts.build import Mechanism, Throw, build
+from laufruhe.machine.layouts.build import Mechanism, Throw, build, numbers_of
 from laufruhe.machine.layouts.places import Layout
-from laufruhe.machine.rotor import CRANKSHAFT, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
 
 
@@ -48,32 +47,23 @@ class MasterRod(Mechanism):
     knuckle_mass: float
     rod: Mapping[str, float] | None
 
-    def cylinder(
-        self,
-        number: int,
-        x: float,
-        throw: float,
-        bank: float,
-        firing_angle: float,
-        pin_mass: float = 0.0,
-        shaft: Shaft = CRANKSHAFT,
-    ) -> SliderCrank:
+    def _made_of(self, plain: SliderCrank, number: int) -> SliderCrank:
         """The master's slider-crank, or an articulated one."""
         if number == self.master:
-            return super().cylinder(number, x, throw, bank, firing_angle, pin_mass, shaft)
+            return plain
         knuckle = self._knuckle(number)
-        length = self.length or knuckle.length_to(_top(knuckle.master), bank)
+        length = self.length or knuckle.length_to(_top(knuckle.master), plain.bank)
         rod = None if self.rod is None else rod_of("articulated_rod", self.rod, length, "knuckle pin")
-        plain = replace(
-            super().cylinder(number, x, throw, bank, firing_angle, shaft=shaft),
+        articulated = replace(
+            plain,
             rod_length=length,
             reciprocating_mass=self.reciprocating_mass if rod is None else self.piston_mass + rod.reciprocating_mass,
             rotating_mass=self.knuckle_mass + (0.0 if rod is None else rod.rotating_mass),
             rod_inertia_deficit=self.rod_inertia_deficit if rod is None else rod.inertia_deficit,
         )
         if self.knuckle_radius == 0.0:
-            return plain
-        return ArticulatedCrank(**{own.name: getattr(plain, own.name) for own in fields(plain)}, knuckle=knuckle)
+            return articulated
+        return ArticulatedCrank(**numbers_of(articulated), knuckle=knuckle)
 
     def _knuckle(self, number: int) -> Knuckle:
         """Knuckle pin of a cylinder, on a master rod that stands for its geometry alone."""

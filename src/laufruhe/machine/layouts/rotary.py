@@ -11,10 +11,10 @@ from laufruhe import units
 from laufruhe.errors import KeyedError
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts.base import SPACING, Key
-from laufruhe.machine.layouts.build import Mechanism
+from laufruhe.machine.layouts.build import Mechanism, numbers_of
 from laufruhe.machine.layouts.inline import Inline
 from laufruhe.machine.rotary import FLANKS, RotaryUnit
-from laufruhe.machine.rotor import CRANKSHAFT, Shaft
+from laufruhe.machine.slider_crank import SliderCrank
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,20 +31,10 @@ class RotorMechanism(Mechanism):
     rotor_width: float
     rotor_inertia: float
 
-    def cylinder(
-        self,
-        number: int,
-        x: float,
-        throw: float,
-        bank: float,
-        firing_angle: float,
-        pin_mass: float = 0.0,
-        shaft: Shaft = CRANKSHAFT,
-    ) -> RotaryUnit:
+    def _made_of(self, plain: SliderCrank, number: int) -> SliderCrank:
         """One rotor."""
-        unit = vars(super().cylinder(number, x, throw, bank, firing_angle, pin_mass, shaft))
         own = {key: getattr(self, key) for key in ("rotor_radius", "rotor_width", "rotor_inertia")}
-        return RotaryUnit(**unit | own | {"name": f"rotor {number}"})
+        return RotaryUnit(**numbers_of(plain) | own | {"name": f"rotor {number}"})
 
 
 class Rotary(Inline):
