@@ -96,12 +96,36 @@ try:
 except ProcessLookupError:
     print("done")
 """
+MEANWHILE = """
+import os, signal, time
+from laufruhe.numerics import processes
+
+processes.processors = lambda: 2
+with processes.meanwhile(os.getpid, pays=True) as answer:
+    assert answer() != os.getpid()
+with processes.meanwhile(os.getpid, pays=False) as answer:
+    assert answer() == os.getpid()
+here = os.getpid()
+with processes.meanwhile(lambda: os.getpid() == here or os._exit(3), pays=True) as answer:
+    assert answer()
+began = time.monotonic()
+try:
+    with processes.meanwhile(lambda: time.sleep(60), pays=True):
+        raise ZeroDivisionError
+except ZeroDivisionError:
+    assert time.monotonic() - began < 30.0
+try:
+    os.wait()
+except ChildProcessError:
+    print("done")
+"""
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system copies no process")
-def test_a_copy_of_a_process_serves_with_all_that_it_had_imported() -> None:
-    told = subprocess.run([sys.executable, "-W", "error", "-c", COPIED], capture_output=True, text=True, check=False)
+@pytest.mark.parametrize("program", [COPIED, MEANWHILE], ids=["served", "once"])
+def test_copies_of_a_process_have_all_that_it_has_and_end_with_it(program: str) -> None:
+    told = subprocess.run([sys.executable, "-W", "error", "-c", program], capture_output=True, text=True, check=False)
     assert (told.stdout, told.stderr) == ("done\n", "")
 
 

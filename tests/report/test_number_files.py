@@ -19,14 +19,19 @@ from laufruhe.physics.torque import torque_parts
 from laufruhe.physics.torsion import chain_of, shaft_torque
 from laufruhe.present.pictures import CURVES, PRINTED, PRINTED_SHEETS, SHEETS
 from laufruhe.problem.evaluation import measured
-from laufruhe.report import curves
+from laufruhe.report import curves, tables
 from laufruhe.report.sections import SECTIONS
 from laufruhe.report.sheet import Sheet
-from laufruhe.report.tables import sheets_of, write_tables
+from laufruhe.report.tables import sheets_of, writing_tables
 from laufruhe.report.workbook import write_book
 from laufruhe.solvers import Result, state
 from problem_files import PROBLEMS, loaded
 from ready import solved
+
+
+def write_tables(result: Result, folder: Path) -> None:
+    with writing_tables(result, folder) as written:
+        written()
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +88,12 @@ def test_the_workbook_has_a_sheet_for_every_file(result: Result, folder: Path) -
         assert list(row[1:]) == pytest.approx(own.tolist()[1:])
 
 
-def test_the_same_numbers_make_the_same_files(result: Result, folder: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("many", [0, 10**9], ids=["beside", "here"])
+def test_the_same_numbers_make_the_same_files(
+    result: Result, folder: Path, tmp_path: Path, many: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever writes the workbook."""
+    monkeypatch.setattr(tables, "MANY", many)
     write_tables(result, tmp_path)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == {
         path.name: path.read_bytes() for path in tmp_path.iterdir()

@@ -35,7 +35,7 @@ class Request:
 
 @contextmanager
 def timed(seconds: dict[str, float], what: str) -> Iterator[None]:
-    """Notes the seconds that a part takes."""
+    """Adds the seconds that a part takes."""
     started = time.perf_counter()
     yield
-    seconds[what] = time.perf_counter() - started
+    seconds[what] = seconds.get(what, 0.0) + time.perf_counter() - started

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from laufruhe.present.pictures import PICTURES
 from laufruhe.report import files
 from laufruhe.report.json_result import as_json
 from laufruhe.report.result_report import result_document
-from laufruhe.report.tables import write_tables
+from laufruhe.report.tables import writing_tables
 from laufruhe.report.web_page import as_html, template
 from laufruhe.solvers.result import Result, Status
 
@@ -41,17 +42,20 @@ def write_results(
         with timed(result.timing, "animation"):
             animate(result, stage / files.MOTION)
     say("writing tables")
-    with timed(result.timing, "tables"):
-        write_tables(result, stage)
-    live, document = live_model(result.problem, result), result_document(result, list(PICTURES), request.command)
-    if request.kinds:
-        say("drawing")
-    with timed(result.timing, "plots"):
-        _get_ready()
-        pictures = drawn()
-    document = document.showing(pictures)
-    files.write(stage / files.REPORT, document.as_markdown(f".{request.kinds[0]}" if request.kinds else ""))
-    files.write(stage / files.PAGE, as_html(document, pictures, live))
+    with ExitStack() as until_then:
+        with timed(result.timing, "tables"):
+            tables = until_then.enter_context(writing_tables(result, stage))
+        live, document = live_model(result.problem, result), result_document(result, list(PICTURES), request.command)
+        if request.kinds:
+            say("drawing")
+        with timed(result.timing, "plots"):
+            _get_ready()
+            pictures = drawn()
+        document = document.showing(pictures)
+        files.write(stage / files.REPORT, document.as_markdown(f".{request.kinds[0]}" if request.kinds else ""))
+        files.write(stage / files.PAGE, as_html(document, pictures, live))
+        with timed(result.timing, "tables"):
+            tables()
     for place in filter(None, (stage / files.RESULT, copy)):
         files.write(place, as_json(result, request.series))
 

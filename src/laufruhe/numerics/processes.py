@@ -49,17 +49,35 @@ def in_twins(work: Callable[[int], T], count: int) -> list[T]:
 
 
 @contextmanager
+def meanwhile(work: Callable[[], T], pays: bool) -> Iterator[Callable[[], T]]:
+    """Gives what waits for the answer of a twin, which works meanwhile; this process works where it can have none.
+
+    Parameters
+    ----------
+    pays
+        Whether it takes longer than a twin takes to begin, some milliseconds.
+    """
+    if pays and processors() > 1 and Copy.can_be():
+        with _twin(work) as answer:
+            yield answer
+    else:
+        yield work
+
+
+@contextmanager
 def _twin(work: Callable[[], T]) -> Iterator[Callable[[], T]]:
     """What waits for the answer of a twin; where that has died, the work is done here."""
     read, write = os.pipe()
-    parent, twin = os.getpid(), os.fork()
+    parent, (twin, heard) = os.getpid(), _forked()
     if twin == 0:
         try:
+            signal.pthread_sigmask(signal.SIG_SETMASK, heard)
             end_with_parent(parent)
             with os.fdopen(write, "wb") as answers:
                 pickle.dump(work(), answers)
         finally:
             os._exit(0)
+    signal.pthread_sigmask(signal.SIG_SETMASK, heard)
     os.close(write)
 
     def answer() -> T:
@@ -72,8 +90,18 @@ def _twin(work: Callable[[], T]) -> Iterator[Callable[[], T]]:
     try:
         with os.fdopen(read, "rb") as answers_of_twin:
             yield answer
+    except BaseException:
+        # nobody waits for what is at work
+        os.kill(twin, signal.SIGKILL)
+        raise
     finally:
         os.waitpid(twin, 0)
+
+
+def _forked() -> tuple[int, set[int | signal.Signals]]:
+    """What fork says, all signals held back, and those that were: neither process is ended as if it were the other."""
+    held = signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+    return os.fork(), held
 
 
 class WorkerDied(BrokenExecutor):
@@ -89,21 +117,19 @@ class Copy:
     def __init__(self) -> None:
         there, asking = os.pipe()
         answering, back = os.pipe()
-        # a signal before the copy stands by itself would end it as if it were this process
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
-        parent, self.pid = os.getpid(), os.fork()
+        parent, (self.pid, heard) = os.getpid(), _forked()
         if self.pid == 0:
             try:
                 os.setsid()
                 for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
                     signal.signal(number, signal.SIG_DFL)
-                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+                signal.pthread_sigmask(signal.SIG_SETMASK, heard)
                 os.close(asking)
                 os.close(answering)
                 _serve(parent, os.fdopen(there, "rb"), os.fdopen(back, "wb"))
             finally:
                 os._exit(1)
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, heard)
         os.close(there)
         os.close(back)
         self.stdin: IO[bytes] = os.fdopen(asking, "wb")

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import astuple, fields
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from laufruhe.numerics.processes import meanwhile
 from laufruhe.present.measures import has_loads, has_ranking, limits_of, loaded, places_of, ranking_of
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.present.numbers import DEGREE, RPM
@@ -26,6 +29,8 @@ from laufruhe.report.workbook import write_book
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result
 
 MOST_ROWS = 20 * STEPS
+MANY = 30_000
+"""Cells that take longer to write than a process to begin."""
 
 
 def sheets_of(result: Result) -> dict[str, Sheet]:
@@ -139,13 +144,18 @@ _SHEETS: Sheets = {
 }
 
 
-def write_tables(result: Result, folder: Path) -> None:
-    """A CSV file for every sheet, and all of them as one workbook, into a folder that exists."""
+@contextmanager
+def writing_tables(result: Result, folder: Path) -> Iterator[Callable[[], None]]:
+    """A CSV file for every sheet, and all of them as one workbook, into a folder that exists.
+
+    Gives what waits for the workbook: a process of its own writes one of many cells.
+    """
     sheets = sheets_of(result)
-    for name, sheet in sheets.items():
-        write_csv(sheet, folder / f"{name}.csv")
-    if sheets:
-        write_book(sheets, folder / files.BOOK)
+    cells = sum(len(sheet.head) * len(sheet.rows) for sheet in sheets.values())
+    with meanwhile(partial(write_book, sheets, folder / files.BOOK), cells > MANY) as written:
+        for name, sheet in sheets.items():
+            write_csv(sheet, folder / f"{name}.csv")
+        yield written if sheets else lambda: None
 
 
 def write_csv(sheet: Sheet, path: Path) -> None:
