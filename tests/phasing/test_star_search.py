@@ -123,3 +123,34 @@ def test_in_pieces_it_stops_in_time(monkeypatch):
         found = search_stars(space, objective, 1, time_limit=0.0)
     assert not found.complete
     assert found.lower_bound <= enumerate_stars(space, objective).values[0] * (1.0 + 1e-12)
+
+
+@pytest.mark.parametrize("throws", [16, 40])
+@pytest.mark.parametrize("name", ["rms of four", "with force"])
+def test_long_cranks_without_couples_need_no_search(throws, name):
+    """Throws in pairs, front and back alike, leave nothing: no star can have less, however many there are."""
+    space = in_pairs(throws)
+    found = search_stars(space, OBJECTIVES[name], 8, time_limit=10.0)
+    assert found.complete
+    assert len(np.unique(found.stars, axis=0)) == 8
+    assert found.values == pytest.approx(0.0, abs=1e-9 * throws**2)
+    assert found.nodes < 100
+
+
+@pytest.mark.parametrize("throws", [6, 14, 48])
+def test_a_search_that_nothing_is_left_of_ends(throws):
+    """Forces alone, which even pairs cancel: every star is as good as the next, in pieces or not."""
+    forces = AmplitudeObjective((1, 2), (AmplitudeTerm(1.0, (1.0, 1.0), (0.0, 0.0)),))
+    found = search_stars(in_pairs(throws), forces, 1, time_limit=10.0)
+    assert found.complete
+    assert found.values == pytest.approx([0.0], abs=1e-12 * throws)
+
+
+def test_a_piece_may_be_left_without_stars(monkeypatch):
+    """All that stand in pieces may be excluded before the pieces are many."""
+    monkeypatch.setattr(star_search, "WORTH_SHARING", 0)
+    monkeypatch.setattr(star_search, "STARTS", 40)
+    space, objective = whole(7), OBJECTIVES["one order"]
+    found = search_stars(space, objective, 1)
+    assert found.complete
+    assert found.values == pytest.approx(enumerate_stars(space, objective, 1).values, abs=1e-12)

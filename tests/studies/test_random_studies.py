@@ -7,6 +7,7 @@ import csv
 import json
 import random
 import re
+import shutil
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ SLOW = {
     "selective-assembly", "worked-diesel",
 }  # fmt: skip
 PROBLEMS = {path.stem: tomllib.loads(path.read_text(encoding="utf-8")) for path in READY if path.stem not in SLOW}
+TABLES = sorted(READY[0].parent.glob("*.csv"))
 KINDS = ("counterweight fraction", "balancer sizing", "layout comparison", "speed map", "tolerance", "free forces")
 # one with a tolerance is no value of a sweep
 NUMBER = re.compile(r"^(-?[\d.]+)(?:/(\d+))? ([^±]+)$")
@@ -110,6 +112,8 @@ def drawn(rng: random.Random, folder: Path) -> dict[str, Any]:
     chosen += [rng.choice(one_cylinder)] if rng.random() < 0.5 else []
     for name in chosen:
         (folder / f"{name}.toml").write_text(as_toml(scene(name)), encoding="utf-8")
+    for numbers in TABLES:
+        shutil.copy(numbers, folder)
     cases = [{"name": f"case {k}", "problem": f"{name}.toml"} for k, name in enumerate(chosen)]
     part: dict[str, Any] = {"name": "p", "kind": kind, "title": "t", "cases": cases}
     if kind in KINDS[:3]:

@@ -57,6 +57,14 @@ class AmplitudeObjective:
         waves = np.exp(1j * throws[:, None, :] * np.array(self.orders)[:, None])
         return self._of_sums(waves @ weights)
 
+    def largest(self, places: Sequence[float]) -> float:
+        """No crank has more: all throws on the side of their places [SI of the objective]."""
+        levers = float(np.abs(places).sum())
+        return sum(
+            term.weight * float(np.hypot(np.multiply(term.force, len(places)), np.multiply(term.couple, levers)).sum())
+            for term in self.terms
+        )
+
     def _of_sums(self, sums: NDArray[np.complex128]) -> Array:
         """Of F_h and C_h, shape (n, orders, 2)."""
         squares = np.square(sums.real) + np.square(sums.imag)

@@ -95,7 +95,7 @@ class StarSpace:
         found = []
         for root in self.roots:
             partial = root
-            while partial.open[1:] and len(partial.stars) < 2 * pieces:
+            while partial.open[1:] and 0 < len(partial.stars) < 2 * pieces:
                 partial = _next(self, partial, prune)
             parts = (part for part in np.array_split(np.arange(len(partial.stars)), pieces) if len(part))
             found += [Partial(partial.stars[k], partial.counts[k], partial.placed, partial.open) for k in parts]
@@ -147,7 +147,7 @@ def _next(space: StarSpace, partial: Partial, prune: Prune | None) -> Partial:
     """One more throw placed, images and what need not be grown further left out."""
     child = _children(partial)
     child = _kept(child, _first_of_images(space, child))
-    return _kept(child, ~prune(child)) if prune is not None and child.open else child
+    return _kept(child, ~prune(child)) if prune is not None and child.open and len(child.stars) else child
 
 
 def _children(partial: Partial) -> Partial:

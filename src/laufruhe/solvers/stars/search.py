@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.load_models.amplitudes import AmplitudeObjective, directions
+from laufruhe.load_models.amplitudes import NEGLIGIBLE, AmplitudeObjective, directions
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import tell
@@ -31,6 +31,8 @@ SLACK = 1e-9
 WORTH_SHARING = 2_000_000_000
 """Stars of a space that takes several seconds: thirteen throws on as many steps take two."""
 PIECES, MOST_AT_ONCE = 64, 16
+STARTS = 12
+"""Stars of each kind that a search begins from."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +138,7 @@ class _Search:
         self.space, self.objective, self.best = space, objective, best
         self.bounds = _Bounds(space, objective)
         self.root = self.bounds.root()
+        self.nothing = NEGLIGIBLE * objective.largest(space.places)
         self.looked_at, self.ended = 0, False
 
     def explore(self, partial: Partial) -> None:
@@ -170,8 +173,9 @@ class _Search:
     def _prune(self, partial: Partial) -> NDArray[np.bool_]:
         self.looked_at += len(partial.stars)
         tell("partial stars", self.looked_at, value=float(self.best.values.min(initial=np.inf)), bound=self.root)
-        self.ended = self.ended or passed()
-        if self.ended:
+        nothing_left = self.best.cut <= self.nothing
+        self.ended = self.ended or (not nothing_left and passed())
+        if nothing_left or self.ended:
             return np.ones(len(partial.stars), dtype=bool)
         if not np.isfinite(self.best.cut):
             return np.zeros(len(partial.stars), dtype=bool)
@@ -269,14 +273,30 @@ def _placed_sums(placed: Stars, x: Array, phases: int, orders: Sequence[int]) ->
     return np.concatenate([total.real, total.imag], axis=1)
 
 
+def _shuffled(pattern: Sequence[int], rng: np.random.Generator) -> Iterator[Stars]:
+    """Random stars, the first throw on step 0."""
+    rest = np.repeat(np.arange(len(pattern)), [pattern[0] - 1, *pattern[1:]])
+    for _ in range(STARTS):
+        yield np.concatenate([[0], rng.permutation(rest)]).astype(np.uint8)
+
+
+def _mirrored(pattern: Sequence[int], rng: np.random.Generator) -> Iterator[Stars]:
+    """Random stars that are their own mirror image, where a pattern has any: equal places leave them no couple."""
+    middle = np.flatnonzero(np.mod(pattern, 2))
+    if len(middle) > 1 or pattern[0] < 2:
+        return
+    half = np.repeat(np.arange(len(pattern)), np.array(pattern) // 2)
+    for _ in range(STARTS):
+        front = np.concatenate([half[:1], rng.permutation(half[1:])])
+        yield np.concatenate([front, middle, front[::-1]]).astype(np.uint8)
+
+
 def _good_starts(space: StarSpace, objective: AmplitudeObjective) -> Iterator[Stars]:
-    """Stars that swapping any two throws does not improve, from a few random ones."""
+    """Stars that swapping any two throws does not improve, from a few that are drawn."""
     rng = np.random.default_rng(1964)
     pairs = np.array(list(itertools.combinations(range(1, space.throws), 2)) or [(0, 0)])
     for pattern in space.patterns:
-        rest = np.repeat(np.arange(space.phases), [pattern[0] - 1, *pattern[1:]]).astype(np.uint8)
-        for _ in range(12):
-            star = np.concatenate([[0], rng.permutation(rest)]).astype(np.uint8)
+        for star in (*_mirrored(pattern, rng), *_shuffled(pattern, rng)):
             value = float(objective.values(space, star[None])[0])
             while True:
                 near = np.repeat(star[None], len(pairs), axis=0)
