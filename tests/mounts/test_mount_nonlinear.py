@@ -264,11 +264,11 @@ def test_ten_seeds_find_the_best_known_optimum_of_the_tractor(seed):
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize("seed", first_fast([1], 0, long=[1]))
+@pytest.mark.parametrize("seed", first_fast(range(4), 0, long=range(1, 4)))
 def test_few_starts_find_the_best_known_optimum_of_the_powertrain(seed):
-    """Its six modes stand on either side of a band in many ways; more seeds in docs/theory/elastic-mounts.md."""
+    """Its six modes stand on either side of a band in many ways: of ten pairs of starts six find the best."""
     problem = load(PROBLEMS / "powertrain-least-force.toml")
-    problem = replace(problem, search=replace(problem.search, starts=2, seed=seed, boxes=0))
+    problem = replace(problem, search=replace(problem.search, starts=6, seed=seed, boxes=0))
     assert solve_joint(problem).objective.value == pytest.approx(13.106325, rel=1e-5)
 
 
