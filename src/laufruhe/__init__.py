@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
@@ -20,11 +21,16 @@ if TYPE_CHECKING:
     from laufruhe.problem.problem import Problem
     from laufruhe.solvers.result import Result
 
+# loaded when they are asked for: import laufruhe is quick
+_CLASSES = {"Problem": "laufruhe.problem.problem", "Result": "laufruhe.solvers.result"}
+
 __version__ = "0.3.0"
 __all__ = [
     "InputError",
     "LaufruheError",
     "ModelError",
+    "Problem",
+    "Result",
     "SolverError",
     "__version__",
     "evaluate",
@@ -35,6 +41,19 @@ __all__ = [
 
 Source: TypeAlias = Union[str, Path, Mapping[str, Any]]  # noqa: UP007
 """A file, its text, or its tables."""
+
+
+if not TYPE_CHECKING:
+    # to a type checker a misspelt name stays one
+    def __getattr__(name: str) -> Any:
+        if name not in _CLASSES:
+            raise AttributeError(f"module 'laufruhe' has no attribute '{name}'")
+        return getattr(import_module(_CLASSES[name]), name)
+
+
+def __dir__() -> list[str]:
+    """What is for users."""
+    return sorted(__all__)
 
 
 def load(source: Source) -> Problem:

@@ -65,9 +65,11 @@ def test_init_with_nobody_to_ask_says_what_to_do(here: Path) -> None:
     ("typed", "cylinders"),
     [
         ("\nMy four\n\n\n\n\n\n\n\n\n\n", 4),
-        ("\nMy twin\nvee\n\n2\n60\n\n\n\n\n\n0.4 kg\n", 2),
+        ("\nMy twin\nvee\n\n2\n60\n\n\n\n\n0.4 kg\n", 2),
         ("\nMy six\nvee\n\n6\n60\n60\n1-6-3-5-2-4\n\n\n\n\n\n", 6),
         ("\nMy single\n\n\n1\n\n\n\n\n", 1),
+        # two cylinders on one throw have no neighbours
+        ("\nMy two\nboxer\n\n2\n\n1-2\n\n\n0.3\n0.4 kg\n", 2),
         ("\nMy ten\nvee\n\n10\n\n\n-\n0, 144, 216, 288, 72\n-\n\n\n\n\n\n", 10),
     ],
 )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import doctest
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -23,6 +25,15 @@ def test_answers_are_those_of_the_page(tmp_path: Path, monkeypatch: pytest.Monke
     test = doctest.DocTestParser().get_doctest(text, {}, "reference", str(PAGE), 0)
     told: list[str] = []
     assert doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE).run(test, out=told.append).failed == 0, told
+
+
+def test_classes_are_named_without_loading_them() -> None:
+    assert (laufruhe.Problem, laufruhe.Result) == (Problem, Result)
+    assert dir(laufruhe) == sorted(laufruhe.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'Reslt'"):
+        laufruhe.Reslt  # type: ignore[attr-defined]  # noqa: B018
+    code = "import sys, laufruhe; print('numpy' in sys.modules, 'pydantic' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).split() == ["False", "False"]
 
 
 def test_everything_public_is_on_the_page() -> None:

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import laufruhe
 from laufruhe.errors import ModelError
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Role, Shaft
 from laufruhe.machine.layouts import (
@@ -44,6 +45,25 @@ def engine(cycle: Cycle, layout: Layout, throws: tuple[float, ...], order: list[
 
 
 class TestPlaces:
+    @pytest.mark.parametrize(
+        ("layout", "own", "most"),
+        [
+            ("inline", {}, 1),
+            ("vee", {"bank_angle": 90}, 2),
+            ("boxer", {"bank_stagger": "40 mm", "firing_order": [1, 2]}, 2),
+        ],
+    )
+    def test_neighbours_alone_need_a_spacing(self, layout: str, own: dict[str, object], most: int) -> None:
+        """Cylinders of one place along the crank have no distance to a next place."""
+        shared = {"cycle": "four-stroke", "stroke": "90 mm", "rod_ratio": 0.3, "reciprocating_mass": "0.5 kg"}
+        asked = {"title": "t", "operating_points": [{"speed": "3000 rpm"}]}
+        engine = {"layout": layout, **own, **shared, "cylinders": most}
+        found = laufruhe.load({**asked, "engine": engine}).engine
+        away = laufruhe.load({**asked, "engine": {**engine, "cylinder_spacing": "1 m"}}).engine
+        assert [part.x for part in found.cylinders] == [part.x for part in away.cylinders]
+        with pytest.raises(laufruhe.InputError, match="cylinder_spacing: is missing"):
+            laufruhe.load({**asked, "engine": {**engine, "cylinders": 4, "firing_order": [1, 3, 4, 2]}})
+
     @given(st.integers(1, 48), st.floats(1e-3, 10.0))
     def test_stations(self, count: int, spacing: float) -> None:
         """From the front backwards, a spacing apart, the middle exactly at x = 0 (C2)."""

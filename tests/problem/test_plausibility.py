@@ -34,6 +34,20 @@ def doubted(old: str = "", new: str = "") -> list[str]:
     return [str(doubt) for doubt in load(SINGLE.replace(old, new)).doubts]
 
 
+def test_a_block_is_heavier_than_what_moves_in_it() -> None:
+    """Grams where kilograms are meant: no other number of such a block need be unusual."""
+    mounts = "[mounts]\nkind = 'elastic'\nstiffness = ['1 N/mm', '1 N/mm', '1 N/mm']\n" + "".join(
+        f"[[mounts.places]]\nname = '{x}{y}'\nposition = ['{x} mm', '{y} mm', '0 mm']\n"
+        for x in (-90, 90)
+        for y in (-90, 90)
+    )
+    block = "[block]\nmass = '{}'\ncentre_of_gravity = ['0 mm', '0 mm', '0 mm']\n"
+    block += "inertia = ['1 kg m^2', '1 kg m^2', '1 kg m^2']\n"
+    (said,) = (str(doubt) for doubt in load(SINGLE + block.format("0.5 kg") + mounts).doubts)
+    assert said.startswith("mass of the block = 0.5 kg: is not more than the 0.6 kg of its pistons and cranks")
+    assert load(SINGLE + block.format("20 kg") + mounts).doubts == ()
+
+
 def test_a_usual_engine_raises_none() -> None:
     assert doubted() == []
 

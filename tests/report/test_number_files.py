@@ -132,6 +132,10 @@ def test_a_name_that_looks_like_a_formula_stays_text(tmp_path: Path) -> None:
     cells = [cell for row in book["measures"].iter_rows() for cell in row if cell.value and "1+1" in str(cell.value)]
     assert cells
     assert all(cell.data_type != "f" for cell in cells)
+    # as it is, also a dash
+    assert {cell.value for cell in cells} == {"=1+1"}
+    write_book({"one": Sheet(["a", "b"], [["-", "-26.8 %"]])}, tmp_path / "dash.xlsx")
+    assert [cell.value for cell in openpyxl.load_workbook(tmp_path / "dash.xlsx")["one"][2]] == ["-", "-26.8 %"]
 
 
 def test_names_are_known_before_anything_is_made(result: Result) -> None:

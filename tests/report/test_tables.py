@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+import laufruhe
 from cli import scenes
 from laufruhe.report.grid import escaped
 from laufruhe.report.result_report import result_document
@@ -17,6 +18,20 @@ from laufruhe.report.sections import tables_of
 from laufruhe.report.wording import explained, headline, why_star
 from laufruhe.solvers import Result
 from ready import solved
+
+_OPEN_FACTOR = """
+title = "Single"
+operating_points = [{ speed = "3000 rpm" }]
+counterweights = [{ name = "web", balance_factor = { between = [0, 1] } }]
+objective = { minimise = "rms shaking force" }
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+stroke = "90 mm"
+rod_ratio = 0.28
+reciprocating_mass = "0.6 kg"
+throws = [0]
+"""
 
 
 def screen(result: Result) -> str:
@@ -116,5 +131,8 @@ def test_weights_are_in_grams_and_throws_have_their_balance_factor() -> None:
     made = dict(zip(tables["Weights as decided"].head, tables["Weights as decided"].rows[0], strict=True))
     assert float(made["g mm after"]) == pytest.approx(1e6 * float(made["kg m"]), rel=1e-3)
     assert [row[-1] for row in tables["Balance factors"].rows] == ["100.0 %"]
+    # a factor of nothing on a throw without rotating mass is a weight of nothing, and still a factor
+    plain = {grid.title: grid for grid in tables_of(laufruhe.solve(_OPEN_FACTOR))}
+    assert [tuple(row) for row in plain["Balance factors"].rows] == [("cylinder 1", "0.0 %", "50.0 %")]
     tight = {grid.title: grid for grid in tables_of(scenes.solved(scenes.TIGHT))}
     assert re.fullmatch(r"[\d.]+ kg m = [\d.]+ g mm", tight["Decisions"].rows[0][2])

@@ -18,6 +18,7 @@ from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit, Measure
+from laufruhe.report.study_report import _flat
 from laufruhe.solvers import solve
 from laufruhe.studies.equal_power import at_equal_power, check_comparable
 from laufruhe.studies.kinds.economics import Economics
@@ -156,6 +157,11 @@ def test_fronts_label_builds_and_units(four: xr.Dataset) -> None:
     assert four["price"].attrs["units"] == "N / kg"
     assert np.ptp(four["force"].sel(build="plain").values) == 0.0
     assert float(four["gap"].max()) < 1e-4
+
+
+def test_every_number_of_its_csv_file_has_its_unit(four: xr.Dataset) -> None:
+    heads = [*_flat(four).reset_index().columns]
+    assert heads[:3] == ["build", "mass_limit [kg]", "force [N]"]
 
 
 def test_efficient_points_are_those_that_nothing_beats(four: xr.Dataset) -> None:

@@ -81,7 +81,7 @@ def test_engines_are_ranked_by_what_their_designs_do(data: xr.Dataset) -> None:
     assert row[1] == pytest.approx(masses, rel=1e-2)
     assert row[0] + row[1] == pytest.approx(result.objective.value, rel=1e-6)
     assert np.isfinite(data["further"].values).all()
-    assert set(data["untold"].values.ravel().tolist()) == {""}
+    assert set(data["why_none"].values.ravel().tolist()) == {""}
 
 
 @pytest.mark.slow

@@ -26,6 +26,7 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.problem.measure import MEASURES, Limit, Measure
+from laufruhe.report.study_report import _flat
 from laufruhe.solvers import solve
 from laufruhe.studies import Point, Scenes, kinds, run, runner
 from laufruhe.studies.kept_points import KEPT
@@ -216,7 +217,11 @@ def test_an_engine_without_a_further_quantity_says_why(tmp_path: Path, small: Pa
     cells = {row[0]: row[2] for row in ranking.rows}
     assert cells["single"] == "– needs main bearings"
     assert cells["carried"].endswith(" (1)")
-    assert data["untold"].values.tolist() == [["needs main bearings", ""], ["", ""]]
+    assert data["why_none"].values.tolist() == [["needs main bearings", ""], ["", ""]]
+    rows = _flat(data)
+    # a reason stands under a head without a unit
+    assert rows["why_none: maximum main-bearing force"].tolist() == ["needs main bearings", ""]
+    assert rows["further: maximum main-bearing force [N]"][1] > 0.0
     wheel = data["further"].sel(quantity="flywheel for 1/50").values
     assert wheel[0] == wheel[1] > 0.0
 

@@ -6,12 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from laufruhe import load
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.studies.kinds.tolerance import (
+    GRAVITY,
     Tolerance,
     TolerancesTable,
+    _marks,
     built,
     mean_mount_forces,
     random_forces,
@@ -19,10 +22,22 @@ from laufruhe.studies.kinds.tolerance import (
     spread,
     worst_parts,
 )
+from laufruhe.studies.picture import Words
 from laufruhe.studies.scenes import Point
 from problem_files import PROBLEMS
 
 KILOPOND = 9.80665
+
+
+def test_long_words_over_neighbouring_lines_keep_apart() -> None:
+    """Of a kilopond and ten: their names are longer than the distance of the lines."""
+    told = {"mark_names": ["worst sum, a source", "free force, a source"], "mark_forces": [GRAVITY, 10.0 * GRAVITY]}
+    first, second = (mark for mark in _marks(xr.Dataset(attrs=told), 3) if isinstance(mark, Words))
+    assert abs(first.y - second.y) >= 0.3
+    (alone,) = (
+        m for m in _marks(xr.Dataset(attrs={"mark_names": "a", "mark_forces": GRAVITY}), 3) if isinstance(m, Words)
+    )
+    assert alone.y == first.y
 
 
 def tolerances_of(

@@ -113,7 +113,7 @@ def _is_asked(key: str, answers: Answers) -> bool:
         "bank_stagger": kind.takes(key) and kind.cylinders_per_throw == 1,
         "firing_order": several and ("firing_order" not in answers or (unordered and "throws" in answers)),
         "throws": several and unordered,
-        "cylinder_spacing": count > 1,
+        "cylinder_spacing": count > kind.banks,
     }.get(key, True)
 
 

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from laufruhe import units
 from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, printed
+from laufruhe.files.fields import FORMS
 
 Loc: TypeAlias = tuple[str | int, ...]
 MOST_COMPLAINTS = 20
@@ -34,7 +35,7 @@ _RULES = {
     "model_type": "must be one table, in [ ]",
     "model_attributes_type": "must be one table, in [ ]",
     "dict_type": "must be one table, in [ ]",
-    "string_pattern_mismatch": "must be text on one line, without tabs",
+    "string_too_short": "is empty; write something",
 }
 
 
@@ -159,7 +160,8 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], home: s
         rule = f"has {detail['ctx']['actual_length']} entries, and {sense} {detail['ctx'][key]} belong there"
         return Complaint(where, short(detail["input"]), rule, remedy)
     message = (detail["msg"][:1].lower() + detail["msg"][1:]).replace("input should", "must")
-    rule, _, remedy = _RULES.get(kind, message).partition("; ")
+    form = FORMS.get(detail["ctx"]["pattern"]) if kind == "string_pattern_mismatch" else None
+    rule, _, remedy = (form or _RULES.get(kind, message)).partition("; ")
     return Complaint(where, short(detail["input"]), rule, remedy or "correct it")
 
 
@@ -216,8 +218,8 @@ def none_of(table: BaseModel, keys: Sequence[str], where: str, rule: str, remedy
             raise Refused(f"{where}.{key}", None, rule, remedy)
 
 
-def all_different(things: Sequence[Any], where: str, rule: str) -> None:
+def all_different(things: Sequence[Any], where: str, rule: str, remedy: str = "rename one") -> None:
     """Refuse two of the same."""
     for k, thing in enumerate(things):
         if thing in things[:k]:
-            raise Refused(f"{where}[{k + 1}]", thing, f"two {rule}", "move or rename one")
+            raise Refused(f"{where}[{k + 1}]", thing, f"two {rule}", remedy)

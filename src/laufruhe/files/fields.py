@@ -144,7 +144,8 @@ class Number:
         if value < self.least:
             raise refusal(f"must be at least {units.shown(self.least, self.unit)}; give a larger value")
         if value > self.most:
-            or_share = "" if self.unit else f', or "{value:g} %" if per cent is meant'
+            meant = not self.unit and value <= 100.0 * self.most
+            or_share = f', or "{value:g} %" if per cent is meant' if meant else ""
             raise refusal(f"must be at most {units.shown(self.most, self.unit)}; give a smaller value{or_share}")
         return value
 
@@ -289,7 +290,18 @@ Side: TypeAlias = Annotated[
 Throws: TypeAlias = Annotated[
     list[float | Open] | Literal["open"], OrOpen(list[OpenAngle], "[0, 180, 180, 0]", tuple(CRANKS.items()))
 ]
-Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=60, pattern=r"^[^\t\n]+$")]
+_LINE, _SLUG, _SHARE, _FORMAT = r"^[^\t\n]+$", "^[a-z0-9][a-z0-9-]*$", r"^\d+(\.\d+)? ?%$", r"^(#?(\.\d)?[efg])?$"
+FORMS = {
+    _LINE: "must be text on one line, without tabs",
+    _SLUG: 'names files and has small letters, digits and hyphens alone; write for example "fig-2"',
+    _SHARE: 'is no share; write for example "15 %"',
+    _FORMAT: 'is no format of numbers; write for example ".2f"',
+}
+"""What is said of a text that has not the form of a field."""
+Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=60, pattern=_LINE)]
+Slug: TypeAlias = Annotated[str, Field(pattern=_SLUG, max_length=60)]
+Share: TypeAlias = Annotated[str, Field(pattern=_SHARE)]
+Format: TypeAlias = Annotated[str, Field(pattern=_FORMAT)]
 CylinderNumber: TypeAlias = Annotated[int, Field(ge=1, le=48)]
 Pair: TypeAlias = Annotated[list[T], Field(min_length=2, max_length=2)]
 Three: TypeAlias = Annotated[list[T], Field(min_length=3, max_length=3)]

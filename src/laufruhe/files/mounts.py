@@ -163,7 +163,7 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
                 raise Refused(f"{where}.{key}", None, "is open, and rigid mounts stay", 'fix it, or use kind "elastic"')
             numbers += [Open.of(value).start for value in values]
         mounts.append(mount_of(Mount(name, (0.0, 0.0, 0.0)), [*numbers, 0.0]))
-    all_different([m.position for m in mounts], "mounts.positions", "mounts stand in one place")
+    all_different([m.position for m in mounts], "mounts.positions", "mounts stand in one place", "move one")
     return tuple(mounts)
 
 

@@ -289,6 +289,9 @@ def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
 
 
 def _ends(quantity: str, first: Value, last: Value) -> tuple[str, tuple[float, ...]]:
+    for key, end in (("from", first), ("to", last)):
+        # of each alone, so that the right one is named
+        _measured(quantity, (end,), key)
     unit, numbers = _measured(quantity, (first, last), "from")
     if numbers is None and isinstance(first, str) and units.dimension_of(first) is not None:
         remedy = "write its whole path, such as operating_points.1.speed"

@@ -239,7 +239,7 @@ def _still(problem: Problem, how: str) -> Iterator[tuple[str, str]]:
     yield from ((name, f"stars are chosen and not slid, so the one decided stays; {how}") for name in names)
     for decision in problem.decisions:
         if not decision.is_affine:
-            yield decision.name, f"forces do not follow it in proportion, so it stays as it was decided; {how}"
+            yield decision.name, f"forces are not in proportion to it, so that it stays as decided; {how}"
     lots = problem.assembly.lots if problem.assembly is not None else ()
     yield from ((f"the {lot.kind} of every cylinder", "parts are chosen and not slid") for lot in lots)
     if problem.over is not None:

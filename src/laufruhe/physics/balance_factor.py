@@ -29,17 +29,19 @@ class BalanceFactor:
     factor: float
 
 
-def balance_factors(engine: Engine) -> tuple[BalanceFactor, ...]:
+def balance_factors(engine: Engine, and_of_none: bool = False) -> tuple[BalanceFactor, ...]:
     """Balance factors of throws that have a counterweight; each weight counts for the nearest throws of its shaft (L9).
+
+    A weight of nothing counts as none, unless `and_of_none`.
 
     kappa = (-Re sum U e^{-i theta} - m_rot r) / (m_rec r), with the unbalances U [kg m] of the counterweights of a
     throw at theta, its rotating mass m_rot [kg] and reciprocating mass m_rec [kg] at the crank radius r [m].
     """
     shafts = dict.fromkeys(part.shaft for part in engine.slider_cranks)
-    return tuple(found for shaft in shafts for found in _on_shaft(engine, shaft))
+    return tuple(found for shaft in shafts for found in _on_shaft(engine, shaft, and_of_none))
 
 
-def _on_shaft(engine: Engine, shaft: Shaft) -> list[BalanceFactor]:
+def _on_shaft(engine: Engine, shaft: Shaft, and_of_none: bool) -> list[BalanceFactor]:
     """Of the throws of one shaft."""
     throws = _throws([part for part in engine.slider_cranks if part.shaft == shaft])
     places = np.array([throw[0].x for throw in throws])
@@ -54,7 +56,7 @@ def _on_shaft(engine: Engine, shaft: Shaft) -> list[BalanceFactor]:
         for j in near.tolist():
             along = (rotor.unbalance * np.conj(cis(as_turn(throws[j][0].throw)))).real
             opposite[j] -= along / len(near)
-            counted[j] |= rotor in weights and rotor.unbalance != 0.0
+            counted[j] |= rotor in weights and (and_of_none or rotor.unbalance != 0.0)
     found = []
     for k, throw in enumerate(throws):
         whole = sum(part.reciprocating_mass * part.crank_radius for part in throw)

@@ -89,6 +89,10 @@ def _of_rotors(engine: Engine) -> Iterator[Complaint]:
 
 
 def _of_mounts(engine: Engine) -> Iterator[Complaint]:
+    moving = sum(part.reciprocating_mass + part.rotating_mass for part in engine.slider_cranks)
+    if engine.block is not None and engine.block.mass <= moving:
+        rule = f"is not more than the {shown(moving, 'kg')} of its pistons and cranks, which it counts in"
+        yield Complaint("mass of the block", shown(engine.block.mass, "kg"), rule, "check its unit")
     stiffness = sum(max(spring.at_rest) for _, spring in every_spring(engine.mounts))
     if engine.block is None or not stiffness:
         return

@@ -79,7 +79,7 @@ class Set:
             raise self.refused(f"holds the results of laufruhe {verb}")
         in_the_way = [name for name in foreign if not verb or name in self.names]
         if in_the_way:
-            raise self.refused(f"holds '{in_the_way[0]}', which Laufruhe did not make")
+            raise self.refused(f"holds '{in_the_way[0]}', which Laufruhe did not make there")
         return made
 
     def refused(self, rule: str) -> InputError:

@@ -118,6 +118,7 @@ def _flat(data: xr.Dataset) -> Any:
     narrow = data.drop_dims({str(values.dims[1]) for values in across.values()})
     units = {str(name): values.attrs.get("units", "") for name, values in narrow.variables.items()}
     rows = narrow.to_dataframe().rename(columns={name: _headed(name, unit) for name, unit in units.items()})
+    rows.index.names = [_headed(str(name), units.get(str(name), "")) for name in rows.index.names]
     columns: dict[str, Any] = {}
     for name, values in across.items():
         along = values.dims[1]
@@ -125,7 +126,8 @@ def _flat(data: xr.Dataset) -> Any:
         units_of = values.attrs.get("unit_of", f"{along}_unit")
         named = data[units_of].values.tolist() if units_of in data.coords else own
         for k, (of, unit) in enumerate(zip(data[along].values, named, strict=True)):
-            columns[_headed(f"{name}: {of}", unit)] = values.values[:, k]
+            # a reason has no unit
+            columns[_headed(f"{name}: {of}", unit if values.dtype.kind in "fiu" else "")] = values.values[:, k]
     # all at once: frames of many columns grow slowly
     return rows.join(type(rows)(columns, index=rows.index))
 

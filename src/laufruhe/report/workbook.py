@@ -126,14 +126,10 @@ def _other(place: str, cell: Any) -> str:
         return f'<c r="{place}"><v>{float(cell):.16G}</v></c>' if math.isfinite(cell) else ""
     if cell is None or cell == "":
         return ""
-    text = _UNWRITABLE.sub(lambda found: f"_x{ord(found[0]):04X}_", _text(str(cell))[:LONGEST])
+    # a text of its own in the file is no formula, whatever it begins with
+    text = _UNWRITABLE.sub(lambda found: f"_x{ord(found[0]):04X}_", str(cell)[:LONGEST])
     kept = ' xml:space="preserve"' if text != text.strip() else ""
     return f'<c r="{place}" t="inlineStr"><is><t{kept}>{escape(text, quote=False)}</t></is></c>'
-
-
-def _text(text: str) -> str:
-    """A text that no spreadsheet takes for a formula."""
-    return f"'{text}" if text[:1] in "=+-@" else text
 
 
 def _page_names(names: Iterable[str]) -> list[str]:

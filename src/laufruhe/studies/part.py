@@ -53,7 +53,7 @@ class Part(Table):
     it is found there. Its fields are its keys in the study file.
     """
 
-    name: Annotated[str, Field(pattern="^[a-z0-9][a-z0-9-]*$", max_length=60)]
+    name: f.Slug
     title: Annotated[str, Field(min_length=1)]
     source: str = ""
     cases: list[CaseTable] = Field(min_length=1)

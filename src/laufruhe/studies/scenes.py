@@ -82,6 +82,8 @@ class Scenes:
                 advice = beside(path, "paths begin in the folder of the study")
                 raise refused("file", "", "is named by the study and does not exist", advice, path)
             self._files[path] = tables_of(path)
+            if "study" in self._files[path]:
+                raise refused("study", "", "makes this a study file", "a case of a study names a problem", path)
         return self._files[path]
 
     def refused(self, case: CaseTable, where: str, rule: str, remedy: str) -> InputError:

@@ -91,7 +91,7 @@ def solved(problem: Problem, further: Mapping[str, Further] | None = None) -> Re
         "shadow_price": {limit.name: limit.shadow_price for limit in limits if shown.certificate},
         "limit_units": {limit.name: limit.unit for limit in limits},
         "further": {name: value for name, (value, _) in told.items()},
-        "untold": {name: why for name, (_, why) in told.items()},
+        "why_none": {name: why for name, (_, why) in told.items()},
     }
 
 

@@ -67,11 +67,10 @@ class Asked:
     rod: Rod | None = None
     gas: bool = False
 
-    @property
-    def spacing(self) -> float:
-        """Between cylinders [m]; that of one alone does not matter."""
+    def spacing(self, places: int) -> float:
+        """Between so many places along the crank [m]; beside one alone there is no other."""
         given = self.own["cylinder_spacing"]
-        if given is None and self.cylinders > 1:
+        if given is None and places > 1:
             raise KeyedError("cylinder_spacing", 'is missing; add it, for example "125 mm"')
         return 1.0 if given is None else float(given)
 
@@ -97,6 +96,8 @@ class LayoutKind(ABC):
         Keys that may be left open.
     cylinders_per_throw
         Cylinders that share a throw.
+    banks
+        Of which each has a cylinder at every place along the crank.
     is_free
         Whether every slider-crank is listed, and nothing is placed.
     fires_evenly
@@ -112,6 +113,7 @@ class LayoutKind(ABC):
     lists: ClassVar[tuple[str, ...]] = ("throws", "firing_order")
     openable: ClassVar[tuple[str, ...]] = ()
     cylinders_per_throw: ClassVar[int] = 1
+    banks: ClassVar[int] = 1
     is_free: ClassVar[bool] = False
     fires_evenly: ClassVar[bool] = False
     needs_rod: ClassVar[bool] = False

@@ -35,9 +35,10 @@ class Boxer(LayoutKind):
 
     name = "boxer"
     keys = (SPACING, STAGGER)
+    banks = 2
 
     def place(self, asked: Asked) -> Layout:
         """Banks at 180 degrees."""
         if asked.own["bank_stagger"] is None:
             raise KeyedError("bank_stagger", "is missing; add the distance between opposed cylinders")
-        return boxer(asked.cylinders, asked.spacing, asked.own["bank_stagger"])
+        return boxer(asked.cylinders, asked.spacing(asked.cylinders // self.banks), asked.own["bank_stagger"])

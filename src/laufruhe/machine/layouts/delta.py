@@ -92,6 +92,7 @@ class Delta(LayoutKind):
     )
     openable = ("throws",)
     cylinders_per_throw = 3
+    banks = 3
     fires_evenly = True
 
     def place(self, asked: Asked) -> Layout:
@@ -99,7 +100,7 @@ class Delta(LayoutKind):
         rows, rest = divmod(asked.cylinders, 3)
         if rest:
             raise KeyedError("cylinders", "is no multiple of the 3 of a row; give one that is", str(asked.cylinders))
-        triangle, places = self._triangle(asked), stations(rows, asked.spacing)
+        triangle, places = self._triangle(asked), stations(rows, asked.spacing(rows))
         turns = [angle_of(within(triangle.centre(bank, bank), 1)) for bank in range(3)]
         return Layout(
             "delta",

@@ -23,4 +23,4 @@ class Inline(LayoutKind):
 
     def place(self, asked: Asked) -> Layout:
         """One bank, upright."""
-        return inline(asked.cylinders, asked.spacing)
+        return inline(asked.cylinders, asked.spacing(asked.cylinders))

@@ -53,6 +53,7 @@ class Vee(LayoutKind):
     )  # fmt: skip
     openable = ("throws", "firing_order", "bank_angle", "split_pin_angle")
     cylinders_per_throw = 2
+    banks = 2
 
     def place(self, asked: Asked) -> Layout:
         """Two banks on shared or split pins."""
@@ -60,4 +61,4 @@ class Vee(LayoutKind):
         if own["bank_angle"] is None:
             raise KeyedError("bank_angle", "is missing; add the angle between the banks, or its bounds")
         split, stagger = own["split_pin_angle"] or 0.0, own["bank_stagger"] or 0.0
-        return vee(asked.cylinders, asked.spacing, own["bank_angle"], split, stagger)
+        return vee(asked.cylinders, asked.spacing(asked.cylinders // self.banks), own["bank_angle"], split, stagger)

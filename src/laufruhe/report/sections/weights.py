@@ -60,8 +60,9 @@ def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
 
 def _factors(result: Result) -> Grid:
     designs = [result.initial, result.final] if changed(result) else [result.final]
-    found = [{one.cylinders: one.factor for one in balance_factors(design.engine)} for design in designs]
-    names = dict.fromkeys(cylinders for factors in found for cylinders in factors)
+    names = dict.fromkeys(one.cylinders for design in designs for one in balance_factors(design.engine))
+    # a weight that one of the designs has is in the other a weight of nothing
+    found = [{one.cylinders: one.factor for one in balance_factors(design.engine, True)} for design in designs]
     rows = [
         (", ".join(cylinders), *(f"{100.0 * each[cylinders]:.1f} %" if cylinders in each else DASH for each in found))
         for cylinders in names

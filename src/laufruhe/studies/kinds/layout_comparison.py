@@ -108,13 +108,13 @@ class LayoutComparison(SweptPart):
         if not names:
             return found
         values = np.array([[record["further"][name] for name in names] for record in records], dtype=float)
-        why = [[record["untold"][name] for name in names] for record in records]
+        why = [[record["why_none"][name] for name in names] for record in records]
         told = {"long_name": "further quantity of the design decided, in quantity_unit"}
         wheel = f"flywheel for 1/{number(1.0 / self.flywheel_for)}" if self.flywheel_for else ""
         units = ["kg m^2" if name == _LEAST_FLYWHEEL else MEASURES[name][0].unit for name in names]
         both = ("point", "quantity")
         return found.assign(
-            further=(both, values, told), untold=(both, why, {"long_name": "why a design has no such quantity"})
+            further=(both, values, told), why_none=(both, why, {"long_name": "why a design has no such quantity"})
         ).assign_coords(
             quantity=[wheel if name == _LEAST_FLYWHEEL else name for name in names], quantity_unit=("quantity", units)
         )
@@ -160,7 +160,7 @@ def _ranking(data: xr.Dataset) -> list[Text]:
         # what cancels leaves a rounding
         near = _NOTHING * float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
         values = np.where(np.abs(values) < near, 0.0, values)
-        columns.append((name, str(data["quantity_unit"].values[k]), values, data["untold"].values[:, k].tolist()))
+        columns.append((name, str(data["quantity_unit"].values[k]), values, data["why_none"].values[:, k].tolist()))
     swept, rows = swept_names(data), []
     scaled = [(name, *readable(unit), values, _places(values), why) for name, unit, values, why in columns]
     for k in sorted(range(points), key=lambda k: (math.isnan(best[k]), best[k])):

@@ -44,6 +44,8 @@ MOUNTED = 200
 """Most engines whose mount forces are evaluated: one costs as much as a thousand free forces."""
 LEAST, TALL = 0.1, 0.7
 """Left end of the axis [kp]; what is smaller stands there with its value. Height of a density over that of a row."""
+_TOP, _STEP = -0.55, 0.3
+"""Where the words above all rows stand, the first one lowest, in rows."""
 
 
 class TolerancesTable(Table):
@@ -261,10 +263,11 @@ class Tolerance(Part):
         rows = [data.sel(case=name) for name in data["case"].values]
         stated = np.atleast_1d(data.attrs.get("mark_forces", []))
         most = max([float(data["nominal"].max()), float(data["worst"].max()), *stated]) / GRAVITY
+        top = _TOP - 0.25 - (_STEP if len(stated) > 1 else 0.0)
         panel = p.Panel(
             [mark for k, row in enumerate(rows) for mark in _row(row, k)] + _marks(data, len(rows)),
             p.Axis("largest free force over the cycle [kp]", (LEAST, max(2.0 * most, 10.0 * LEAST)), log=(1.0,)),
-            p.Axis(ends=(len(rows) - 0.5, -0.8), ticks=[(k, _label(row)) for k, row in enumerate(rows)], grid=False),
+            p.Axis(ends=(len(rows) - 0.5, top), ticks=[(k, _label(row)) for k, row in enumerate(rows)], grid=False),
         )
         legend: list[p.Mark] = [
             p.Area(label=f"{data.attrs['engines']:,} random engines"),
@@ -334,7 +337,9 @@ def _density(quantiles: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.
 def _marks(data: xr.Dataset, count: int) -> list[p.Mark]:
     names, forces = (np.atleast_1d(data.attrs.get(key, [])) for key in ("mark_names", "mark_forces"))
     found: list[p.Mark] = []
-    for name, force in zip(names, forces / GRAVITY if len(forces) else forces, strict=True):
-        found.append(p.Line([force] * 2, [-0.55, count - 0.5], "faint", width=1.2, dash=(3.0, 2.0), behind=True))
-        found.append(p.Words(force, -0.58, f"{name}: {force:.0f}", colour="faint", across="center", along="bottom"))
+    # long names of two neighbours would touch on one line
+    for k, (name, force) in enumerate(zip(names, forces / GRAVITY if len(forces) else forces, strict=True)):
+        top = _TOP - _STEP * (k % 2)
+        found.append(p.Line([force] * 2, [top, count - 0.5], "faint", width=1.2, dash=(3.0, 2.0), behind=True))
+        found.append(p.Words(force, top, f"{name}: {force:.0f}", colour="faint", across="center", along="bottom"))
     return found

@@ -66,9 +66,7 @@ class StatementTable(Table):
     value: str
     unit: str = ""
     expected: Expression | None = Field(default=None, alias="is", description="Printed number in that unit.")
-    within: int | float | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")] | None = f.told(
-        'Allowed: a number in that unit, or "15 %".'
-    )
+    within: int | float | f.Share | None = f.told('Allowed: a number in that unit, or "15 %".')
     holds: str | None = f.told("Condition, with the name value, in place of is and within.")
     why: str = ""
 
@@ -113,11 +111,7 @@ class BarsTable(Table):
     each: Each = Field(default_factory=dict, alias="for")
     label: str = ""
     labels: list[str] = Field(default_factory=list)
-    number: str = Field(
-        default="",
-        pattern=r"^(#?(\.\d)?[efg])?$",
-        description="Format of the numbers on the bars; three figures by default.",
-    )
+    number: f.Format = f.told("Format of the numbers on the bars; three figures by default.", "")
     colours: list[Hue] = Field(default=["grey", "sky", "orange", "blue", "vermilion", "green"], min_length=1)
 
 
