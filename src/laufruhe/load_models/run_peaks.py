@@ -57,7 +57,7 @@ class RunPeaks:
     @property
     def is_known(self) -> bool:
         """Whether steps follow the run."""
-        return bool(self._sweeps)
+        return bool(self.sweeps)
 
     @property
     def counts(self) -> tuple[int, ...]:
@@ -67,7 +67,7 @@ class RunPeaks:
 
     def values(self, asked: Array) -> Array:
         """Peaks where open numbers of mounts, then columns of unbalances, have these values; no numbers where none."""
-        if self._is_stopped:
+        if self.is_stopped:
             # designs side by side cost hardly more than one
             return self._at(asked)[1]
         key = asked.tobytes()
@@ -87,7 +87,7 @@ class RunPeaks:
 
         None where that is not linear in the loads, as on bump stops.
         """
-        found = [] if self._is_stopped else self._found(points)
+        found = [] if self.is_stopped else self._found(points)
         told = [both for both in found if both is not None]
         if not told or len(told) < len(points):
             return None
@@ -95,7 +95,8 @@ class RunPeaks:
         return [{measure: np.concatenate(runs) for measure, runs in each.items()} for each in pairs]
 
     @cached_property
-    def _is_stopped(self) -> bool:
+    def is_stopped(self) -> bool:
+        """Whether any bump stop can be met."""
         springs = (spring for _, spring in every_spring(self._problem.engine.mounts))
         return any(spring.stop_stiffness > 0.0 and spring.stop_gap < math.inf for spring in springs)
 
@@ -149,7 +150,7 @@ class RunPeaks:
             [sum((u * own for u, own in zip(point[len(self._decisions) :], by, strict=True)), bare) for point in points]
             for bare, by in self._wrenches
         ]
-        runs = [responses_to(models, sweep, own) for sweep, own in zip(self._sweeps, wrenches, strict=True)]
+        runs = [responses_to(models, sweep, own) for sweep, own in zip(self.sweeps, wrenches, strict=True)]
         return [
             None if any(response is None for response in both) else [
                 _of(measure, response) for measure in self.measures for response in both if response is not None
@@ -168,7 +169,7 @@ class RunPeaks:
             return None
 
     @cached_property
-    def _sweeps(self) -> tuple[Sweep, ...]:
+    def sweeps(self) -> tuple[Sweep, ...]:
         """Of run-up and shut-down; none where they take too many steps."""
         run = self._problem.engine.run
         if run is None:
@@ -176,6 +177,11 @@ class RunPeaks:
         told = ((0.0, run.speed, run.up), (run.speed, 0.0, run.down))
         found = [sweep_of(*each, self._coarser) for each in told]
         return tuple(each for each in found if each is not None) if None not in found else ()
+
+    @property
+    def wrenches(self) -> tuple[Array, ...]:
+        """Of both runs those of the bare design."""
+        return tuple(bare for bare, _ in self._wrenches)
 
     @cached_property
     def _wrenches(self) -> list[tuple[Array, list[Array]]]:
@@ -190,7 +196,7 @@ class RunPeaks:
         designs = [problem.numbers(value, opened).engine(plain) if opened else plain for value in values]
         loads = [run_loads(design, point, problem.fidelity) for design in designs]
         out = []
-        for sweep in self._sweeps:
+        for sweep in self.sweeps:
             bare, *others = (
                 sweep.wrenches([(part.orders, part.coefficients) for part in own if part is not None]) for own in loads
             )

@@ -8,6 +8,7 @@ loads make the answer linear in them to a rounding.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -183,6 +184,25 @@ def _quadrature() -> tuple[Array, Array]:
         np.prod([(points - other) / (node - other) for other in nodes if other != node], axis=0) for node in nodes
     ])  # fmt: skip
     return points, np.ascontiguousarray((0.5 * shares * bases).T)
+
+
+@lru_cache
+def step_moments(count: int) -> Array:
+    """Integrals of (1 - s)^k / k! L_i(s) over a step of one, k under a count, L_i of its Gauss points, (k, points)."""
+    points, shares = _quadrature()
+    powers = [(1.0 - points) ** k / math.factorial(k) for k in range(count)]
+    return np.asarray(np.array(powers) @ shares)
+
+
+@lru_cache
+def largest_share() -> float:
+    """What a polynomial through the Gauss points is at most over a step, as a share of its largest value at these.
+
+    The sum of |L_i| is largest at the ends of the step.
+    """
+    nodes = _nodes()
+    ends = [np.prod([(1.0 - o) / (node - o) for o in nodes if o != node]) for node in nodes]
+    return float(np.abs(ends).sum())
 
 
 def _weights(rates: ComplexArray) -> ComplexArray:

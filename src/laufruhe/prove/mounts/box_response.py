@@ -157,7 +157,7 @@ class BoxModel:
         self._base, self._dynamic = self._parts(base), base.dynamic
         ends = [np.where(np.arange(len(decisions)) == j, self.upper, self.lower) for j in range(len(decisions))]
         moved = [self._parts(self.mounting(end)) for end in ends]
-        self._slopes = {
+        self.slopes = {
             name: np.array(
                 [
                     (getattr(other, name) - getattr(self._base, name)) / width
@@ -217,11 +217,11 @@ class BoxModel:
     @property
     def stiffness_slopes(self) -> Array:
         """A by every open number, shape (n, 6, 6)."""
-        return self._slopes["stiffness"]
+        return self.slopes["stiffness"]
 
     def stiffness(self, x: Array) -> Array:
         """A at many designs, shape (boxes, n) to (boxes, 6, 6)."""
-        return self._at("stiffness", x)
+        return self.at("stiffness", x)
 
     def added(self, omegas: Array) -> ComplexArray:
         """What springs whose stiffness depends on frequency add to the impedance, (lines, 6, 6) (E50)."""
@@ -237,19 +237,20 @@ class BoxModel:
             return np.zeros(len(omegas))
         return np.asarray(np.maximum(np.linalg.eigvalsh(self.added(omegas).real)[..., -1], 0.0))
 
-    def _at(self, name: str, x: Array) -> Array:
+    def at(self, name: str, x: Array) -> Array:
+        """A matrix of `Matrices` at many designs, shape (boxes, n) to (boxes, ...)."""
         base: Array = getattr(self._base, name)
-        return np.asarray(base + np.einsum("bn,nij->bij", x - self.lower, self._slopes[name]))
+        return np.asarray(base + np.einsum("bn,nij->bij", x - self.lower, self.slopes[name]))
 
     def expanded(self, lines: Lines, lower: Array, upper: Array) -> Expansion:
         """Motion over boxes, shapes (boxes, n) (E37)."""
         centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
         moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
-        stiffness, loss, damping = (self._at(name, centres)[:, None] for name in ("stiffness", "loss", "damping"))
+        stiffness, loss, damping = (self.at(name, centres)[:, None] for name in ("stiffness", "loss", "damping"))
         impedance: ComplexArray = stiffness + 1j * (moving * loss + omegas * damping) + self.added(lines.omegas)
         impedance = impedance - omegas**2 * np.eye(6)
-        lost = moving[:, None] * self._slopes["loss"] + omegas[:, None] * self._slopes["damping"]
-        slopes = self._slopes["stiffness"] + 1j * lost
+        lost = moving[:, None] * self.slopes["loss"] + omegas[:, None] * self.slopes["damping"]
+        slopes = self.slopes["stiffness"] + 1j * lost
         inverse = inverses(np.asarray(impedance, dtype=np.complex128))
         motion = np.einsum("bkij,kj->bki", inverse, lines.loads)
         return series(centres, halves, inverse, slopes[None], motion)
@@ -267,11 +268,11 @@ class BoxModel:
             return flat, np.zeros((boxes, count, open_numbers, len(rows), 6), dtype=complex)
         moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
         springs, losses, dampers = (
-            self._at(name, at.centres)[:, None, rows] for name in ("springs", "losses", "dampers")
+            self.at(name, at.centres)[:, None, rows] for name in ("springs", "losses", "dampers")
         )
         value = springs + 1j * (moving * losses + omegas * dampers) + self.added_forces(lines.omegas)[:, rows]
-        lost = moving[:, None] * self._slopes["losses"][:, rows] + omegas[:, None] * self._slopes["dampers"][:, rows]
-        by_side = self._slopes["springs"][:, rows] + 1j * lost
+        lost = moving[:, None] * self.slopes["losses"][:, rows] + omegas[:, None] * self.slopes["dampers"][:, rows]
+        by_side = self.slopes["springs"][:, rows] + 1j * lost
         return value, by_side * at.halves[:, None, :, None, None]
 
     def felt_at_most(self, lines: Lines, channel: Channel) -> Array:

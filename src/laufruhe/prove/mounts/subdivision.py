@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +21,11 @@ from laufruhe.problem import channels
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import Divided, divided_on
+from laufruhe.prove.best_first import NEARLY, Divided, divided_on
 from laufruhe.prove.mounts.box_norms import Under, root_under, under
 from laufruhe.prove.mounts.box_numbers import RANGES, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, Lines
+from laufruhe.prove.mounts.box_runs import run_boxes
 from laufruhe.prove.mounts.ranges import SLACK
 
 # open numbers that are divided without being asked for, and what all boxes may cost together
@@ -33,6 +35,8 @@ MOST_BOXES = 20_000
 # numbers held at once
 HELD = 3e6
 HALVINGS = 45
+# numbers of a motion in time that cost as much as one of an order
+RUN_SHARE = 18
 # of the gap that counts as proven, what small orders may take of it
 LEFT_OUT = 0.05
 
@@ -60,7 +64,7 @@ def divided_bound(problem: Problem, value: float, room: float) -> Divided:
 
 def divided_bounds(problem: Problem, value: float, room: float, shares: Sequence[float]) -> Iterator[Divided]:
     """The same by each of these shares of what is worth it, one after the other."""
-    search = StiffnessBoxes(problem, LEFT_OUT * room)
+    search = StiffnessBoxes(problem, LEFT_OUT * room, value - NEARLY * room if value < math.inf else math.inf)
     most = search.most_boxes
     if not most or not search.is_sampled_fully:
         yield from (Divided(0.0, 0) for _ in shares)
@@ -76,12 +80,21 @@ class StiffnessBoxes:
     ----------
     constant
         Of the objective: loads of the block and masses are the same on all mounts.
+    runs
+        Bounds of run-ups that are asked about; none where nothing bounds them.
+
+    Parameters
+    ----------
+    left_out
+        What small orders may take of the objective.
+    enough
+        Of a box whose bound comes to this no more is asked.
     """
 
     what = "boxes of stiffness"
 
-    def __init__(self, problem: Problem, left_out: float) -> None:
-        self.problem = problem
+    def __init__(self, problem: Problem, left_out: float, enough: float = math.inf) -> None:
+        self.problem, self.enough = problem, enough
         evaluation = evaluate_start(problem)
         self.model = BoxModel(problem, evaluation)
         terms = [term for term in problem.load_terms if term.measure.on_mounts]
@@ -94,6 +107,7 @@ class StiffnessBoxes:
             for limit in problem.limits
             if limit.measure.on_mounts
         ]
+        self.runs = run_boxes(self.model)
 
     @property
     def is_sampled_fully(self) -> bool:
@@ -107,7 +121,8 @@ class StiffnessBoxes:
         lines = sum(len(lines.omegas) for _, _, lines, _ in (*self._terms, *self._limits))
         ratios = [term.measure for term in self.problem.mount_terms]
         lines += sum(2 * len(self._ratio_lines(q).omegas) for q in ratios if _is_ratio(q))
-        return max(lines, 1) * len(self.problem.decisions) ** 2 * max(mounts, 2)
+        runs = self.runs.cost // RUN_SHARE if self.runs is not None else 0
+        return max(lines, 1) * len(self.problem.decisions) ** 2 * max(mounts, 2) + runs
 
     @property
     def at_once(self) -> int:
@@ -130,30 +145,55 @@ class StiffnessBoxes:
             return self._bounds(lower, upper)
 
     def _bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        total, slopes, pull = np.zeros(len(lower)), np.zeros_like(lower), np.zeros_like(lower)
+        boxes, pull = _Boxes.of(lower), np.zeros_like(lower)
         for weight, quantity, lines, left_out in self._terms:
             at = self.model.expanded(lines, lower, upper)
-            least = under(self.model, quantity, lines, at)
-            total += weight * (least.value - least.rest - left_out)
-            slopes += weight * least.slopes
+            boxes.add(weight, under(self.model, quantity, lines, at), left_out)
             pull = np.maximum(pull, at.sides)
-        found = self.constant + _known(total - np.abs(slopes).sum(axis=1))
+        for maximum, quantity, lines, left_out in self._limits:
+            least = under(self.model, quantity, lines, self.model.expanded(lines, lower, upper))
+            boxes.hold(least, left_out, maximum)
+        numbers, pulled = self._numbers(lower, upper)
+        broken = self._breaks(lower, upper)
+        found = self.constant + numbers + boxes.least
+        pull = np.maximum(pull, pulled)
+        # run-ups cost most, and tell nothing of boxes that are ruled out
+        left = np.flatnonzero(~broken & (found < self.enough))
+        if self.runs is not None and len(left):
+            own = boxes.kept(left)
+            pull[left] = np.maximum(pull[left], self._run(own, lower[left], upper[left]))
+            found[left] = self.constant + numbers[left] + own.least
+        found = np.where(broken, np.inf, found)
+        return found, np.argmax(np.nan_to_num(pull) + 1e-12 * (upper - lower) / upper.max(), axis=1)
+
+    def _run(self, boxes: _Boxes, lower: Array, upper: Array) -> Array:
+        """Add what run-ups tell of boxes (E65); the pull of sides."""
+        assert self.runs is not None
+        pull, problem = np.zeros_like(lower), self.problem
+        weights = {term.measure: term.weight for term in problem.objective}
+        for measure in self.runs.measures:
+            found = self.runs.under(measure, lower, upper)
+            boxes.add(weights.get(measure, 0.0), found.under)
+            for limit in problem.limits:
+                if limit.measure == measure:
+                    boxes.hold(found.under, 0.0, limit.maximum * (1.0 + SLACK))
+            pull = np.maximum(pull, found.pull)
+        return pull
+
+    def _numbers(self, lower: Array, upper: Array) -> tuple[Array, Array]:
+        """Least of what numbers of the mounts are in the objective, and the pull of sides."""
+        found, pull = np.zeros(len(lower)), np.zeros_like(lower)
         for asked, weight in ((term.measure, term.weight) for term in self.problem.mount_terms):
             if _is_ratio(asked):
                 ratio, pulled = self._ratio(asked, lower, upper)
                 found, pull = np.asarray(found + weight * ratio), np.maximum(pull, pulled)
             else:
                 found = np.asarray(found + weight * RANGES[asked.channel](self.model, asked, lower, upper)[0])
-        found = np.where(self._cannot(lower, upper), np.inf, found)
-        return found, np.argmax(np.nan_to_num(pull) + 1e-12 * (upper - lower) / upper.max(), axis=1)
+        return found, pull
 
-    def _cannot(self, lower: Array, upper: Array) -> Mask:
-        """Boxes on which a limit is broken everywhere."""
+    def _breaks(self, lower: Array, upper: Array) -> Mask:
+        """Boxes on which a limit of a number of the mounts is broken everywhere."""
         out = np.zeros(len(lower), dtype=bool)
-        for maximum, quantity, lines, left_out in self._limits:
-            at = self.model.expanded(lines, lower, upper)
-            least = under(self.model, quantity, lines, at)
-            out |= _known(least.value - least.rest - left_out - np.abs(least.slopes).sum(axis=1)) > maximum
         for limit in self.problem.mount_limits:
             if _is_ratio(limit.measure):
                 out |= self._ratio(limit.measure, lower, upper)[0] > limit.maximum * (1.0 + SLACK)
@@ -230,6 +270,56 @@ def _felt(model: BoxModel, quantity: Measure, budget: float) -> tuple[Lines, flo
     return lines.kept(kept), (1.0 if quantity.norm.of_row_lengths else 2.0) * float(felt[out].sum())
 
 
-def _known(bound: Array) -> Array:
-    """Zero where an expansion does not end: no norm goes under it."""
-    return np.maximum(np.where(np.isfinite(bound), bound, 0.0), 0.0)
+@dataclass(eq=False)
+class _Boxes:
+    """What linear functions tell of boxes, half a box being one: objective, and limits on which it stands.
+
+    Attributes
+    ----------
+    value, slopes
+        Under the objective, shapes (boxes,) and (boxes, open numbers).
+    limits
+        Under what is limited, less its limit, in the same shapes.
+    """
+
+    value: Array
+    slopes: Array
+    limits: list[tuple[Array, Array]] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, lower: Array) -> _Boxes:
+        """Of which nothing is known."""
+        return cls(np.zeros(len(lower)), np.zeros_like(lower))
+
+    def kept(self, which: NDArray[np.intp]) -> _Boxes:
+        """Some of them."""
+        return _Boxes(self.value[which], self.slopes[which], [(v[which], s[which]) for v, s in self.limits])
+
+    def add(self, weight: float, least: Under, left_out: float = 0.0) -> None:
+        """To the objective, where anything is known of it: no norm goes under zero."""
+        value = least.value - least.rest - left_out
+        tells = np.isfinite(value) & (value > 0.0)
+        self.value = self.value + weight * np.where(tells, value, 0.0)
+        self.slopes = self.slopes + weight * np.where(tells[:, None], least.slopes, 0.0)
+
+    def hold(self, least: Under, left_out: float, maximum: float) -> None:
+        """A limit."""
+        over = least.value - least.rest - left_out - maximum
+        known = np.isfinite(over) & np.all(np.isfinite(least.slopes), axis=1)
+        self.limits.append((np.where(known, over, -1.0), np.where(known[:, None], least.slopes, 0.0)))
+
+    @property
+    def least(self) -> Array:
+        """Least objective where each limit by itself is kept; infinite where one is not.
+
+        By a price of the limit at which a side of the box changes its end (P4): the least over the box is linear in the
+        price between these.
+        """
+        found = self.value - np.abs(self.slopes).sum(axis=1)
+        for over, slopes in self.limits:
+            price = np.where(self.slopes * slopes < 0.0, -self.slopes / np.where(slopes != 0.0, slopes, 1.0), 0.0)
+            leaning = np.abs(self.slopes[:, None] + price[:, :, None] * slopes[:, None]).sum(axis=2)
+            held = self.value[:, None] + price * over[:, None] - leaning
+            found = np.maximum(found, held.max(axis=1))
+            found = np.where(over > np.abs(slopes).sum(axis=1), np.inf, found)
+        return np.asarray(np.maximum(found, 0.0))

@@ -6,13 +6,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from laufruhe.load_models.run_look import asks_runs
 from laufruhe.numerics.budget import at_least, in_time, passed
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import NEARLY, Divided
 from laufruhe.prove.certificate import Reach, certified, room_of
-from laufruhe.prove.mounts.subdivision import divided_bounds, divides
+from laufruhe.prove.mounts.subdivision import divided_bound, divided_bounds, divides
 from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.solvers.conclusion import KEPT, values_of
 from laufruhe.solvers.mounts.search import MountSearch
@@ -54,8 +55,13 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
 def _by_boxes(problem: Problem, value: float, room: float, near: Sequence[Value]) -> Divided:
     """By the forces of springs, a few boxes of which close many stiffnesses; by expansions what these leave open.
 
-    Expansions need more boxes of less time: some are tried once the springs of all that is open do not close it.
+    Expansions need more boxes of less time: some are tried once the springs of all that is open do not close it. Of
+    run-ups they alone tell anything, and springs have told what they know without these.
     """
+    if asks_runs(problem):
+        of_runs = divided_bound(problem, value, room)
+        if of_runs.boxes or passed():
+            return of_runs
     alone = divides(problem)
     with at_least(LEAST_SECONDS):
         few = spring_bound(problem, value, room, near, whole=alone)

@@ -232,7 +232,7 @@ def _none(
     """No start ended at a design within the limits: a proof where the convex limits, or all boxes, tell of none."""
     conflict = _proven_conflict(problem)
     if not conflict and divided.bound == math.inf:
-        conflict = _ruled_out(problem)
+        conflict = ruled_out(problem)
     result = none_within(problem, initial, conflict, timing)
     if conflict:
         return result
@@ -247,7 +247,7 @@ def _none(
     return replace(result, status=Status.FAILED, message=message, nearest=near)
 
 
-def _ruled_out(problem: Problem) -> tuple[str, ...]:
+def ruled_out(problem: Problem) -> tuple[str, ...]:
     """Limits that no box keeps together, each needed for that."""
 
     def excluded(kept: Sequence[Limit]) -> bool:

@@ -12,8 +12,13 @@ from laufruhe.machine.mount import every_spring
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
+from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach
+from laufruhe.prove.mounts.box_runs import bounds_runs
+from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, none_within
+from laufruhe.solvers.mounts.bounds import divided_by
+from laufruhe.solvers.mounts.nonlinear import ruled_out
 from laufruhe.solvers.mounts.search import NEAR, Found, MountSearch
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
@@ -44,27 +49,35 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     searched = bool(search.optima) and not stopped and not alone
     if searched and search.best is not None and search.best.design.excess <= NEAR:
         search.refined()
+    divided = divided_by(problem, search, False) if divides(problem) and bounds_runs(problem) else Divided(0.0, 0)
     timing = {"solve": time.perf_counter() - started}
     found = search.chosen
     if found is None or found.design.excess > KEPT:
-        return _none(problem, search, found, none_within(problem, initial, (), timing))
+        conflict = ruled_out(problem) if divided.bound == math.inf else ()
+        result = none_within(problem, initial, conflict, timing)
+        return result if conflict else _none(problem, search, found, result)
     own = None if relaxed is None else relaxed.certificate
+    bare = 0.0 if own is None else own.lower_bound
     optimum = found.optimum
     shown = Shown(
-        bound=0.0 if own is None else own.lower_bound,
-        reach=Reach.ASIDE,
+        bound=max(bare, divided.bound),
+        reach=Reach.NEAR if divided.boxes else Reach.ASIDE,
         kkt_residual=math.inf if optimum is None else optimum.kkt_residual,
-        method=_method(search.optima, max(found.design.value, nothing_of(problem)), own is not None),
+        method=_method(search.optima, max(found.design.value, nothing_of(problem)), bare, divided),
         prices={} if optimum is None else found.joint.prices(optimum),
     )
     design = replace(found.design, problem=problem)
     return concluded(design, initial, shown, timing)
 
 
-def _method(optima: Sequence[LocalOptimum], scale: float, is_bounded: bool) -> str:
+def _method(optima: Sequence[LocalOptimum], scale: float, bare: float, divided: Divided) -> str:
     ends = ends_in_words(optima, len(distinct(optima, scale, 1e-3)))
-    told = "" if is_bounded else "; nothing bounds a run-up alone"
-    bound = "; the bound is that of the same without what is asked of run-ups" if is_bounded else told
+    if divided.bound > bare:
+        bound = f"; bounds of mounts and run-ups looked at in {divided.boxes} box{'es' if divided.boxes > 1 else ''}"
+    elif bare > 0.0:
+        bound = "; the bound is that of the same without what is asked of run-ups"
+    else:
+        bound = "; nothing bounds a run-up alone"
     return f"{ends}, with run-ups integrated{bound}"
 
 

@@ -1,0 +1,105 @@
+"""Loads of a run over long steps, as moments that hold for every mounting (E65).
+
+Under z' = A z + B p(t) a step of length H ends at e^{A H} z + sum_k A^k B m_k with m_k the integral of
+(H - s)^k / k! p(s) over it, p the polynomials that the exact model has for its short steps (E28a): where moments are
+enough, long steps end where the short ones do.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.linear_run import NODES, Sweep, largest_share, step_moments
+
+MOMENTS = 14
+"""Of a long step."""
+
+
+@dataclass(frozen=True, eq=False)
+class LongSteps:
+    """Steps of some short ones each.
+
+    Attributes
+    ----------
+    moments
+        Shape (moments, 6, steps): of the wrench about the origin.
+    pushes, highest
+        What the integral of the length of its share in the motion, and that length, are at most in a step, (steps,).
+    """
+
+    moments: Array
+    pushes: Array
+    highest: Array
+
+    @property
+    def count(self) -> int:
+        """Of steps."""
+        return len(self.pushes)
+
+
+class RunMoments:
+    """Moments of one run.
+
+    Parameters
+    ----------
+    wrenches
+        As `Sweep.wrenches` has them.
+    load
+        From a wrench to what drives the motion, shape (n, 6).
+    times
+        So many short steps make a long one.
+    """
+
+    def __init__(self, sweep: Sweep, wrenches: Array, load: Array, times: int) -> None:
+        self.sweep, self.times = sweep, times
+        self._wrenches = wrenches.reshape(NODES, 6, -1)
+        driven = np.linalg.norm(np.einsum("ni,ais->ans", load, self._wrenches), axis=1).max(axis=0)
+        self._highest = largest_share() * driven
+        self._known: dict[int, LongSteps] = {}
+
+    @property
+    def step(self) -> float:
+        """Length of a long step [s]."""
+        return self.times * self.sweep.step
+
+    def ending_at(self, place: int) -> LongSteps:
+        """Long steps of which one ends at a short one; what is before the start is at rest and without load."""
+        first = place % self.times
+        if first not in self._known:
+            self._known[first] = self._found(first)
+        return self._known[first]
+
+    def short(self, places: Array) -> Array:
+        """Moments of short steps that begin at these, zero beyond the run, shape (..., moments, 6)."""
+        inside = (places >= 0) & (places < self.sweep.count)
+        own = self._wrenches[..., np.where(inside, places, 0)] * inside
+        shares = step_moments(MOMENTS) * self.sweep.step ** np.arange(1, MOMENTS + 1)[:, None]
+        return np.asarray(np.moveaxis(np.tensordot(shares, own, axes=1), (0, 1), (-2, -1)))
+
+    def _found(self, first: int) -> LongSteps:
+        ahead = (self.times - first) % self.times
+        count = (ahead + self.sweep.count) // self.times
+
+        def cut(rows: Array) -> Array:
+            whole = np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(ahead, 0)])[..., : count * self.times]
+            return np.asarray(whole.reshape(*rows.shape[:-1], count, self.times))
+
+        moments = np.einsum("kat,aint->kin", self._weights, cut(self._wrenches), optimize=True)
+        highest = cut(self._highest)
+        return LongSteps(moments, self.sweep.step * highest.sum(axis=1), highest.max(axis=1))
+
+    @property
+    def _weights(self) -> Array:
+        """Of the Gauss points of the short steps in a long one, shape (moments, points, short steps)."""
+        h, found = self.sweep.step, []
+        shares = step_moments(MOMENTS)
+        for later in range(self.times - 1, -1, -1):
+            # (l h + u)^k / k! = sum of (l h)^i / i! u^(k - i) / (k - i)!
+            powers = [(later * h) ** i / math.factorial(i) for i in range(MOMENTS)]
+            own = [sum(powers[i] * h ** (k - i + 1) * shares[k - i] for i in range(k + 1)) for k in range(MOMENTS)]
+            found.append(np.array(own))
+        return np.stack(found, axis=-1)

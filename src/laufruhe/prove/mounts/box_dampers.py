@@ -1,0 +1,174 @@
+"""Maps of a block on its mounts in time over boxes of stiffness, with the viscous damping of E26 (E65).
+
+What moves is felt as P y + (L S + D) y', with P, L and D linear in the stiffnesses, and S = A^{-1/2} of the stiffness A
+of the block at rest: 2/pi times the integral of (A + s^2)^{-1} over s from zero on. In the modes of the middle of a
+box, with E what A differs by there and w the natural frequencies,
+
+    S_ab = 1/w (a = b) + f[a,b] E_ab + sum_c f[a,c,b] E_ac E_cb - ...                              (E65)
+
+with divided differences f of k^{-1/2} at the squares of w. With R = (w^2 + s^2)^{-1}, what is left after the first
+order is 2/pi times the integral of R E (A + s^2)^{-1} E R, and after the second that of -R E R E (A + s^2)^{-1} E R.
+As A >= (1 - t) w^2, Cauchy and Schwarz bound their entries by products of two lengths.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """A matrix that is linear in the open numbers.
+
+    Attributes
+    ----------
+    lowest
+        Where all of these are at their lower bounds, shape (r, n).
+    slopes
+        By every open number, shape (open numbers, r, n).
+    """
+
+    lowest: Array
+    slopes: Array
+
+    def at(self, above: Array) -> Array:
+        """So far above the lower bounds, shape (boxes, open numbers) to (boxes, r, n)."""
+        return np.asarray(self.lowest + np.tensordot(above, self.slopes, axes=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Felt:
+    """P, L and D."""
+
+    position: Linear
+    lossy: Linear
+    drag: Linear
+
+
+@dataclass(frozen=True, eq=False)
+class Roots:
+    """S over boxes, in the modes of their middles; half a box is one.
+
+    Attributes
+    ----------
+    middle, first, second
+        Shapes (boxes, n, n), (boxes, open numbers, n, n), and (boxes, pairs, n, n) of j <= l.
+    after_first, after_second
+        What entries are off by at most then, shape (boxes, n, n); no numbers where nothing is known.
+    """
+
+    middle: Array
+    first: Array
+    second: Array
+    after_first: Array
+    after_second: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Maps:
+    """P y + Q y' over boxes, in shares of half a box.
+
+    Attributes
+    ----------
+    position, positions
+        P at the middle and by side, shapes (boxes, r, n) and (boxes, open numbers, r, n).
+    rate, rates, bends
+        Q at the middle, by side, and by pairs of sides j <= l, (boxes, pairs, r, n).
+    rest
+        What entries of Q are off by at most beyond, shape (boxes, r, n).
+    """
+
+    position: Array
+    positions: Array
+    rate: Array
+    rates: Array
+    bends: Array
+    rest: Array
+
+    @property
+    def bent(self) -> Array:
+        """Largest entries of what is beyond the first order, shape (boxes, r, n)."""
+        return np.asarray(np.abs(self.bends).sum(axis=1) + self.rest)
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether nothing open is in them."""
+        return not (self.positions.any() or self.rates.any() or self.bent.any())
+
+
+def pairs_of(count: int) -> list[tuple[int, int]]:
+    """Of sides j <= l."""
+    return [(j, k) for j in range(count) for k in range(j, count)]
+
+
+def roots(squares: Array, slopes: Array, size: int) -> Roots:
+    """S of boxes from the squares at their middles and the stiffness over half a box there, all in their modes (E65).
+
+    Parameters
+    ----------
+    squares, slopes
+        Shapes (boxes, 6), above zero, and (boxes, open numbers, 6, 6), none of them negative.
+    size
+        Of motion; coordinates beside those of the block have no S.
+    """
+    w = np.sqrt(squares)
+    a, b, c = w[:, :, None, None], w[:, None, None, :], w[:, None, :, None]
+    third = (a + b + c) / (a * b * c * (a + b) * (b + c) * (a + c))
+    own = np.einsum("baca->bac", third)
+    pair = 1.0 / (w[:, :, None] * w[:, None] * (w[:, :, None] + w[:, None]))
+    products = [
+        np.einsum("bac,bcd,bacd->bad", slopes[:, j], slopes[:, k], third, optimize=True)
+        for j, k in pairs_of(slopes.shape[1])
+    ]
+    second = [
+        one if j == k else one + np.swapaxes(one, 1, 2)
+        for one, (j, k) in zip(products, pairs_of(slopes.shape[1]), strict=True)
+    ]
+    most = np.abs(slopes).sum(axis=1)
+    share = np.linalg.eigvalsh(slopes.sum(axis=1) / (w[:, :, None] * w[:, None]))[:, -1]
+    left = 1.0 - share
+    twice = (most / squares[:, None]) @ most
+    near, far = (np.sqrt(np.einsum("bac,bac->ba", each**2, own)) for each in (most, twice))
+    # half a box that reaches to nothing is not known
+    left = np.where(left > 0.0, left, np.nan)[:, None, None]
+    after_first, crossed = (each[:, :, None] * near[:, None] / left for each in (near, far))
+    after_second = np.minimum(crossed, np.swapaxes(crossed, 1, 2))
+    wider = [(0, size - 6), (0, size - 6)]
+    eye = np.eye(6) / w[:, None]
+    found = (eye, -slopes * pair[:, None], np.stack(second, axis=1), after_first, after_second)
+    return Roots(*(np.pad(each, [(0, 0)] * (each.ndim - 2) + wider) for each in found))
+
+
+def mapped(felt: Felt, above: Array, halves: Array, turn: Array, s: Roots, of_motion: bool = False) -> Maps:
+    """Maps of boxes, in the modes of their middles.
+
+    Parameters
+    ----------
+    above, halves
+        Middles above the lower bounds, and half widths, shape (boxes, open numbers).
+    turn
+        From the coordinates of the modes, shape (boxes, n, n).
+    of_motion
+        Whether what is felt is in coordinates of the motion too.
+    """
+
+    def seen(matrices: Array) -> Array:
+        own = turn if matrices.ndim == 3 else turn[:, None]
+        out = matrices @ own
+        return np.asarray(np.swapaxes(own, -1, -2) @ out if of_motion else out)
+
+    scale = halves[:, :, None, None]
+    (p, p_by), (lossy, lossy_by), (drag, drag_by) = (
+        (seen(each.at(above)), seen(scale * each.slopes)) for each in (felt.position, felt.lossy, felt.drag)
+    )
+    by_side = lossy_by @ s.middle[:, None] + lossy[:, None] @ s.first + drag_by
+    bends = []
+    for number, (j, k) in enumerate(pairs_of(halves.shape[1])):
+        bend = lossy @ s.second[:, number] + lossy_by[:, j] @ s.first[:, k]
+        bends.append(bend if j == k else bend + lossy_by[:, k] @ s.first[:, j])
+    rest = np.abs(lossy) @ s.after_second + np.abs(lossy_by).sum(axis=1) @ s.after_first
+    return Maps(p, p_by, lossy @ s.middle + drag, by_side, np.stack(bends, axis=1), rest)

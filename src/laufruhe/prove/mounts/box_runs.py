@@ -1,0 +1,243 @@
+"""Largest force, travel and twist of run-up and shut-down over boxes of stiffness, bounded from below (E65)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from laufruhe.load_models.run_look import run_measures
+from laufruhe.load_models.run_moments import RunMoments
+from laufruhe.load_models.run_peaks import RunPeaks
+from laufruhe.numerics.arrays import Array, Indices
+from laufruhe.problem.measure import Measure
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.mounts.box_dampers import Maps, mapped, pairs_of
+from laufruhe.prove.mounts.box_norms import Under
+from laufruhe.prove.mounts.box_response import BoxModel
+from laufruhe.prove.mounts.run_matrices import Rows, RunMatrices
+from laufruhe.prove.mounts.run_motion import FARTHEST, REACH, Equations, Motion, Steps, equations, motion_of
+
+# long steps that a run has at least
+LEAST_STEPS = 60
+
+
+@dataclass(frozen=True, eq=False)
+class RunUnder:
+    """A linear function under a measure of every box, and what splitting a side would lessen, (boxes, open numbers)."""
+
+    under: Under
+    pull: Array
+
+
+class RunBoxes:
+    """Of a problem whose open numbers are stiffnesses alone.
+
+    Parameters
+    ----------
+    model
+        Of the boxes.
+    measures
+        Of run-ups.
+    """
+
+    def __init__(self, model: BoxModel, measures: Sequence[Measure]) -> None:
+        self._model, self._matrices, self.measures = model, RunMatrices(model), tuple(measures)
+        self._peaks = RunPeaks(model.problem, measures)
+        self._rows: dict[Measure, Rows] = {measure: self._matrices.asked(measure) for measure in measures}
+
+    @property
+    def cost(self) -> int:
+        """Of one box, in numbers."""
+        sides, n = len(self._model.lower), 2 * self._matrices.size
+        columns = 1 + sides + len(pairs_of(sides))
+        return len(self._rows) * sum(run.sweep.count // run.times for run in self._runs) * columns * n
+
+    @cached_property
+    def _scale(self) -> float:
+        """Quickest undamped motion of all [rad/s]."""
+        above = self._model.upper - self._model.lower
+        return float(np.sqrt(np.linalg.eigvalsh(self._matrices.motion.position.at(above[None])[0])[-1]))
+
+    @cached_property
+    def _runs(self) -> tuple[RunMoments, ...]:
+        drag = float(np.linalg.norm(self._matrices.base.damping, 2))
+        runs = []
+        for sweep, wrenches in zip(self._peaks.sweeps, self._peaks.wrenches, strict=True):
+            most = min(REACH / ((self._scale + drag) * sweep.step), sweep.count / LEAST_STEPS)
+            runs.append(RunMoments(sweep, wrenches, self._matrices.base.load, max(int(most), 1)))
+        return tuple(runs)
+
+    def under(self, measure: Measure, lower: Array, upper: Array) -> RunUnder:
+        """Of boxes, shapes (boxes, open numbers); with an infinite rest where nothing is known."""
+        of = self._equations(lower, upper)
+        step = max(run.step for run in self._runs)
+        which = np.flatnonzero(of.known & (np.linalg.norm(of.matrix, 2, axis=(-2, -1)) * step <= FARTHEST))
+        nothing = Under(np.zeros(len(lower)), np.zeros_like(lower), np.full(len(lower), np.inf))
+        out = RunUnder(nothing, np.ones_like(lower))
+        if len(which):
+            of = of if len(which) == len(lower) else self._equations(lower[which], upper[which])
+            found = self._under(measure, of)
+            for name in ("value", "slopes", "rest"):
+                getattr(out.under, name)[which] = getattr(found.under, name)
+            out.pull[which] = found.pull
+        return out
+
+    def _equations(self, lower: Array, upper: Array) -> Equations:
+        return equations(self._model, self._matrices, self._scale, lower, upper)
+
+    def _under(self, measure: Measure, of: Equations) -> RunUnder:
+        felt, d = self._rows[measure]
+        maps = mapped(felt, of.above, of.halves, of.turn, of.roots)
+        found = [_Look(of, run, maps, d).under() for run in self._runs]
+        bounds = [np.nan_to_num(_least(each.under), nan=-np.inf) for each in found]
+        best, pick = np.argmax(bounds, axis=0), np.arange(of.count)
+        value, slopes, rest = (
+            np.array([getattr(each.under, name) for each in found])[best, pick] for name in ("value", "slopes", "rest")
+        )
+        return RunUnder(Under(value, slopes, rest), np.array([each.pull for each in found])[best, pick])
+
+
+def run_boxes(model: BoxModel) -> RunBoxes | None:
+    """Of the run-ups that a problem asks about; none where nothing bounds them."""
+    return RunBoxes(model, run_measures(model.problem)) if bounds_runs(model.problem) else None
+
+
+def bounds_runs(problem: Problem) -> bool:
+    """Whether run-ups are asked about that go in steps and meet no bump stop: with one they are not linear in loads."""
+    measures = run_measures(problem)
+    peaks = RunPeaks(problem, measures)
+    return bool(measures) and peaks.is_known and not peaks.is_stopped
+
+
+def _tops(squares: Array) -> Array:
+    """Of every time but the first: the top of the parabola through three, where that stands between them."""
+    before, middle, after = squares[..., :-2], squares[..., 1:-1], squares[..., 2:]
+    bend, lean = before - 2.0 * middle + after, after - before
+    inside = np.abs(lean) < -2.0 * bend
+    tops = middle - np.where(inside, lean**2 / (8.0 * np.where(inside, bend, -1.0)), 0.0)
+    return np.concatenate([tops, squares[..., -1:]], axis=-1)
+
+
+def _least(under: Under) -> Array:
+    return np.asarray(under.value - under.rest - np.abs(under.slopes).sum(axis=-1))
+
+
+class _Look:
+    """At what one run makes of boxes.
+
+    Parameters
+    ----------
+    maps, d
+        What a measure is the largest length of, d rows a place.
+    """
+
+    def __init__(self, of: Equations, run: RunMoments, maps: Maps, d: int) -> None:
+        self._of, self._run, self._maps, self._d = of, run, maps, d
+        self._steps = Steps(of, run.step)
+
+    def under(self) -> RunUnder:
+        """The best of all moments and places, of steps of which one ends where motion at the middle is largest."""
+        steps = [self._run.ending_at(int(place)) for place in self._peaks()]
+        count = min(each.count for each in steps)
+        moments = np.stack([each.moments[..., :count].reshape(-1, count) for each in steps])
+        pushes, highest = (np.stack([getattr(each, k)[:count] for each in steps]) for k in ("pushes", "highest"))
+        return self._of_motion(motion_of(self._steps, moments, pushes, highest))
+
+    def _peaks(self) -> Indices:
+        """Short steps at which motion at the middles is largest: among long ones, then about the largest of these."""
+        of, run = self._of, self._run
+        whole = run.ending_at(0)
+        rows = whole.moments.reshape(-1, whole.count)
+        moments = np.broadcast_to(rows, (of.count, *rows.shape))
+        middle = self._steps.middle(moments)
+        top = 1 + _tops(self._lengths(middle) ** 2).max(axis=1).argmax(axis=1)
+        boxes, start = np.arange(of.count), run.times * (top - 1)
+        places = start[:, None] + np.arange(2 * run.times)
+        short = Steps(of, run.sweep.step, orders=False)
+        finely = run.short(places).reshape(of.count, 2 * run.times, -1)
+        z = middle[boxes, :, top - 1][..., None]
+        sizes = [self._lengths(z)[..., 0].max(axis=1)]
+        for k in range(2 * run.times):
+            z = short.moves[0] @ z + short.loads[0] @ finely[:, k, :, None]
+            sizes.append(self._lengths(z)[..., 0].max(axis=1))
+        places = start + np.arange(2 * run.times + 1)[:, None]
+        return np.asarray(start + np.where(places <= run.sweep.count, sizes, 0.0).argmax(axis=0))
+
+    def _rows(self, position: Array, rate: Array) -> Array:
+        """From (y, y') as it is counted."""
+        return np.concatenate([position / self._of.scale, rate], axis=-1)
+
+    def _places(self, rows: Array) -> Array:
+        """Rows of places, shape (..., places, d, times)."""
+        return rows.reshape(*rows.shape[:-2], -1, self._d, rows.shape[-1])
+
+    def _lengths(self, z: Array) -> Array:
+        """At the middles, (boxes, places, times) of (boxes, 2 n, times)."""
+        seen = self._rows(self._maps.position, self._maps.rate) @ z
+        return np.asarray(np.linalg.norm(self._places(seen), axis=-2))
+
+    def _of_motion(self, motion: Motion) -> RunUnder:
+        maps, pairs = self._maps, self._steps.pairs
+        own, by = self._rows(maps.position, maps.rate), self._rows(maps.positions, maps.rates)
+        value = own @ motion.middle
+        first = own[:, None] @ motion.first + by @ motion.middle[:, None]
+        bends = self._rows(np.zeros_like(maps.bends), maps.bends)
+        second = own[:, None] @ motion.second + bends @ motion.middle[:, None]
+        for number, (j, k) in enumerate(pairs):
+            second[:, number] += by[:, j] @ motion.first[:, k]
+            if j != k:
+                second[:, number] += by[:, k] @ motion.first[:, j]
+        rows = self._places(value)
+        size = np.linalg.norm(rows, axis=-2)
+        along = rows / np.where(size > 0.0, size, 1.0)[..., None, :]
+        rest = self._gains(along) * motion.left[:, None] + self._further(motion, by)
+        slopes, bent = (np.einsum("bpdt,bspdt->bspt", along, self._places(each)) for each in (first, second))
+        alike = np.array([j == k for j, k in pairs])[:, None, None]
+        # a square is not under zero
+        bent = np.where(alike, np.maximum(-bent, 0.0), np.abs(bent))
+        return self._best(size, slopes, bent, rest)
+
+    def _best(self, size: Array, slopes: Array, bent: Array, rest: Array) -> RunUnder:
+        """Of all places and times that which is highest."""
+        least = size - np.abs(slopes).sum(axis=1) - bent.sum(axis=1) - rest
+        known = np.nan_to_num(least, nan=-np.inf)
+        boxes = np.arange(len(size))
+        place, time = np.unravel_index(known.reshape(len(size), -1).argmax(axis=1), least.shape[1:])
+        size, rest = (each[boxes, place, time] for each in (size, rest))
+        slopes, bent = (each[boxes, :, place, time] for each in (slopes, bent))
+        moved = np.linalg.norm(self._of.first, axis=(-2, -1))
+        share = moved / np.maximum(moved.sum(axis=1), 1e-300)[:, None]
+        pull = np.abs(slopes) + share * np.minimum(rest, size)[:, None]
+        for number, (j, k) in enumerate(self._steps.pairs):
+            for side in {j, k}:
+                pull[:, side] += bent[:, number]
+        scale = np.where(size > 0.0, size, 1.0)[:, None]
+        return RunUnder(Under(size, slopes, rest + bent.sum(axis=1)), pull / scale)
+
+    def _gains(self, along: Array) -> Array:
+        """What a motion of energy one is felt as at most along directions (boxes, places, d, times), without d."""
+        maps, of = self._maps, self._of
+        softest = np.swapaxes(np.linalg.inv(np.linalg.cholesky(of.softest)), 1, 2)
+
+        def sizes(matrices: Array) -> Array:
+            return np.asarray(np.linalg.norm(self._places(matrices), axis=(-2, -1)))
+
+        middle = np.linalg.norm(np.einsum("bpdt,bpdn->bpnt", along, self._places(maps.position @ softest)), axis=2)
+        still = middle + sizes(maps.positions @ softest[:, None]).sum(axis=1)[..., None]
+        moving = sizes(maps.rate) + sizes(maps.rates).sum(axis=1) + sizes(maps.bent)
+        return np.asarray(np.hypot(still, moving[..., None]))
+
+    def _further(self, motion: Motion, by: Array) -> Array:
+        """What is felt of both orders beyond the second, (boxes, places, times)."""
+        maps, n = self._maps, self._of.softest.shape[-1]
+        if maps.is_constant:
+            return np.zeros(1)
+        felt = (self._places(by[:, j, None] @ motion.second) for j in range(by.shape[1]))
+        total = sum(np.linalg.norm(each, axis=-2).sum(axis=1) for each in felt)
+        rates = [np.abs(each[..., n:, :]) for each in (motion.middle, motion.first, motion.second)]
+        bends = np.abs(maps.bends).sum(axis=1) @ (rates[1].sum(axis=1) + rates[2].sum(axis=1))
+        rest = maps.rest @ (rates[0] + rates[1].sum(axis=1) + rates[2].sum(axis=1))
+        return np.asarray(total + np.linalg.norm(self._places(bends + rest), axis=-2))

@@ -1,0 +1,302 @@
+"""Run-ups over boxes of stiffness (E65): against random designs within, SciPy, and what the derivation supposes."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.files.reader import load_tables, tables_of
+from laufruhe.load_models.run_moments import RunMoments
+from laufruhe.load_models.run_peaks import RunPeaks
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.linear_run import LinearRun
+from laufruhe.physics.run_up import run_through
+from laufruhe.physics.runs import run_loads
+from laufruhe.physics.time_model import time_model
+from laufruhe.problem.channels import RUN_FORCE, RUN_TRAVEL, RUN_TWIST
+from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.measure import Measure
+from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from laufruhe.prove.mounts.box_dampers import pairs_of, roots
+from laufruhe.prove.mounts.box_norms import Under
+from laufruhe.prove.mounts.box_response import BoxModel
+from laufruhe.prove.mounts.box_runs import RunBoxes, bounds_runs
+from laufruhe.prove.mounts.run_matrices import RunMatrices
+from laufruhe.prove.mounts.run_motion import Steps, equations
+from laufruhe.prove.mounts.subdivision import divided_bound
+from laufruhe.solvers import Status
+from problem_files import PROBLEMS
+
+READY = PROBLEMS / "soft-single-run-up-mounts.toml"
+OF_RUNS = tuple(Measure(channel) for channel in (RUN_FORCE, RUN_TRAVEL, RUN_TWIST))
+SIZES = (0.02, 0.1, 0.3)
+FLUID = {"mass": "25 kg", "bulge_stiffness": "260 N/mm", "damping": "500 N s/m"}
+
+
+def random_tables(seed: int, **asked: Any) -> dict[str, Any]:
+    """A single on three or four mounts with one to four stiffnesses open, of several kinds of damping."""
+    r = np.random.default_rng(seed)
+    count = int(r.integers(3, 5))
+    axes = r.permutation(3 * count)[: int(r.integers(1, 5))]
+    places = []
+    for m in range(count):
+        stiffness: list[Any] = [f"{k} N/mm" for k in r.uniform(60.0, 400.0, 3)]
+        for axis in axes[axes // 3 == m] % 3:
+            low = r.uniform(30.0, 150.0)
+            high = low * r.uniform(1.5, 8.0)
+            stiffness[axis] = {"between": [f"{low} N/mm", f"{high} N/mm"], "start": f"{0.5 * (low + high)} N/mm"}
+        position = [f"{x} mm" for x in (*r.uniform(-300.0, 300.0, 2), r.uniform(-50.0, 150.0))]
+        place = {"name": f"m{m}", "position": position, "stiffness": stiffness}
+        chance = r.random(3)
+        place |= {"loss_factor": float(r.uniform(0.0, 0.4))} if chance[0] < 0.5 else {}
+        place |= {"damping": [f"{r.uniform(0.0, 400.0)} N s/m"] * 3} if chance[1] < 0.25 else {}
+        place |= {"damping_per_stiffness": f"{r.uniform(0.0, 4.0)} ms"} if chance[2] < 0.2 else {}
+        places.append(place)
+    if seed % 4 == 0:
+        places[0]["fluid_track"] = FLUID
+    rpm = float(r.uniform(500.0, 1500.0))
+    return {
+        **tables_of(READY),
+        "fidelity": {"samples": 360},
+        "mounts": {"kind": "elastic", "loss_factor": float(r.choice([0.0, 0.05, 0.1, 0.3])), "places": places},
+        "block": {
+            "mass": f"{r.uniform(60.0, 250.0)} kg",
+            "centre_of_gravity": [f"{x} mm" for x in (*r.uniform(-60.0, 60.0, 2), r.uniform(0.0, 200.0))],
+            "inertia": [f"{x} kg m^2" for x in r.uniform(5.0, 9.0, 3)],
+        },
+        "operating_points": [{"name": "rated", "speed": f"{rpm} rpm"}],
+        "run_up": {
+            "up_to": f"{rpm} rpm", "time": f"{r.uniform(0.2, 0.5)} s", "shut_down_time": f"{r.uniform(0.2, 0.6)} s",
+        },
+        "objective": {"minimise": "run-up travel"}, "constraints": [], **asked,
+    }  # fmt: skip
+
+
+def random_problem(seed: int, **asked: Any) -> Problem:
+    return load_tables(random_tables(seed, **asked), Path("random.toml"))
+
+
+class Boxes:
+    """A problem, boxes of several sizes within it, and what every measure is at designs."""
+
+    def __init__(self, seed: int) -> None:
+        self.problem = random_problem(seed)
+        self.model = BoxModel(self.problem, evaluate_start(self.problem))
+        self.runs = RunBoxes(self.model, OF_RUNS)
+        self.peaks = RunPeaks(self.problem, OF_RUNS)
+        r = self.random = np.random.default_rng(seed + 1000)
+        low, high = self.model.lower, self.model.upper
+        self.middles = np.exp(r.uniform(np.log(low), np.log(high), (len(SIZES), len(low))))
+        self.shares = np.array(SIZES)[:, None] * r.uniform(0.3, 1.0, self.middles.shape)
+        self.lower = np.clip(self.middles * (1.0 - self.shares), low, high)
+        self.upper = np.clip(self.middles * (1.0 + self.shares), low, high)
+
+    def values(self, x: Array) -> Array:
+        """Largest lengths over all steps, ends of both runs included."""
+        rows = self.peaks.rows([x])
+        assert rows is not None
+        return np.array([np.linalg.norm(rows[0][measure], axis=-1).max() for measure in OF_RUNS])
+
+    def designs(self, box: int, count: int) -> Array:
+        """Half of them corners."""
+        n = len(self.model.lower)
+        shares = np.vstack([self.random.random((count - count // 2, n)), self.random.integers(0, 2, (count // 2, n))])
+        return self.lower[box] + shares * (self.upper[box] - self.lower[box])
+
+
+@cache
+def of_seed(seed: int) -> Boxes:
+    return Boxes(seed)
+
+
+def least(under: Under) -> Array:
+    found = under.value - under.rest - np.abs(under.slopes).sum(axis=1)
+    return np.where(np.isfinite(found), found, -np.inf)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(12))
+def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
+    """Of 200 in every box, corners among them: nor under the linear function; bounds of small boxes are near."""
+    boxes = of_seed(seed)
+    found = [boxes.runs.under(measure, boxes.lower, boxes.upper).under for measure in OF_RUNS]
+    tight = []
+    for box in range(len(SIZES)):
+        best = np.full(len(OF_RUNS), np.inf)
+        half = 0.5 * (boxes.upper[box] - boxes.lower[box])
+        for x in boxes.designs(box, 200):
+            values = boxes.values(x)
+            best = np.minimum(best, values)
+            share = (x - boxes.lower[box]) / half - 1.0
+            lines = np.array([u.value[box] - u.rest[box] + u.slopes[box] @ share for u in found])
+            assert np.all(lines[np.isfinite(lines)] <= values[np.isfinite(lines)] * (1.0 + 1e-9))
+        bounds = np.array([least(under)[box] for under in found])
+        assert np.all(bounds <= best * (1.0 + 1e-9))
+        tight.append(bounds / best)
+    assert np.min(tight[0]) > 0.9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_a_smaller_box_has_no_worse_bound_and_is_known_to_its_cube(seed: int) -> None:
+    """About one middle, from the whole down to nothing, where the bound is what the exact model has there."""
+    boxes = of_seed(seed)
+    sizes = np.array([0.2, 0.1, 0.05, 0.02, 0.01, 0.001, 1e-6])
+    middle = np.repeat(boxes.middles[1:2], len(sizes), axis=0)
+    width = sizes[:, None] * np.minimum(middle - boxes.model.lower, boxes.model.upper - middle)
+    for number, measure in enumerate(OF_RUNS):
+        found = boxes.runs.under(measure, middle - width, middle + width)
+        bounds = least(found.under)
+        assert np.all(np.diff(np.maximum(bounds, 0.0)) >= -1e-9 * bounds[-1])
+        assert bounds[-1] == pytest.approx(boxes.values(middle[0])[number], rel=1e-5)
+        # squares are in the rest as well, as far as they are under
+        assert found.under.rest[5] < 1.2e-2 * found.under.rest[4] + 1e-12 * bounds[-1]
+
+
+@pytest.mark.slow
+def test_scipy_reaches_what_boxes_are_not_under() -> None:
+    """Integrated by its eighth order, with loads at every moment and no modes."""
+    boxes = of_seed(3)
+    problem, run = boxes.problem, boxes.problem.engine.run
+    assert run is not None
+    bounds = np.array([least(boxes.runs.under(measure, boxes.lower, boxes.upper).under) for measure in OF_RUNS])
+    inertia, gas = run_loads(problem.engine, problem.points[0], problem.fidelity)
+    for box in range(2):
+        for x in boxes.designs(box, 4):
+            told = [
+                run_through(boxes.model.mounting(x), inertia, gas, *each, 60, "DOP853", 1e-9)
+                for each in ((0.0, run.speed, run.up), (run.speed, 0.0, run.down))
+            ]
+            values = [
+                max(getattr(own, name) for own in told) for name in ("worst_force", "worst_travel", "worst_twist")
+            ]
+            assert np.all(bounds[:, box] <= np.array(values) * (1.0 + 1e-3))
+        assert np.any(bounds[:, box] > 0.8 * np.array(values))
+
+
+def test_long_steps_end_where_short_ones_do() -> None:
+    """Motion at the middle from moments is that of the exact model, from whichever short step they are counted."""
+    boxes = of_seed(1)
+    whole = (boxes.model.lower[None], boxes.model.upper[None])
+    of = equations(boxes.model, RunMatrices(boxes.model), 80.0, *whole)
+    model = time_model(boxes.model.mounting(0.5 * (whole[0][0] + whole[1][0])))
+    for sweep, wrenches in zip(boxes.peaks.sweeps, boxes.peaks.wrenches, strict=True):
+        exact = LinearRun(model, sweep).response(wrenches)
+        moments = RunMoments(sweep, wrenches, model.load, 7)
+        steps = Steps(of, moments.step)
+        for first in (0, 3):
+            long = moments.ending_at(first)
+            y, rate = np.split(steps.middle(long.moments.reshape(1, -1, long.count))[0], 2)
+            ends = (first - 7) % 7 - 7 * (first > 0) + 7 * np.arange(long.count + 1)
+            inside = ends >= 0
+            turned = of.turn[0] @ (y / of.scale), of.turn[0] @ rate
+            for own, told in zip(turned, (exact.y, exact.rate), strict=True):
+                size = np.abs(told).max()
+                assert np.abs(own[:, inside] - told[:, ends[inside]]).max() < 1e-9 * size
+
+
+def test_roots_of_stiffness_are_as_near_as_they_say() -> None:
+    """Random matrices: what is left after the first and the second order of A^{-1/2} is within its bounds."""
+    r = np.random.default_rng(4)
+    for _ in range(30):
+        squares = np.sort(r.uniform(200.0, 8000.0, 6))
+        slopes = np.stack([np.outer(v, v) for v in r.normal(size=(3, 6))])
+        units = np.sqrt(np.outer(squares, squares))
+        slopes *= r.uniform(0.05, 0.95) / np.linalg.eigvalsh(slopes.sum(axis=0) / units)[-1]
+        found = roots(squares[None], slopes[None], 7)
+        assert found.middle.shape == (1, 7, 7)
+        assert not found.middle[0, 6].any()
+        for d in np.vstack([r.uniform(-1.0, 1.0, (10, 3)), r.choice([-1.0, 1.0], (6, 3))]):
+            values, modes = np.linalg.eigh(np.diag(squares) + np.tensordot(d, slopes, axes=1))
+            exact = np.pad((modes / np.sqrt(values)) @ modes.T, [(0, 1), (0, 1)])
+            once = found.middle[0] + np.tensordot(d, found.first[0], axes=1)
+            twice = once + sum(d[j] * d[k] * own for own, (j, k) in zip(found.second[0], pairs_of(3), strict=True))
+            for near, left in ((once, found.after_first[0]), (twice, found.after_second[0])):
+                assert np.all(np.abs(exact - near) <= left * (1.0 + 1e-9) + 1e-15)
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2, 5])
+def test_losses_drive_no_more_than_is_told(seed: int) -> None:
+    """The damping of every design in a box takes energy, or gives no more than the rate that is known."""
+    boxes = of_seed(seed)
+    of = equations(boxes.model, RunMatrices(boxes.model), 80.0, boxes.lower, boxes.upper)
+    for box in range(len(SIZES)):
+        for x in boxes.designs(box, 20):
+            damping = time_model(boxes.model.mounting(x)).damping
+            assert np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] >= -of.drives[box] - 1e-9 * np.abs(damping).max()
+
+
+def test_a_box_that_reaches_to_a_free_block_is_not_bounded() -> None:
+    """What no spring holds moves as far as it is pushed: nothing is said of it, and nothing false."""
+    told = random_tables(7)
+    for place in told["mounts"]["places"]:
+        place["stiffness"] = [{"between": ["0 N/mm", "300 N/mm"], "start": "100 N/mm"}, "200 N/mm", "200 N/mm"]
+    problem = load_tables(told, Path("loose.toml"))
+    model = BoxModel(problem, evaluate_start(problem))
+    found = RunBoxes(model, OF_RUNS).under(OF_RUNS[1], model.lower[None], model.upper[None])
+    assert least(found.under)[0] == -np.inf
+
+
+def test_stops_are_left_to_what_bounds_them_without_run_ups() -> None:
+    assert bounds_runs(random_problem(1))
+    stopped = random_tables(1)
+    for place in stopped["mounts"]["places"]:
+        place["stop"] = {"gap": "1 mm", "stiffness": "300 N/mm"}
+    assert not bounds_runs(load_tables(stopped, Path("stopped.toml")))
+    assert not bounds_runs(random_problem(1, objective={"minimise": "static sag"}))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seed", "objective", "limit"),
+    [
+        (8, "run-up force", None),
+        (3, "mean mount force", ("run-up travel", "mm", 1e3)),
+        (7, "static sag", ("run-up force", "N", 1.0)),
+    ],
+)
+def test_no_design_of_a_grid_is_under_the_bound(
+    seed: int, objective: str, limit: tuple[str, str, float] | None
+) -> None:
+    """Minimised and limited: what is proven holds for 300 designs, and is near to the best of them."""
+    bare = random_problem(seed, objective={"minimise": objective})
+    given = evaluate(bare)
+    r = np.random.default_rng(seed)
+    low, high = (np.array([getattr(d, side) for d in bare.mount_decisions]) for side in ("lower", "upper"))
+    designs = [remounted(given, bare.design(x.tolist())) for x in low + (high - low) * r.random((300, len(low)))]
+    problem = bare
+    if limit is not None:
+        name, unit, scale = limit
+        measure = next(m for m in OF_RUNS if m.name == name)
+        most = float(np.quantile([design.value(measure) for design in designs], 0.2))
+        problem = random_problem(
+            seed, objective={"minimise": objective}, constraints=[{"limit": name, "max": f"{most * scale} {unit}"}]
+        )
+    values = [objective_value(problem, d) for d in designs if d.excess(problem.limits) <= 0.0]
+    value = min(values)
+    bound = divided_bound(problem, value, 0.05 * value).bound
+    assert bound <= value
+    result = laufruhe.solve(problem)
+    assert result.certificate.lower_bound <= min(value, result.objective.value)
+    assert result.certificate.gap < 0.1
+    assert result.objective.value <= value * (1.0 + 1e-3)
+
+
+@pytest.mark.slow
+def test_what_no_stiffness_keeps_is_named() -> None:
+    """A little under the least travel there is no design, and the limit is named; a little over it there is one."""
+    best = laufruhe.solve(random_problem(7))
+    assert best.certificate.kind is Proof.GLOBAL
+    force, sag = {"minimise": "mean mount force"}, {"limit": "static sag", "max": "1 m"}
+    for share, status in ((0.98, Status.INFEASIBLE), (1.02, Status.OPTIMAL)):
+        limit = {"limit": "run-up travel", "max": f"{share * 1e3 * best.objective.value} mm"}
+        result = laufruhe.solve(random_problem(7, objective=force, constraints=[sag, limit]))
+        assert result.status is status
+        assert result.conflict == (() if status is Status.OPTIMAL else ("run-up travel",))
