@@ -13,7 +13,7 @@ from laufruhe.load_models.uneven_model import Symbols, UnevenModel, rides_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.throws.uneven import star_bounds, throw_costs, uneven_bound
+from laufruhe.prove.throws.uneven import least_bound, star_bounds, throw_costs, uneven_bound
 from laufruhe.solvers import solve
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.search import search_stars
@@ -154,6 +154,20 @@ def test_bank_and_split_pins_move_within_bounds(tmp_path):
     for name in ("bank angle", "split pin angle"):
         assert values[name].lower - 1e-9 <= values[name].value <= values[name].upper + 1e-9
     assert result.objective.value <= result.phasing.even_value
+
+
+@pytest.mark.parametrize("directions", [1, 31, 32, 33, 100])
+def test_the_least_bound_of_stars_is_that_of_all_directions(directions):
+    """Whatever of them a few directions show to be no better, and whatever is known of others."""
+    rng = np.random.default_rng(directions)
+    for size in (1e-3, 1.0, 1e3):
+        costs = size * rng.normal(size=(directions, 4, 5))
+        stars = rng.integers(0, 5, (60, 4)).astype(np.uint8)
+        every = star_bounds(costs, stars)
+        assert least_bound(costs, stars, np.inf) == every.min()
+        for known in (every.min() - size, np.median(every)):
+            assert least_bound(costs, stars, known) == min(known, every.min())
+        assert least_bound(costs, stars[:0], size) == size
 
 
 @pytest.mark.parametrize("cycle", ["two-stroke", "four-stroke"])

@@ -133,7 +133,11 @@ def test_what_came_in_the_meantime_stays(tmp_path: Path) -> None:
     assert (folder / NAMES[3]).read_text() == "mine"
 
 
-def test_a_run_that_works_is_not_swept_away(tmp_path: Path) -> None:
+@pytest.mark.parametrize("locks", [True, False])
+def test_a_run_that_works_is_not_swept_away(locks: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor where no lock tells whether it works."""
+    if not locks:
+        monkeypatch.setattr("laufruhe.numerics.locks.fcntl", None)
     with staged(Set(tmp_path / "set", "--out", "solve", NAMES)) as first:
         (first / NAMES[0]).write_text("first")
         make(tmp_path / "set", "second")

@@ -83,6 +83,8 @@ def test_mounts_agree_with_the_model() -> None:
 
 def test_mounts_over_two_points_are_weighted() -> None:
     result = scenes.solved(scenes.TWO_POINTS)
+    # the first is idle, where least shakes
+    assert parsed(result)["shaking"] == parsed(result)["points"][1]["shaking"] != parsed(result)["points"][0]["shaking"]
     written = parsed(result)
     assert [point["name"] for point in written["points"]] == ["idle", "rated"]
     mean = np.mean([mount["mean"] for mount in written["mounts"]])

@@ -127,6 +127,12 @@ def test_two_runs_do_not_write_at_once(tmp_path: Path) -> None:
         pass
 
 
+def test_a_system_without_locks_keeps_a_study_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("laufruhe.numerics.locks.fcntl", None)
+    with kept_to_one(tmp_path / "s.zarr"):
+        assert (tmp_path / "s.zarr").is_dir()
+
+
 def test_a_full_disk_loses_the_piece_at_hand_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Wherever the disk gets full: in the values, or in the mark that they are done."""
     import zarr.storage._local as local
