@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -284,11 +285,12 @@ def test_a_question_about_modes_needs_no_loads() -> None:
     assert first.initial == second.initial
 
 
-def test_a_transmissibility_needs_its_loads() -> None:
-
+@pytest.mark.parametrize("damped", [{}, {"loss_factor": 0.0, "damping": (900.0, 900.0, 900.0)}])
+def test_a_transmissibility_needs_its_loads(damped: dict[str, Any]) -> None:
     problem = load(PROBLEMS / "powertrain-torque-roll.toml")
     asked = (*problem.load_terms, Term(Measure(channels.TRANSMISSIBILITY)))
-    choice = needs(replace(problem, objective=asked, limits=problem.load_limits))
+    engine = replace(problem.engine, mounts=tuple(replace(mount, **damped) for mount in problem.engine.mounts))
+    choice = needs(replace(problem, engine=engine, objective=asked, limits=problem.load_limits))
     kept = " ".join(choice.kept)
     assert "gas" in kept
     assert "crank speed" in kept
