@@ -25,7 +25,6 @@ HEAVY = {
     "clarabel",
     "cvxpy",
     "distributed",
-    "jinja2",
     "matplotlib",
     "netCDF4",
     "pandas",
