@@ -302,11 +302,11 @@ class SpringBox:
             size = float(np.sum(squared(self.each.felt(line) / line.unit) * moments)) or 1.0
             mounts = self.parts[order.part]
             for spring, (seen, added) in zip(mounts.springs, line.springs, strict=True):
-                apart = added - np.tensordot(s, spring.slopes(len(s)), 1) @ seen
+                apart = spring.in_forces(added - np.tensordot(s, spring.slopes(len(s)), 1) @ seen, order.omega)
                 share = max(float(np.sum(squared(apart) * moments)), 0.0) / size
                 self._spread(pull, [j for j, _ in spring.terms], share)
             for place, (seen, moved) in zip(mounts.places, line.places, strict=True):
-                apart = np.split(moved - s[place.number] * seen, 2)[1]
+                apart = place.in_forces(moved - s[place.number] * seen, order.omega)
                 self._spread(pull, [place.number], max(float(np.sum(squared(apart) * moments)), 0.0) / size)
         for shapes, priced, own, moments in zip(
             self.modes, found.multipliers.shapes, self.search.own, found.shapes, strict=True

@@ -1,8 +1,10 @@
-"""Response of an order over a box of mounts, affine in what open springs and places add to the middle (E42, E52).
+"""Response of an order over a box of mounts, affine in what is open of them and adds to the middle (E42, E52, E66).
 
 A spring whose stiffness is open adds the force t = kappa(s) u to that of the middle, u its deflection. A mount that
-may move by s times h sees s h (theta x e) more of the turn theta of the block, and has the moment s h e x f more. With
-these products t, s theta and s f as variables w, and unbalances beside them,
+may move by s times h sees s h (theta x e) more of the turn theta of the block, and has the moment s h e x f more. What
+is open of a damper adds i W t, t = (C - C(c)) u; where it follows what is open of stiffness, i W b t. With these
+products t, s theta and s f as variables w, f without loss and that of dampers over i W each by itself, and unbalances
+beside them,
 
     D(c) y = r0 + R u - (what is linear in w)                                               (E42)
 
@@ -15,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -116,7 +119,7 @@ def line_of(mounts: OpenMounts, loads: ComplexArray, omega: float, near: Complex
     products = _products(mounts, sizes, columns)
     turning = mounts.turning(omega)
     impedances = mounts.middles * turning[:, None, None] + 1j * omega * mounts.dampers
-    shifted, _, held = _added(mounts, products, turning)
+    shifted, _, held = _added(mounts, products, omega)
     held[:, : 1 + columns] += loads.T / unit
     held -= np.einsum("mia,mij,mjd->ad", mounts.motions, impedances, shifted)
     whole = _impedance(mounts, impedances, omega)
@@ -132,13 +135,14 @@ def _line(
 ) -> Line:
     """Of a motion, with columns, reaches and unit."""
     turning = mounts.turning(omega)
-    shifted, moments, _ = _added(mounts, products, turning)
+    shifted, moments, _ = _added(mounts, products, omega)
     columns, reaches, unit = known
     deflections = mounts.motions @ motion + shifted
-    elastic = mounts.middles @ deflections
+    elastic, viscous = mounts.middles @ deflections, mounts.dampers @ deflections
     for spring, part in zip(mounts.springs, products.springs, strict=True):
-        elastic[spring.mount] += spring.axes @ part
-    forces = elastic * turning[:, None, None] + 1j * omega * (mounts.dampers @ deflections)
+        elastic[spring.mount] += spring.elastic * (spring.axes @ part)
+        viscous[spring.mount] += spring.viscous * (spring.axes @ part)
+    forces = elastic * turning[:, None, None] + 1j * omega * viscous
     held_by = [spring.axes.T @ deflections[spring.mount] for spring in mounts.springs]
     return Line(
         columns,
@@ -150,7 +154,7 @@ def _line(
         deflections[[int(np.argmax(mounts.stands == k)) for k in range(mounts.mounts)]] / mounts.times[:, None, None],
         _of_mounts(mounts, forces, omega, motion) / mounts.times[:, None, None],
         tuple(zip(held_by, products.springs, strict=True)),
-        tuple(zip(_moved(mounts, motion, elastic), products.places, strict=True)),
+        tuple(zip(_moved(mounts, motion, elastic, viscous), products.places, strict=True)),
         reaches,
         unit,
     )
@@ -163,12 +167,15 @@ def _impedance(mounts: OpenMounts, impedances: ComplexArray, omega: float) -> Co
     return np.asarray(whole + added - omega**2 * np.eye(mounts.size), dtype=np.complex128)
 
 
-def _moved(mounts: OpenMounts, motion: ComplexArray, elastic: ComplexArray) -> list[ComplexArray]:
-    """What s of every place multiplies: turns, and moments of forces without loss, shape (2 n, d)."""
+def _moved(
+    mounts: OpenMounts, motion: ComplexArray, elastic: ComplexArray, viscous: ComplexArray
+) -> list[ComplexArray]:
+    """What s of every place multiplies: turns, and moments of springs without loss and of dampers, shape (n, d)."""
     out = []
     for place in mounts.places:
-        moments = sum(h * place.arms @ elastic[m] for m, h in place.mounts)
-        out.append(np.concatenate([place.aside @ mounts.turns @ motion, moments]))
+        felt = (elastic, viscous)[: 1 + place.is_damped]
+        moments = [np.asarray(sum(h * place.arms @ each[m] for m, h in place.mounts)) for each in felt]
+        out.append(np.concatenate([place.aside @ mounts.turns @ motion, *moments]))
     return out
 
 
@@ -197,27 +204,28 @@ def _products(mounts: OpenMounts, sizes: Array, columns: int) -> _Products:
     rows = np.arange(count)
     added[rows, 1 + columns + rows], added[rows, 1 + columns + count + rows] = sizes, 1j * sizes
     counts = [spring.axes.shape[1] for spring in mounts.springs]
-    ends = np.cumsum(counts + [2 * len(place.aside) for place in mounts.places])
+    ends = np.cumsum(counts + [place.products for place in mounts.places])
     parts = np.split(added, ends[:-1]) if len(ends) else []
     return _Products(parts[: len(mounts.springs)], parts[len(mounts.springs) :], added.shape[1])
 
 
-def _added(
-    mounts: OpenMounts, products: _Products, turning: ComplexArray
-) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+def _added(mounts: OpenMounts, products: _Products, omega: float) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
     """What products add to deflections, to what springs without loss do to the block, and to the load of the middle."""
+    turning = mounts.turning(omega)
     shifted = np.zeros((len(turning), 3, products.width), dtype=complex)
     moments, held = (np.zeros((mounts.size, products.width), dtype=complex) for _ in range(2))
     for place, part in zip(mounts.places, products.places, strict=True):
-        turns, turning_moments = np.split(part, 2)
+        turns, *felt = np.split(part, len(part) // len(place.aside))
         for m, reach in place.mounts:
             shifted[m] += reach * place.arms.T @ turns
-        moment = mounts.root[:, 3:] @ place.aside.T @ turning_moments
-        moments += moment
+        own = [mounts.root[:, 3:] @ place.aside.T @ each for each in felt]
+        moments += own[0]
         # mounts of one place have one loss factor
-        held -= moment * turning[place.mounts[0][0]]
+        for moment, factor in zip(own, (turning[place.mounts[0][0]], 1j * omega), strict=False):
+            held -= moment * factor
     for spring, part in zip(mounts.springs, products.springs, strict=True):
-        held -= turning[spring.mount] * mounts.motions[spring.mount].T @ spring.axes @ part
+        factor = spring.elastic * turning[spring.mount] + 1j * omega * spring.viscous
+        held -= factor * mounts.motions[spring.mount].T @ spring.axes @ part
     return shifted, moments, held
 
 
@@ -229,9 +237,10 @@ def _sizes(mounts: OpenMounts, near: ComplexArray) -> Array:
     found = [spring.size * np.maximum(each, least) for spring, each in zip(mounts.springs, seen, strict=True)]
     for place in mounts.places:
         found.append(np.maximum(_lengths(place.aside @ turns), SMALL * np.linalg.norm(turns)))
-        forces = [(h, mounts.middles[m] @ deflections[m]) for m, h in place.mounts]
-        moment = _lengths(np.asarray(sum(h * place.arms @ force for h, force in forces)))
-        found.append(np.maximum(moment, SMALL * sum(abs(h) * np.linalg.norm(force) for h, force in forces)))
+        for matrices in (mounts.middles, mounts.dampers)[: 1 + place.is_damped]:
+            forces = [(h, matrices[m] @ deflections[m]) for m, h in place.mounts]
+            moment = _lengths(np.asarray(sum(h * place.arms @ force for h, force in forces)))
+            found.append(np.maximum(moment, SMALL * sum(abs(h) * np.linalg.norm(force) for h, force in forces)))
     sizes = np.concatenate([np.zeros(0), *found])
     return np.where(sizes > 0.0, sizes, sizes.max(initial=0.0) or 1.0)
 
@@ -242,11 +251,12 @@ def _lengths(rows: ComplexArray) -> Array:
 
 def _most(mounts: OpenMounts, motion: float, seen: Array) -> Array:
     """What every product is not over, for a motion and deflections of the mounts that are not over these."""
-    turn, stiff = motion * float(np.linalg.norm(mounts.turns, 2)), _stiffness_at_most(mounts)
+    turn = motion * float(np.linalg.norm(mounts.turns, 2))
+    felt = _at_most(mounts, "elastic"), _at_most(mounts, "viscous")
     found = [np.full(spring.axes.shape[1], spring.most * seen[spring.mount]) for spring in mounts.springs]
     for place in mounts.places:
-        moment = sum(abs(h) * stiff[m] * seen[m] for m, h in place.mounts)
-        found.append(np.repeat([turn, moment], len(place.aside)))
+        moments = [sum(abs(h) * each[m] * seen[m] for m, h in place.mounts) for each in felt[: 1 + place.is_damped]]
+        found.append(np.repeat([turn, *moments], len(place.aside)))
     return np.concatenate([np.zeros(0), *found])
 
 
@@ -259,12 +269,12 @@ def _seen_at_most(mounts: OpenMounts) -> Array:
     return np.array([float(np.linalg.norm(g, 2)) + h * turn for g, h in zip(mounts.motions, reach, strict=True)])
 
 
-def _stiffness_at_most(mounts: OpenMounts) -> Array:
-    """Of every mount."""
-    stiff = np.linalg.norm(mounts.middles, 2, axis=(1, 2))
+def _at_most(mounts: OpenMounts, kind: Literal["elastic", "viscous"]) -> Array:
+    """Stiffness, or damping, of every mount."""
+    found = np.linalg.norm(mounts.middles if kind == "elastic" else mounts.dampers, 2, axis=(1, 2))
     for spring in mounts.springs:
-        stiff[spring.mount] += spring.most
-    return np.asarray(stiff, dtype=np.float64)
+        found[spring.mount] += abs(getattr(spring, kind)) * spring.most
+    return np.asarray(found, dtype=np.float64)
 
 
 def most_felt(mounts: OpenMounts, loads: ComplexArray, omega: float, travel: bool, chosen: Sequence[int]) -> float:
@@ -275,8 +285,8 @@ def most_felt(mounts: OpenMounts, loads: ComplexArray, omega: float, travel: boo
     members = [k for k, own in enumerate(mounts.members) if own[0] in chosen]
     sizes, counted = mounts.times[mounts.stands], np.isin(mounts.stands, members)
     if not travel:
-        damping = np.linalg.norm(mounts.dampers, 2, axis=(1, 2))
-        sizes = sizes * (_stiffness_at_most(mounts) * np.abs(mounts.turning(omega)) + omega * damping)
+        elastic, viscous = _at_most(mounts, "elastic"), _at_most(mounts, "viscous")
+        sizes = sizes * (elastic * np.abs(mounts.turning(omega)) + omega * viscous)
     found = float((_seen_at_most(mounts) * sizes)[counted].sum())
     if not travel:
         found += math.sqrt(len(chosen)) * float(np.linalg.norm(_of_mounts_alone(mounts, omega)))

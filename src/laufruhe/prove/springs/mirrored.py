@@ -46,12 +46,14 @@ def mirrored_halves(signal: ComplexArray, members: Sequence[tuple[int, ...]]) ->
 
 def _others(mounts: OpenMounts, mirror: Array) -> list[int] | None:
     """Of every spring the one that is its image; None where one has none."""
-    opened = np.zeros((len(mounts.motions), mounts.numbers, 3, 3))
+    opened, lost = (np.zeros((len(mounts.motions), mounts.numbers, 3, 3)) for _ in range(2))
     for spring in mounts.springs:
         for j, matrix in spring.terms:
-            opened[spring.mount, j] += spring.axes @ matrix @ spring.axes.T
+            own = spring.axes @ matrix @ spring.axes.T
+            opened[spring.mount, j] += spring.elastic * own
+            lost[spring.mount, j] += spring.viscous * own
     pairs = [(mounts.motions, ACROSS @ mounts.motions @ mirror)]
-    pairs += [(each, ACROSS @ each @ ACROSS) for each in (mounts.middles, mounts.dampers, opened)]
+    pairs += [(each, ACROSS @ each @ ACROSS) for each in (mounts.middles, mounts.dampers, opened, lost)]
     pairs += [(each, each) for each in (mounts.losses, mounts.lags, mounts.softest)]
     images = [(given, image, float(np.abs(given).max(initial=0.0))) for given, image in pairs]
     found: list[int] = []

@@ -23,7 +23,7 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import DAMPING, LAG, LOSS, POSITION, STIFFNESS, TURNED
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.ranges import SLACK, limited_stiffness, number_ranges
-from laufruhe.prove.springs.opened import Framed, Opened, Place, Spring, own_axes
+from laufruhe.prove.springs.opened import Framed, Opened, Place, Spring
 from laufruhe.prove.springs.planes import Plane
 
 # what turns count as none beside the largest
@@ -43,7 +43,7 @@ class OpenMounts:
     motions
         G at the middle of the box in these coordinates, shape (springs, 3, k).
     middles, dampers
-        Stiffness at the middle and damping, shape (springs, 3, 3).
+        Stiffness and damping at the middle, shape (springs, 3, 3).
     losses, lags
         Loss factors, and viscous damping over stiffness [s], shape (springs,).
     stands
@@ -164,7 +164,7 @@ class OpenMounts:
     @property
     def products(self) -> int:
         """Complex numbers that springs and places add to every order."""
-        return sum(len(s.axes.T) for s in self.springs) + sum(2 * len(place.aside) for place in self.places)
+        return sum(len(s.axes.T) for s in self.springs) + sum(place.products for place in self.places)
 
     @property
     def slopes(self) -> Array:
@@ -173,7 +173,7 @@ class OpenMounts:
         for spring in self.springs:
             arms = spring.axes.T @ self.motions[spring.mount]
             for j, matrix in spring.terms:
-                out[j] += carried(arms, matrix)
+                out[j] += spring.elastic * carried(arms, matrix)
         return out
 
 
@@ -188,9 +188,8 @@ def is_lifted(problem: Problem) -> bool:
     still = all(np.all(low[:, part] == high[:, part]) for part in (LOSS, DAMPING, LAG))
     springs = every_spring(mounting_in(problem.engine).mounts)
     dynamic = np.array([bool(spring.dynamic) for _, spring in springs])
-    damped, unlike = np.any(low[:, DAMPING] != 0.0, axis=1), np.ptp(low[:, DAMPING], axis=1) > 0.0
-    # damping of a mount that moves, or turns and has not the same along all axes, is not linear in these numbers
-    nonlinear = (damped | dynamic) & moved | (unlike | dynamic) & turned
+    # what depends on frequency does not follow these numbers
+    nonlinear = dynamic & (moved | turned)
     return still and not np.any(nonlinear) and bool(np.all(low[:, STIFFNESS] >= 0.0))
 
 
@@ -202,32 +201,29 @@ def open_mounts(problem: Problem, lower: Array, upper: Array, framed: Framed | N
     motions = np.array([point_motion(NUMBERS, opened.middle(m)[POSITION] - centre) @ root.T for m in range(count)])
     found = [opened.springs(m) for m in range(count)]
     places = opened.places()
-    axes = [own_axes(opened.middle(m)[TURNED]) for m in range(count)]
-    dampers = [a.T @ np.diag(opened.low[m, DAMPING]) @ a for m, a in enumerate(axes)]
     floors, ceilings, bands = limited_stiffness(problem, root)
     floors = [(1.0 - 2.0 * SLACK) * floor for floor in floors]
     ceilings = [(1.0 + SLACK) ** 2 * ceiling for ceiling in ceilings]
-    low, high, lossy, lagging = _least_and_most(opened, motions, places, root)
+    low, high, lossy, lagging, damping = _least_and_most(opened, motions, places, root)
     stands = [k for k, _ in every_spring(mounting.mounts)]
     members = tuple((k,) for k in sorted({*stands}))
     return OpenMounts(
-        root, motions, np.array([total for total, _ in found]), np.array(dampers),
+        root, motions, np.array([total for total, _, _ in found]), np.array([total for _, total, _ in found]),
         opened.low[:, LOSS], opened.low[:, LAG], np.array(stands, dtype=np.intp), members,
-        mounting.dynamic, tuple(s for _, own in found for s in own), places, opened.numbers.keys, tuple(floors),
-        tuple(ceilings), tuple(bands), low, high, lossy, lagging,
-        np.asarray(sum(carried(g, c) for g, c in zip(motions, dampers, strict=True))),
+        mounting.dynamic, tuple(s for *_, own in found for s in own), places, opened.numbers.keys, tuple(floors),
+        tuple(ceilings), tuple(bands), low, high, lossy, lagging, damping,
         opened.low[:, STIFFNESS].min(axis=1), opened.planes,
     )  # fmt: skip
 
 
 def _least_and_most(
     opened: Opened, motions: Array, places: Sequence[Place], root: Array
-) -> tuple[Array, Array, Array, Array]:
-    """What stiffness is not under and not over, and what loss and damping that follow it are not under, (6, 6) each."""
-    low, high, lossy, lagging = (np.zeros((6, 6)) for _ in range(4))
+) -> tuple[Array, Array, Array, Array, Array]:
+    """What stiffness is not under and not over, and what loss, lag and damping are not under, shape (6, 6) each."""
+    low, high, lossy, lagging, damping = (np.zeros((6, 6)) for _ in range(5))
     for m, motion in enumerate(motions):
         moved = sum(abs(reach) for place in places for k, reach in place.mounts if k == m)
-        least, most = opened.least_and_most(m)
+        least, most = opened.least_and_most(m, STIFFNESS)
         high += (1.0 + STRETCH * (moved > 0.0)) * carried(motion, most)
         if moved > 0.0:
             size = float(np.linalg.norm(most, 2)) * moved**2
@@ -237,4 +233,5 @@ def _least_and_most(
             low += own
             lossy += float(opened.low[m, LOSS]) * own
             lagging += float(opened.low[m, LAG]) * own
-    return low, high, lossy, lagging
+            damping += carried(motion, opened.least_and_most(m, DAMPING)[0])
+    return low, high, lossy, lagging, damping
