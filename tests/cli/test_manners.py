@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
@@ -55,6 +56,27 @@ def test_output_that_nobody_can_take_is_told(here: Path) -> None:
     assert found.returncode == 1
     assert found.stderr.startswith("laufruhe: the output cannot be written (No space left")
     assert found.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("command", ["check", "solve", "evaluate", "study", "explain", "trade", "page"])
+def test_a_file_that_may_not_be_read_is_told_as_any_other_fault(
+    here: Path, monkeypatch: pytest.MonkeyPatch, command: str
+) -> None:
+    """By the reader, in its one line, and not as a wrong word of the command line."""
+
+    whole = Path.open
+
+    def forbidden(path: Path, *given: Any, **named: Any) -> Any:
+        if path.name == "mine.toml":
+            raise PermissionError(13, "Permission denied")
+        return whole(path, *given, **named)
+
+    (here / "mine.toml").write_text("", encoding="utf-8")
+    monkeypatch.setattr(os, "access", lambda *_, **__: False)
+    monkeypatch.setattr(Path, "open", forbidden)
+    found = run.invoke(app, [command, "mine.toml"])
+    assert found.exit_code == 2
+    assert found.stderr == "mine.toml: file: cannot be read (Permission denied); check its permissions\n"
 
 
 def test_quiet_says_nothing_and_writes_all(here: Path) -> None:

@@ -23,11 +23,12 @@ def _completed(kinds: str) -> Callable[[str], list[str]]:
     return names
 
 
-FileOnDisk = Annotated[Path, typer.Argument(metavar="PROBLEM", help="Problem file (TOML).", show_default=False)]
+ON_DISK = "Problem file (TOML)."
+FileOnDisk = Annotated[Path, typer.Argument(metavar="PROBLEM", help=ON_DISK, show_default=False, readable=False)]
 FILE = "Problem file (TOML); - reads standard input."
-ProblemArgument = Annotated[Path, typer.Argument(metavar="PROBLEM", help=FILE, show_default=False)]
+ProblemArgument = Annotated[Path, typer.Argument(metavar="PROBLEM", help=FILE, show_default=False, readable=False)]
 EITHER = "Problem or study file (TOML); - reads standard input."
-EitherArgument = Annotated[Path, typer.Argument(metavar="FILE", help=EITHER, show_default=False)]
+EitherArgument = Annotated[Path, typer.Argument(metavar="FILE", help=EITHER, show_default=False, readable=False)]
 JSON = "Write the result as JSON to FILE; - prints it, and the text goes to stderr."
 JsonOption = Annotated[str | None, typer.Option("--json", metavar="FILE", help=JSON)]
 PARTS = "Write all parts as JSON to FILE; - prints them."
@@ -73,7 +74,7 @@ JobsOption = Annotated[int | None, typer.Option("--jobs", metavar="N", help=JOBS
 SCHEDULER = "Let the Dask workers of the scheduler at ADDRESS do the work."
 SchedulerOption = Annotated[str | None, typer.Option("--scheduler", metavar="ADDRESS", help=SCHEDULER)]
 STUDY = "Study file (TOML); - reads standard input."
-StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help=STUDY, show_default=False)]
+StudyArgument = Annotated[Path, typer.Argument(metavar="STUDY", help=STUDY, show_default=False, readable=False)]
 FileArgument = Annotated[Path, typer.Argument(metavar="FILE", help="Problem file to write.")]
 FROM = "Engine of the catalogue, or ready problem, to start from."
 COPIED = "Ready problems to copy, with all files that they refer to."
@@ -94,7 +95,9 @@ QUIET = "Print errors only."
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help=QUIET)]
 VERBOSE = "Print every step on standard error, in a pipe too."
 VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help=VERBOSE)]
-Problems = Annotated[list[Path], typer.Argument(metavar="PROBLEM...", help="Problem files.", show_default=False)]
+Problems = Annotated[
+    list[Path], typer.Argument(metavar="PROBLEM...", help="Problem files.", show_default=False, readable=False)
+]
 PORT = "Port to serve at.  [default: 8537, or one that is free]"
 PortOption = Annotated[int | None, typer.Option("--port", metavar="N", help=PORT)]
 NO_BROWSER = "Open no browser; print the address only."

@@ -36,9 +36,9 @@ from laufruhe.solvers.conclusion import angle_name
 from laufruhe.solvers.result import Result
 
 ON_BLOCK = ("shaking force", "rocking couple", "roll moment")
-HOW, HERE = "laufruhe page {file} follows it", "it is decided here, or moved beside"
+HOW, HERE = "laufruhe page {file} follows it", "decided here, or moved beside"
 OBJECTIVE = "objective"
-NOTHING = "Forces follow nothing that is open here in proportion, so this page has no sliders."
+NOTHING = "Forces are in proportion to nothing that is open here, so this page has no sliders."
 
 
 def live_model(problem: Problem, result: Result, is_served: bool = False) -> LiveModel:
@@ -239,7 +239,7 @@ def _still(problem: Problem, how: str) -> Iterator[tuple[str, str]]:
     yield from ((name, f"stars are chosen and not slid, so the one decided stays; {how}") for name in names)
     for decision in problem.decisions:
         if not decision.is_affine:
-            yield decision.name, f"forces are not in proportion to it, so that it stays as decided; {how}"
+            yield decision.name, f"no slider here, because forces do not follow in proportion; {how}"
     lots = problem.assembly.lots if problem.assembly is not None else ()
     yield from ((f"the {lot.kind} of every cylinder", "parts are chosen and not slid") for lot in lots)
     if problem.over is not None:

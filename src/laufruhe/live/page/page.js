@@ -153,9 +153,9 @@ class Page {
     this.error = difference(this.model);
     const size = this.error < 1e-15 ? "less than 1e-15" : exponential(this.error, 2);
     const words = [
-      "Numbers of this page are float64.",
-      `Held against the exact model at ${designsOf(this.model).length} designs as it opened,`,
-      `they differ by ${size} of their size at the most.`,
+      "This page computes its forces itself:",
+      `checked against the exact model at ${designsOf(this.model).length} designs as it opened,`,
+      `they differ by ${size} of their size at most.`,
       this.error > 1e-6 ? "That is more than the figures shown can bear: take the numbers of laufruhe evaluate." : "",
     ];
     this.accuracy.textContent = words.join(" ").trim();
