@@ -50,7 +50,7 @@ def in_twins(work: Callable[[int], T], count: int) -> list[T]:
 
 @contextmanager
 def meanwhile(work: Callable[[], T], pays: bool) -> Iterator[Callable[[], T]]:
-    """Gives what waits for the answer of a twin, which works meanwhile; this process works where it can have none.
+    """Gives what waits for the answer of a twin, which works meanwhile; this process works first where it has none.
 
     Parameters
     ----------
@@ -61,7 +61,8 @@ def meanwhile(work: Callable[[], T], pays: bool) -> Iterator[Callable[[], T]]:
         with _twin(work) as answer:
             yield answer
     else:
-        yield work
+        found = work()
+        yield lambda: found
 
 
 @contextmanager

@@ -152,10 +152,11 @@ def writing_tables(result: Result, folder: Path) -> Iterator[Callable[[], None]]
     """
     sheets = sheets_of(result)
     cells = sum(len(sheet.head) * len(sheet.rows) for sheet in sheets.values())
-    with meanwhile(partial(write_book, sheets, folder / files.BOOK), cells > MANY) as written:
+    book = partial(write_book, sheets, folder / files.BOOK) if sheets else lambda: None
+    with meanwhile(book, cells > MANY) as written:
         for name, sheet in sheets.items():
             write_csv(sheet, folder / f"{name}.csv")
-        yield written if sheets else lambda: None
+        yield written
 
 
 def write_csv(sheet: Sheet, path: Path) -> None:
