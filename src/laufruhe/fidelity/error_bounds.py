@@ -21,7 +21,7 @@ from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.runs import missed_share
 from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.evaluation import Evaluation, evaluate, over
+from laufruhe.problem.evaluation import Evaluation, evaluate, over, value_of_loads
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
@@ -82,7 +82,7 @@ class Scale:
     def __init__(self, problem: Problem, best: Evaluation) -> None:
         self.problem, self.best = problem, best
         self.terms = [term for term in problem.objective if term.measure.is_load]
-        self.value = _loads(problem, best)
+        self.value = value_of_loads(problem, best)
         self._known: dict[tuple[str, Fidelity], float] = {}
 
     @classmethod
@@ -145,7 +145,7 @@ class Scale:
 
     def error_of(self, evaluation: Evaluation) -> float:
         """Of the objective of the same design at another fidelity, as `error_bound`."""
-        value = _loads(self.problem, evaluation)
+        value = value_of_loads(self.problem, evaluation)
         bound = self.lost(evaluation, self.best) + self.missed(evaluation, self.best.samples) + self.doubted
         return relative(bound + ROUNDING * value, value)
 
@@ -240,8 +240,3 @@ def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
         # what is left of twice the steps is no more than what they change
         bound += 2.0 * scale.lost(given, finer)
     return relative(bound, scale.value)
-
-
-def _loads(problem: Problem, evaluation: Evaluation) -> float:
-    """Objective without what is asked of a block on its mounts, which no fidelity changes."""
-    return sum(term.weight * evaluation.value(term.measure) for term in problem.load_terms)

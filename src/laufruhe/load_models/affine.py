@@ -19,7 +19,7 @@ from laufruhe.numerics.spectrum import Spectrum, as_order, common_base
 from laufruhe.physics.mounting import NO_MAP, Mounting, mounting_of, travel_of
 from laufruhe.physics.shaking_loads import added_geared_loads, added_rotor_loads, shaking_loads
 from laufruhe.problem.channels import LoadChannel
-from laufruhe.problem.decision import Decision, Domain, Kind, domains_of, vector_of
+from laufruhe.problem.decision import Decision, Domain, Kind, domains_of, scales_of, vector_of
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure, Rows, bends_of, load_rows, mass_rows
@@ -115,7 +115,7 @@ class AffineProblem:
     @property
     def scales(self) -> Array:
         """Largest size of every column."""
-        return np.concatenate([np.full(d.width, d.scale) for d in self.domains]) if self.domains else np.zeros(0)
+        return scales_of(self.domains)
 
     @cached_property
     def units(self) -> Array:

@@ -85,9 +85,13 @@ def prepare(problem: Problem, prune: bool = True) -> Designs:
     return Designs(problem, model, terms, limits)
 
 
+def by_feature(norm: AffineNorm) -> Array:
+    """V0 and the columns of B as `BatchNorm` has them, shape (d, 1 + n, k)."""
+    return np.concatenate([norm.constant[:, :, None], norm.slope], axis=2).transpose(1, 2, 0)
+
+
 def _batched(norm: AffineNorm, prune: bool) -> BatchNorm:
-    rows = np.concatenate([norm.constant[:, :, None], norm.slope], axis=2).transpose(1, 2, 0)
-    grid = norm.grid
+    rows, grid = by_feature(norm), norm.grid
     if prune and norm.norm.of_row_lengths:
         rows, weights = _merged(rows, grid.weights)
         grid = Grid(weights, len(weights))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from laufruhe.load_models.affine import AffineNorm
+from laufruhe.load_models.batch import by_feature
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.batch_norms import BatchNorm
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
@@ -66,6 +67,6 @@ def values_of(terms: Sequence[tuple[float, AffineNorm]], errors: Array) -> Array
     features = np.concatenate([np.ones((len(errors), 1)), errors], axis=1)
     total = np.zeros(len(errors))
     for weight, norm in terms:
-        rows = np.concatenate([norm.constant[:, :, None], norm.slope], axis=2).transpose(1, 2, 0)
-        total += weight * BatchNorm(norm.norm, np.ascontiguousarray(rows), norm.grid).values(features)
+        rows = np.ascontiguousarray(by_feature(norm))
+        total += weight * BatchNorm(norm.norm, rows, norm.grid).values(features)
     return total

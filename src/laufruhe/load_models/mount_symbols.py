@@ -18,6 +18,7 @@ from laufruhe.machine.dynamic import Dynamic
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import symbols
+from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import along_axes, carried, point_motion, turned_axes
 from laufruhe.problem.decision import DAMPING, LAG, LOSS, POSITION, STIFFNESS, TURNED
 from laufruhe.problem.problem import Problem
@@ -67,7 +68,7 @@ def mount_matrices(problem: Problem, block: Block) -> Any:
     """A CasADi function from the decisions to the matrices of `SymbolicMounts`, in that order."""
     lib = symbols()
     decisions = ca.SX.sym("mounts", len(problem.mount_decisions))
-    root = ca.DM(np.linalg.inv(np.linalg.cholesky(block.mass_matrix)))
+    root = ca.DM(mass_root(block))
     totals = [ca.SX(6, 6) for _ in range(3)]
     maps: list[list[Any]] = [[], [], [], []]
     found = problem.numbers([decisions[k] for k in range(len(problem.mount_decisions))], problem.mount_decisions)

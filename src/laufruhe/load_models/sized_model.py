@@ -21,7 +21,7 @@ from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.norms.norm import lengths
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.problem.decision import Decision, Kind, domains_of, vector_of
+from laufruhe.problem.decision import Decision, Kind, domains_of, ends_of, vector_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
 from laufruhe.problem.measure import Measure, Rows, bends_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
@@ -228,9 +228,7 @@ class SizeModel:
     @cached_property
     def _span(self) -> tuple[Array, Array]:
         """Least and most of every column within the bounds."""
-        wide = [(d.set.lower, d.set.upper) if d.width == 1 else (-d.scale, d.scale) for d in self.domains]
-        ends = [pair for pair, d in zip(wide, self.domains, strict=True) for _ in range(d.width)]
-        low, high = (np.array([pair[k] for pair in ends]) for k in (0, 1))
+        low, high = ends_of(self.domains)
         return np.append(self.mass_box[0], low), np.append(self.mass_box[1], high)
 
     @cached_property

@@ -37,8 +37,7 @@ class Bearing:
     def scaled(self, length: float) -> Bearing:
         """The same bearing in another size."""
         diameter, width = (None if size is None else size * length for size in (self.diameter, self.width))
-        shaft = replace(self.shaft, y=self.shaft.y * length, z=self.shaft.z * length)
-        return replace(self, x=self.x * length, diameter=diameter, width=width, shaft=shaft)
+        return replace(self, x=self.x * length, diameter=diameter, width=width, shaft=self.shaft.scaled(length))
 
     @property
     def area(self) -> float:

@@ -29,6 +29,10 @@ class Shaft:
         if self.ratio == 0.0:
             raise ModelError(f"shaft '{self.name}' has ratio 0: a shaft that stands still balances nothing")
 
+    def scaled(self, length: float) -> Shaft:
+        """The same shaft of an engine in another size."""
+        return replace(self, y=self.y * length, z=self.z * length)
+
 
 CRANKSHAFT = Shaft("crankshaft")
 

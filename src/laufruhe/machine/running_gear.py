@@ -74,7 +74,7 @@ class Shank:
     @property
     def inertia(self) -> float:
         """Second moment of the section [m4]."""
-        return 0.5 * self.diameter * round_modulus(self.diameter, self.bore)
+        return round_inertia(self.diameter, self.bore)
 
 
 @dataclass(frozen=True)
@@ -292,6 +292,11 @@ def ring_area(diameter: float, bore: float) -> float:
 def round_modulus(diameter: float, bore: float = 0.0) -> float:
     """Of a round section against bending, half of that against torsion [m3] (Z1)."""
     return math.pi / 32.0 * (diameter**4 - bore**4) / diameter
+
+
+def round_inertia(diameter: float, bore: float = 0.0) -> float:
+    """Second moment of a round section [m4]."""
+    return 0.5 * diameter * round_modulus(diameter, bore)
 
 
 def _check_hollow(name: str, diameter: float, bore: float) -> None:

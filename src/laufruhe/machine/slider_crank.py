@@ -206,7 +206,7 @@ class SliderCrank:
             reciprocating_mass=self.reciprocating_mass * mass,
             rotating_mass=self.rotating_mass * mass,
             rod_inertia_deficit=self.rod_inertia_deficit * mass * length**2,
-            shaft=replace(self.shaft, y=self.shaft.y * length, z=self.shaft.z * length),
+            shaft=self.shaft.scaled(length),
             big_end=self.big_end and (self.big_end[0] * length, self.big_end[1] * length),
             facing=self.facing and self.facing.scaled(length),
         )

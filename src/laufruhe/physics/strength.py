@@ -28,7 +28,7 @@ from laufruhe.machine import (
     SliderCrank,
     Webs,
 )
-from laufruhe.machine.running_gear import ring_area, round_modulus
+from laufruhe.machine.running_gear import ring_area, round_inertia, round_modulus
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.bearing_loads import crank_forces, pin_forces
@@ -243,7 +243,7 @@ def pin_bending_factors(engine: Engine, _: OperatingPoint) -> Array:
 def deflection_factors(engine: Engine, _: OperatingPoint) -> Array:
     """Deflection of every piston pin for each newton [m/N] (Z9; eq. 93)."""
     modulus = gear_of(engine).elastic_modulus
-    return _of_pins(engine, lambda pin: SPREAD * pin.span**3 / (48.0 * modulus * _pin_inertia(pin)))
+    return _of_pins(engine, lambda pin: SPREAD * pin.span**3 / (48.0 * modulus * round_inertia(pin.diameter, pin.bore)))
 
 
 def ovality_factors(engine: Engine, _: OperatingPoint) -> Array:
@@ -298,10 +298,6 @@ def gear_mass(engine: Engine) -> float:
 
 def _of_pins(engine: Engine, factor: Callable[[PistonPin], float]) -> Array:
     return np.full(len(engine.slider_cranks), factor(_part(engine, "piston_pin", PistonPin)))
-
-
-def _pin_inertia(pin: PistonPin) -> float:
-    return 0.5 * pin.diameter * round_modulus(pin.diameter, pin.bore)
 
 
 def _part(engine: Engine, name: str, kind: type[T]) -> T:

@@ -14,6 +14,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.dynamic_springs import DynamicSprings
 from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import moved_wrench
 
 NO_LAW = "a stiffness measured over frequency has no law in time; give a fluid_track, or leave time and run-ups out"
@@ -96,7 +97,7 @@ def time_model(mounting: ElasticMounting) -> TimeModel:
     mode keeps the loss factor that the mounts give it, and forces and motion agree.
     """
     modes = mounting.modes
-    root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
+    root = mass_root(mounting.block)
     vectors = np.linalg.solve(root.T, modes.shapes)
     motions = mounting.motions @ root.T
     places, springs = zip(*every_spring(mounting.mounts), strict=True)

@@ -173,6 +173,11 @@ class Domain:
         """Largest size."""
         return self.decision.set.scale
 
+    @property
+    def ends(self) -> tuple[float, float]:
+        """Least and largest that each of its columns is within the bounds."""
+        return (self.set.lower, self.set.upper) if self.width == 1 else (-self.scale, self.scale)
+
     def complex_value(self, x: Array) -> complex:
         """The decision u from the decision vector."""
         return complex(sum(part * d for part, d in zip(x[self.columns], self.set.directions, strict=True)))
@@ -200,6 +205,23 @@ def domains_of(decisions: Sequence[Decision]) -> tuple[Domain, ...]:
         out.append(Domain(decision, start))
         start += out[-1].width
     return tuple(out)
+
+
+def ends_of(domains: Sequence[Domain]) -> tuple[Array, Array]:
+    """Least and most of every column of a decision vector within the bounds."""
+    low, high = (np.array([d.ends[k] for d in domains for _ in range(d.width)], dtype=float) for k in (0, 1))
+    return low, high
+
+
+def sides_of(decisions: Sequence[Decision]) -> tuple[Array, Array]:
+    """Bounds of decisions that are one number each."""
+    lower, upper = (np.array([getattr(d, side) for d in decisions], dtype=float) for side in ("lower", "upper"))
+    return lower, upper
+
+
+def scales_of(domains: Sequence[Domain]) -> Array:
+    """Largest size of every column of a decision vector."""
+    return np.concatenate([np.zeros(0), *(np.full(d.width, d.scale) for d in domains)])
 
 
 def vector_of(domains: Sequence[Domain], values: Sequence[Value] | Array | None = None) -> Array:

@@ -204,6 +204,11 @@ def objective_value(problem: Problem, evaluation: Evaluation) -> float:
     return sum(term.weight * evaluation.value(term.measure) for term in problem.objective)
 
 
+def value_of_loads(problem: Problem, evaluation: Evaluation) -> float:
+    """The same without what is asked of a block on its mounts, which no fidelity changes."""
+    return sum(term.weight * evaluation.value(term.measure) for term in problem.load_terms)
+
+
 def samples_of(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE) -> Array:
     """A channel at operating point k over the whole cycle, shape (samples, places, d)."""
     signal = channel.signal(evaluation.loads[k])

@@ -9,7 +9,7 @@ from functools import partial
 from laufruhe.fidelity.automatic import choose
 from laufruhe.fidelity.error_bounds import error_bound, missed, reference, relative, sampling_error
 from laufruhe.numerics.budget import in_time, passed
-from laufruhe.problem.evaluation import Evaluation, objective_value
+from laufruhe.problem.evaluation import Evaluation, objective_value, value_of_loads
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import Result
 
@@ -26,7 +26,7 @@ def error_of(problem: Problem, evaluation: Evaluation) -> float:
     loads = _error_of_loads(problem, evaluation)
     if not runs or evaluation.resonance:
         return loads
-    share = sum(term.weight * evaluation.value(term.measure) for term in problem.load_terms) * loads
+    share = value_of_loads(problem, evaluation) * loads
     between = sum(term.weight * missed(term.measure, evaluation) for term in runs)
     return relative(share + between, objective_value(problem, evaluation))
 

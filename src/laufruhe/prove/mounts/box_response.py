@@ -22,9 +22,11 @@ from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, mounting_in
+from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
@@ -150,9 +152,9 @@ class BoxModel:
     def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
         self.problem, self.evaluation = problem, evaluation
         decisions = problem.mount_decisions
-        self.lower, self.upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+        self.lower, self.upper = sides_of(decisions)
         base = self.mounting(self.lower)
-        self.root = np.linalg.inv(np.linalg.cholesky(base.block.mass_matrix))
+        self.root = mass_root(base.block)
         self.travels = (base.motions @ self.root.T).reshape(-1, 6)
         self._base, self._dynamic = self._parts(base), base.dynamic
         ends = [np.where(np.arange(len(decisions)) == j, self.upper, self.lower) for j in range(len(decisions))]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.numerics.arrays import Array, ComplexArray
-from laufruhe.problem.decision import Domain, vector_of
+from laufruhe.problem.decision import Domain, ends_of, vector_of
 from laufruhe.problem.sets import Value
 
 # share of the largest load under which one counts as none
@@ -72,12 +72,8 @@ def columns_of(domains: Sequence[Domain], values: Sequence[Value]) -> tuple[Colu
 
 def _ranges(domains: Sequence[Domain]) -> tuple[Array, Array]:
     """Middle and reach of every column."""
-    middles, reaches = [np.zeros(0)], [np.zeros(0)]
-    for domain in domains:
-        low, high = (domain.set.lower, domain.set.upper) if domain.width == 1 else (-domain.scale, domain.scale)
-        middles.append(np.full(domain.width, 0.5 * (low + high)))
-        reaches.append(np.full(domain.width, 0.5 * (high - low)))
-    return np.concatenate(middles), np.concatenate(reaches)
+    low, high = ends_of(domains)
+    return 0.5 * (low + high), 0.5 * (high - low)
 
 
 def _sets(domains: Sequence[Domain], count: int) -> list[Array]:

@@ -18,6 +18,7 @@ from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.dynamic_springs import DynamicSprings
+from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import carried, point_motion
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import DAMPING, LAG, LOSS, POSITION, STIFFNESS, TURNED
@@ -196,7 +197,7 @@ def is_lifted(problem: Problem) -> bool:
 def open_mounts(problem: Problem, lower: Array, upper: Array, framed: Framed | None = None) -> OpenMounts:
     """The mounts of a problem that `is_lifted`, its open numbers between these."""
     mounting, opened = mounting_in(problem.engine), Opened(problem, lower, upper, framed)
-    root = np.linalg.inv(np.linalg.cholesky(mounting.block.mass_matrix))
+    root = mass_root(mounting.block)
     count, centre = len(opened.low), np.array(mounting.block.centre_of_gravity)
     motions = np.array([point_motion(NUMBERS, opened.middle(m)[POSITION] - centre) @ root.T for m in range(count)])
     found = [opened.springs(m) for m in range(count)]

@@ -12,6 +12,7 @@ import numpy as np
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import off_resonance
@@ -64,7 +65,7 @@ class SpringBoxes:
     ) -> None:
         self.problem, self.value, self.enough, self.ahead = problem, value, value - NEARLY * room, ahead
         decisions = problem.mount_decisions
-        lower, upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+        lower, upper = sides_of(decisions)
         self._near = np.array([v for v, d in zip(near, problem.decisions, strict=True) if not d.is_affine], dtype=float)
         self._frames = number_ranges(problem, self._near, self._near)[0]
         self._planes = open_mounts(problem, lower, upper, Framed(self._frames)).planes

@@ -16,7 +16,7 @@ from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.decision import STIFFNESS, Decision
+from laufruhe.problem.decision import STIFFNESS, Decision, sides_of
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
@@ -62,7 +62,7 @@ def _convex_sides(limit: Limit) -> bool:
 def convex_program(problem: Problem) -> ConvexProgram:
     """The functions of a problem that `is_convex`."""
     decisions = problem.decisions
-    lower, upper = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+    lower, upper = sides_of(decisions)
     start = np.array([d.start_number for d in decisions])
     given = mounting_in(problem.design(start.tolist()))
     root = mass_root(given.block)

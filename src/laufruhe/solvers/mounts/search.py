@@ -14,7 +14,7 @@ from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed, rounds
 from laufruhe.numerics.progress import tell
-from laufruhe.problem.decision import domains_of
+from laufruhe.problem.decision import domains_of, sides_of
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
@@ -196,7 +196,7 @@ class MountSearch:
         around = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
         if around and len(points) > 1 and not self._is_explored(optima) and not passed():
             decisions = problem.mount_decisions
-            low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+            low, high = sides_of(decisions)
             again = []
             for k in range(max(len(points) // 2, 1)):
                 x = around[k % len(around)].x

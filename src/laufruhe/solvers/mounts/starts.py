@@ -11,7 +11,7 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.run_look import RunLook, asks_runs
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time, left, limited
-from laufruhe.problem.decision import columns_of, domains_of
+from laufruhe.problem.decision import columns_of, domains_of, sides_of
 from laufruhe.problem.evaluation import Evaluation, objective_value, remounted
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.problem import Problem
@@ -67,7 +67,7 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     decisions = problem.mount_decisions
     starts = min(search.starts, STARTS * (len(decisions) + sum(domain.width for domain in domains)))
     ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
-    low, high = (np.array([getattr(d, side) for d in decisions]) for side in ("lower", "upper"))
+    low, high = sides_of(decisions)
     given = np.array([d.start_number for d in decisions])
     low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
     wide = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])

@@ -13,7 +13,7 @@ import numpy as np
 from laufruhe.errors import ModelError
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
-from laufruhe.problem.decision import Domain, domains_of, vector_of
+from laufruhe.problem.decision import Domain, domains_of, ends_of, vector_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side
 from laufruhe.problem.nothing import nothing_of
@@ -43,10 +43,7 @@ class LocalProgram:
     @classmethod
     def of(cls, problem: Problem) -> Self:
         """Over the bounds of all that is open."""
-        domains = domains_of(problem.decisions)
-        ends = [(d.set.lower, d.set.upper) if d.width == 1 else (-d.scale, d.scale) for d in domains]
-        pairs = [pair for pair, d in zip(ends, domains, strict=True) for _ in range(d.width)]
-        return cls(problem, *(np.array([pair[k] for pair in pairs]) for k in (0, 1)))
+        return cls(problem, *ends_of(domains_of(problem.decisions)))
 
     @cached_property
     def domains(self) -> tuple[Domain, ...]:

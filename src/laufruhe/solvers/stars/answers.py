@@ -18,12 +18,11 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
-from laufruhe.solvers.conclusion import KEPT
 from laufruhe.solvers.stars.cuts import CutsFound, search_designs
 from laufruhe.solvers.stars.exchange import improved
 from laufruhe.solvers.stars.families import Family, FiringFamily
 from laufruhe.solvers.stars.firing_search import MOST_SLOTS, enumerate_orders
-from laufruhe.solvers.stars.program import owners_of, solve_design
+from laufruhe.solvers.stars.program import owners_of, solve_design, widened
 from laufruhe.solvers.stars.ranking import RankedStar, ranked_star
 from laufruhe.solvers.stars.search import StarsFound, enumerate_stars, search_stars
 
@@ -168,9 +167,8 @@ def _programmed(
     found = solve_program(model.at(samples), space, owners, phasing.shafts, phasing.time_limit)
     if found.status != "infeasible":
         return found
-    sound = model.at(samples, averaged=True)
-    lenient = replace(sound, limits=tuple((most * (1.0 + KEPT), norm) for most, norm in sound.limits))
-    return solve_program(lenient, space, owners, phasing.shafts, phasing.time_limit)
+    sound = widened(model.at(samples, averaged=True))
+    return solve_program(sound, space, owners, phasing.shafts, phasing.time_limit)
 
 
 def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:

@@ -23,7 +23,7 @@ from laufruhe.numerics.budget import left
 from laufruhe.numerics.norms import Cones
 from laufruhe.numerics.progress import tell
 from laufruhe.physics.star_space import StarSpace
-from laufruhe.problem.decision import Domain
+from laufruhe.problem.decision import Domain, scales_of
 from laufruhe.problem.phasing import ShaftChoice
 
 # what SCIP's own feasibility tolerance may hide of the objective
@@ -78,8 +78,8 @@ def solve_program(
     if any(norm.turns is not None for _, norm in (*problem.terms, *problem.limits)):
         raise ModelError("unbalances that are counted from a throw make the program bilinear")
     steps = cp.Variable((space.throws, space.phases), boolean=True)
-    size = sum(domain.width for domain in problem.domains)
-    scales = np.concatenate([np.full(d.width, d.scale) for d in problem.domains]) if size else np.zeros(0)
+    scales = scales_of(problem.domains)
+    size = len(scales)
     y = cp.Variable(max(size, 1))
     built = cp.Variable(max(len(shafts.optional), 1), boolean=True)
     held = [*_stars(steps, space), *_shafts(built, shafts)]

@@ -138,6 +138,11 @@ def _with_idle(multipliers: Multipliers, rows_of: StarProblem, idle: Sequence[bo
     return replace(multipliers, limits=limits)
 
 
+def widened(averaged: StarProblem) -> StarProblem:
+    """With limits wider by what a design may exceed them by."""
+    return replace(averaged, limits=tuple((maximum * (1.0 + KEPT), norm) for maximum, norm in averaged.limits))
+
+
 def _by_averages(
     averaged: StarProblem, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int], idle: Sequence[bool],
     found: ConicSolution,
@@ -147,7 +152,7 @@ def _by_averages(
     Limits are wider by what a design may exceed them by. Where dual rows of the angles show that averages have none
     either, these are not asked.
     """
-    wide = replace(averaged, limits=tuple((maximum * (1.0 + KEPT), norm) for maximum, norm in averaged.limits))
+    wide = widened(averaged)
     none = tuple(np.zeros_like(norm.constant) for _, norm in wide.terms)
     cut = cut_of(wide, Multipliers(none, _with_idle(found.multipliers, wide, idle).limits))
     if cut.excludes(np.array([star]), [built], owners).all():
