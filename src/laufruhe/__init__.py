@@ -123,7 +123,12 @@ def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint]
     from laufruhe.machine import Engine
     from laufruhe.solvers import state
 
-    return state(_of_engine(design, points) if isinstance(design, Engine) else _problem(design))
+    if isinstance(design, Engine):
+        return state(_of_engine(design, points))
+    if len(points):
+        rule, remedy = "stand beside a problem, which has its own", "leave them out, or give the problem's engine"
+        raise wrong_call("points", points, rule, remedy)
+    return state(_problem(design))
 
 
 def _of_engine(design: Engine, points: Sequence[OperatingPoint]) -> Problem:

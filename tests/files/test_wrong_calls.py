@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import laufruhe
@@ -39,6 +41,7 @@ CALLS: dict[str, Call] = {
         p.engine,
         ["3000 rpm"],  # type: ignore[list-item]
     ),
+    "stand beside a problem, which has its own": lambda p, r: laufruhe.evaluate(p, p.points),
     "values = None: is no table": lambda p, r: p.with_values(None),  # type: ignore[arg-type]
     "values = 'front web.mass'": lambda p, r: p.with_values("front web.mass"),  # type: ignore[arg-type]
     "name = 3: is no name": lambda p, r: p.with_values({3: 1}),  # type: ignore[dict-item]
@@ -63,3 +66,27 @@ def test_refused_by_an_error_of_the_package(said: str) -> None:
     with pytest.raises(laufruhe.LaufruheError) as caught:
         CALLS[said](laufruhe.load(FOUR), scenes.stated(scenes.GIVEN))
     assert said in str(caught.value)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    """Tables that a program makes have arrays, tuples and numbers of NumPy's, which a file has not."""
+    engine = {"layout": "inline", "cycle": np.str_("four-stroke"), "stroke": "90 mm", "reciprocating_mass": "1 kg"}
+    tables = {"title": "t", "operating_points": ({"speed": "3000 rpm"},)}
+    weights = [{"name": "web", "balance_factor": {"between": np.array([0.0, 1.0])}}]
+    throws = np.array([0, 180])
+    made = {**tables, "counterweights": weights, "objective": {"minimise": "rms shaking force"}}
+    made["engine"] = {**engine, "rod_ratio": np.float64(0.3), "throws": throws, "cylinder_spacing": "90 mm"}
+    problem = laufruhe.load(made)
+    assert [math.degrees(part.throw) for part in problem.engine.cylinders] == pytest.approx([0.0, 180.0])
+    (decision,) = problem.open("web.balance_factor", *np.array([0.25, 0.5])).decisions
+    assert (decision.lower, decision.upper) == (0.25, 0.5)
+    turned = problem.with_values({"engine.throws": throws[::-1]}).engine.cylinders
+    assert [part.throw for part in turned] == [part.throw for part in problem.engine.cylinders][::-1]
+    single = laufruhe.load({**tables, "engine": {**engine, "rod_ratio": 0.3, "cylinders": np.int64(1)}})
+    assert len(single.engine.cylinders) == 1
+    # what was given stays as it was
+    assert made["engine"]["throws"] is throws
+    endless: dict[str, Any] = {}
+    endless["engine"] = endless
+    with pytest.raises(laufruhe.InputError, match="is nested more than"):
+        laufruhe.load(endless)

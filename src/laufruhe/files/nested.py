@@ -6,6 +6,8 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
+import numpy as np
+
 Place: TypeAlias = tuple[str | int, ...]
 """Keys, and numbers in lists from zero."""
 
@@ -41,3 +43,12 @@ def inside(tables: Any) -> Iterator[tuple[Place, Any]]:
 def texts_in(tables: Any) -> Iterator[tuple[Place, str]]:
     """All texts of tables, and where they stand."""
     return ((place, node) for place, node in inside(tables) if isinstance(node, str))
+
+
+def plain(given: Any, deepest: int) -> Any:
+    """A copy as a file has it: lists of tuples and arrays, numbers of NumPy's, down to a depth."""
+    if isinstance(given, Mapping) and deepest:
+        return {key: plain(value, deepest - 1) for key, value in given.items()}
+    if isinstance(given, list | tuple) and deepest:
+        return [plain(value, deepest - 1) for value in given]
+    return given.tolist() if isinstance(given, np.ndarray | np.generic) else given

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import os
 import re
 import sys
@@ -30,7 +29,7 @@ from laufruhe.files.gas import gas_of, needs_bore
 from laufruhe.files.geared import geared_of
 from laufruhe.files.load_cases import load_cases_of
 from laufruhe.files.mounts import mounts_of
-from laufruhe.files.nested import inside
+from laufruhe.files.nested import inside, plain
 from laufruhe.files.open_parts import check_factors, leads_of, piston_masses
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
@@ -74,7 +73,7 @@ def load(source: str | Path | Mapping[str, Any]) -> Problem:
 def given(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Path]:
     """Tables of a file, of a text or as they are, and by what name they are spoken of."""
     if isinstance(source, Mapping):
-        return _whole(copy.deepcopy(dict(source)), UNNAMED), UNNAMED
+        return _whole(plain(source, DEEPEST + 1), UNNAMED), UNNAMED
     if isinstance(source, str) and ("\n" in source or "=" in source):
         return _whole(_parsed(source.encode("utf-8"), UNNAMED), UNNAMED), UNNAMED
     if not isinstance(source, str | os.PathLike):
@@ -138,15 +137,18 @@ class _Origin:
 
     def with_values(self, values: Mapping[str, Any]) -> Problem:
         """Numbers at other values."""
-        return self._edited(*(partial(edits.with_value, name=name, value=value) for name, value in values.items()))
+        return self._edited(
+            *(partial(edits.with_value, name=name, value=plain(value, DEEPEST)) for name, value in values.items())
+        )
 
     def opened(self, name: str, low: Any, high: Any, start: Any) -> Problem:
         """A number left open."""
+        low, high, start = plain([low, high, start], DEEPEST)
         return self._edited(partial(edits.opened, name=name, low=low, high=high, start=start))
 
     def fixed(self, name: str, value: Any) -> Problem:
         """A number fixed."""
-        return self._edited(partial(edits.fixed, name=name, value=value))
+        return self._edited(partial(edits.fixed, name=name, value=plain(value, DEEPEST)))
 
     def _edited(self, *each: Callable[[Mapping[str, Any]], dict[str, Any]]) -> Problem:
         tables: Mapping[str, Any] = self.tables
