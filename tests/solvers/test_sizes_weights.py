@@ -80,7 +80,8 @@ def test_at_its_sizes_the_cone_program_finds_the_same(solved: Result, problem: P
     boxes = SizeBoxes(model, ask_cones)
     point = boxes.cut(sizes, sizes, np.inf)
     assert point.bound <= solved.objective.value * (1.0 + 1e-9)
-    assert point.bound == pytest.approx(solved.objective.value, rel=1e-6)
+    # less by what means lose that are averaged about their angles
+    assert point.bound == pytest.approx(solved.objective.value, rel=1e-5)
 
 
 def test_weights_beside_sizes_are_never_worse_and_neither_are_sizes_beside_weights(
@@ -191,7 +192,7 @@ max = "7 N/mm^2"
 limit = "maximum rod stress"
 max = "60 N/mm^2"
 [fidelity]
-samples = 90
+samples = 360
 """
 
 

@@ -8,7 +8,9 @@ asked once without any, and once for each. The columns of a measure are the mass
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -27,6 +29,8 @@ from laufruhe.problem.measure import Measure, Rows, bends_of, load_rows, mass_ro
 from laufruhe.problem.problem import Problem
 
 MASSES, MOST_KEPT = 4, 4096
+FINE = 1440
+"""Angles at the least between which the means of bounds are averaged."""
 BETWEEN, BESIDE, SAME = 7, 0.02, 1e-9
 """Lengths of the rod at which bends are looked for, how much farther they are taken to move, and no move [rad]."""
 
@@ -98,7 +102,11 @@ class SizeModel:
         Decisions about sizes.
     domains
         Of the unbalances, in the columns behind the masses.
+    averaged
+        Whether rows of means are averaged about their angles, so that what bounds them bounds the whole cycle (P7).
     """
+
+    averaged = False
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -112,7 +120,14 @@ class SizeModel:
         self._engines, self._masses = dict[bytes, Engine](), dict[bytes, Array]()
         # of its sizes alone: one slider-crank, no rotors
         self._bare = replace(given, parts=given.parts[:1], rotors=())
-        self._pieces: dict[float, dict[Measure, tuple[Piece, ...]]] = {}
+        self._pieces: dict[float, dict[tuple[Measure, bool], tuple[Piece, ...]]] = {}
+        self._evaluations: dict[float, list[Evaluation]] = {}
+
+    def averaging(self) -> SizeModel:
+        """The same with rows of means that are never more than what they stand for."""
+        other = copy(self)
+        other.averaged = True
+        return other
 
     @property
     def moves_rod(self) -> bool:
@@ -174,6 +189,14 @@ class SizeModel:
         pieces = self.pieces(measure, engine.slider_cranks[0].rod_length)
         return max(piece.value(self.factors(piece, measure, engine), columns) for piece in pieces)
 
+    def _averages(self, measure: Measure) -> bool:
+        return self.averaged and measure.norm.averages
+
+    def _steps(self, measure: Measure) -> int:
+        """Rows of a signal: as results are measured, and no few of them where means are averaged."""
+        samples = self.problem.fidelity.samples
+        return samples * (max(math.ceil(FINE / samples), 1) if self._averages(measure) else measure.norm.refinement)
+
     def whole_pieces(self, measure: Measure) -> Callable[[float], tuple[Piece, ...]]:
         """The pieces of a measure at any length of the rod, with the same rows at each."""
         length = self._given[ROD_LENGTH]
@@ -200,11 +223,14 @@ class SizeModel:
         base = self.problem.engine.cycle.base_order
         found = [over(base, self._each_alone(float(each))[0].signals(measure.load)) for each in lengths]
         bends = bends_of(measure, found[0], self.problem.engine)
-        steps = measure.norm.refinement * self.problem.fidelity.samples
+        steps = self._steps(measure)
         kept = [
-            _unswept([own[k] for own in found], np.append(found[0][k].period * np.arange(steps) / steps, bends[k]))
+            _unswept(
+                [own[k] for own in found], np.append(found[0][k].period * np.arange(steps) / steps, bends[k]),
+                found[0][k].period / steps if self._averages(measure) else 0.0,
+            )
             for k in range(len(self.problem.points))
-        ]
+        ]  # fmt: skip
         # of every operating point as many places with these angles
         counts = [len(own.affine.constant) // len(own.at) for own in pieces]
         return [
@@ -215,10 +241,10 @@ class SizeModel:
     def pieces(self, measure: Measure, rod_length: float | None = None) -> tuple[Piece, ...]:
         """A measure of loads at a length of the rod, that of the start unless told: the largest of these."""
         length = self.problem.engine.slider_cranks[0].rod_length if rod_length is None else rod_length
-        known = self._pieces.setdefault(length, {})
-        if measure not in known:
-            known[measure] = self._cut_up(measure, length)
-        return known[measure]
+        known, key = self._pieces.setdefault(length, {}), (measure, self._averages(measure))
+        if key not in known:
+            known[key] = self._cut_up(measure, length)
+        return known[key]
 
     @cached_property
     def start(self) -> Array:
@@ -243,10 +269,6 @@ class SizeModel:
         found = self.mass_corners.reshape(-1, MASSES)
         return found.min(axis=0), found.max(axis=0)
 
-    @cached_property
-    def _evaluations(self) -> dict[float, list[Evaluation]]:
-        return {}
-
     def _each_alone(self, length: float) -> list[Evaluation]:
         """Loads without masses of the running gear and unbalances, and with one unit of each column."""
         if length not in self._evaluations:
@@ -269,9 +291,11 @@ class SizeModel:
             return (Piece(_affine(masses), (), ()),)
         channel = measure.load
         base = problem.engine.cycle.base_order
-        steps = measure.norm.refinement * problem.fidelity.samples
+        steps = self._steps(measure)
         signals: list[list[Spectrum]] = [over(base, each.signals(channel)) for each in found]
         bends = bends_of(measure, signals[0], problem.engine) if told is None else told
+        if self._averages(measure):
+            signals = [[own.averaged(own.period / steps) for own in each] for each in signals]
         rows = [load_rows(measure, problem.points, own, problem.engine, steps, bends) for own in signals]
         whole, each = _affine(rows), steps + len(bends[0])
         points = [k for k, share in enumerate(measure.shares(problem.points)) if share > 0.0]
@@ -290,8 +314,8 @@ class SizeModel:
         return tuple(pieces)
 
 
-def _unswept(signals: Sequence[Spectrum], angles: Array) -> Mask:
-    """Angles that no bend of a signal at several lengths passes on the way from one to the next."""
+def _unswept(signals: Sequence[Spectrum], angles: Array, beside: float) -> Mask:
+    """Angles that no bend of a signal at several lengths passes, nor comes as near as `beside`, on the way."""
     period = signals[0].period
     own = [np.zeros(0) if each.corners is None else each.corners.angles for each in signals]
     if len({len(each) for each in own}) > 1:
@@ -299,7 +323,7 @@ def _unswept(signals: Sequence[Spectrum], angles: Array) -> Mask:
     # what stands at zero may be told as a whole period
     turned = np.array([np.sort(np.mod(each + SAME, period)) - SAME for each in own])
     low, high = turned.min(axis=0, initial=period), turned.max(axis=0, initial=-period)
-    wide = BESIDE * (high - low)
+    wide = BESIDE * (high - low) + beside
     moved = high - low > 2.0 * SAME
     over = (angles[:, None] > (low - wide)[moved]) & (angles[:, None] < (high + wide)[moved])
     return np.asarray(~over.any(axis=1))

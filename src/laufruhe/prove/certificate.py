@@ -204,21 +204,26 @@ def best_bound(fine: AffineProblem, x: Array, found: Multipliers) -> Bound:
     One takes the solver's dual rows between the coarse angles; one takes the direction
     of every row of the design itself, and the solver's only where a row vanishes.
     """
-    spread = Multipliers(
-        tuple(_spread(norm, z) for (_, norm), z in zip(fine.terms, found.terms, strict=True)),
-        tuple(_spread(norm, z) for (_, norm), z in zip(fine.limits, found.limits, strict=True)),
-    )
+    own = spread(fine, found)
     direct = Multipliers(
         tuple(
-            norm.norm.aligned(norm.grid, norm.rows(x), z) for (_, norm), z in zip(fine.terms, spread.terms, strict=True)
+            norm.norm.aligned(norm.grid, norm.rows(x), z) for (_, norm), z in zip(fine.terms, own.terms, strict=True)
         ),
-        spread.limits,
+        own.limits,
     )
-    best = max((lower_bound(fine, m) for m in (spread, direct)), key=lambda bound: bound.value)
+    best = max((lower_bound(fine, m) for m in (own, direct)), key=lambda bound: bound.value)
     for _ in range(LEVELLINGS):
         if fine.objective(x) - best.value > LEVEL * best.value:
             best = max(best, lower_bound(fine, levelled(fine, x, best)), key=lambda bound: bound.value)
     return best
+
+
+def spread(fine: AffineProblem, found: Multipliers) -> Multipliers:
+    """Dual rows of a solution on a coarser grid between its angles (P6); terms that it has none of are left out."""
+    return Multipliers(
+        tuple(_spread(norm, z) for (_, norm), z in zip(fine.terms, found.terms, strict=False)),
+        tuple(_spread(norm, z) for (_, norm), z in zip(fine.limits, found.limits, strict=True)),
+    )
 
 
 def levelled(problem: AffineProblem, x: Array, bound: Bound) -> Multipliers:

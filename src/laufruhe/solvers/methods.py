@@ -30,6 +30,7 @@ from laufruhe.solvers.mounts.convex import is_convex
 from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.rooms import surely_broken, with_room
+from laufruhe.solvers.told_limits import solve_told
 
 LIBRARIES = ("casadi", "clarabel", "cvxpy", "pyscipopt")
 """Packages that are imported where something open needs them, named as their modules."""
@@ -260,7 +261,12 @@ def _cut_short(problem: Problem, found: Result | None) -> Result:
 
 
 def _decided(problem: Problem) -> Result:
-    """By the first method that suits, for the drawing or for the engines that are built to it."""
+    """For the drawing or for the engines that are built to it, at so many angles that limits are what these tell."""
+    return solve_told(problem, _by_what_is_open)
+
+
+def _by_what_is_open(problem: Problem) -> Result:
+    """By the first method that suits."""
     if problem.ranks:
         return solve_in_order(problem, _decided)
     if problem.assembly is not None:

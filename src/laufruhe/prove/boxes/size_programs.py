@@ -22,7 +22,7 @@ from laufruhe.numerics.norms import Grid
 from laufruhe.problem.decision import Decision, domains_of
 from laufruhe.problem.sets import Interval
 from laufruhe.prove.boxes.size_bundles import Grouped, Number, Reach, corner, least_of
-from laufruhe.prove.certificate import ROUNDING, Multipliers, best_bound, minorant
+from laufruhe.prove.certificate import ROUNDING, Multipliers, best_bound, minorant, spread
 
 Ask: TypeAlias = Callable[[AffineProblem, bool], tuple[Array | None, Multipliers]]
 """A decision vector of a program, None where none is allowed, and dual rows, roughly unless told; none is trusted."""
@@ -76,7 +76,7 @@ class SizePrograms:
         if x is not None:
             return self._together(program, best_bound(program, x, found).multipliers) if program.terms else None
         stripped = replace(program, terms=())
-        return self._together(stripped, minorant(stripped, Multipliers((), found.limits)).multipliers)
+        return self._together(stripped, minorant(stripped, spread(stripped, found)).multipliers)
 
     def program(self, lower: Array, upper: Array, reach: Reach) -> AffineProblem:
         """The masses of a box as decisions of their own beside the unbalances, factors where they are least."""

@@ -62,7 +62,8 @@ class SizeBoxes:
     """
 
     def __init__(self, model: SizeModel, ask: Ask | None = None) -> None:
-        self.model, problem = model, model.problem
+        # means at a few angles may be more than over the cycle, and would prove too much
+        self.model, problem = model.averaging(), model.problem
         # no row is left out for a bend that passes it
         self.is_whole = True
         # for each size whether masses grow with it or fall

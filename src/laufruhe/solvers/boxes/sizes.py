@@ -30,8 +30,8 @@ from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, proven, 
 MOST_WITH_ROD, MOST_PROGRAMS = 300, 400
 """Boxes where the length of the rod is open, which take ten times as long, and where each has cone programs."""
 STARTS = 3
-# part of the angles at which programs of boxes stand, of no fewer than so many
-THIN, LEAST_STEPS = 4, 48
+# angles at the least at which programs of boxes stand, roughly and where little is to be shown
+FEW_STEPS, MANY_STEPS = 180, 720
 # relative room that local programs leave inside limits, a part of what counts as kept
 INSIDE = 1e-7
 
@@ -127,25 +127,26 @@ def _proposed(program: SizeProgram) -> Array:
 
 
 def ask_cones(program: AffineProblem, exactly: bool = False) -> tuple[Array | None, Multipliers]:
-    """A program's decision vector and dual rows, at fewer angles unless all are wanted."""
-    if not exactly:
-        program = replace(
-            program,
-            terms=tuple((weight, _thinned(norm)) for weight, norm in program.terms),
-            limits=tuple((most, _thinned(norm)) for most, norm in program.limits),
-        )
-    found = solve_cones(program)
+    """A program's decision vector and dual rows, at few angles, or at as many as tell all but all."""
+    steps = MANY_STEPS if exactly else FEW_STEPS
+    fewer = replace(
+        program,
+        terms=tuple((weight, _thinned(norm, steps)) for weight, norm in program.terms),
+        limits=tuple((most, _thinned(norm, steps)) for most, norm in program.limits),
+    )
+    found = solve_cones(fewer)
     return found.x, found.multipliers
 
 
-def _thinned(norm: AffineNorm) -> AffineNorm:
-    """Every so many rows of a mean over equal steps; all of those of others."""
+def _thinned(norm: AffineNorm, least: int) -> AffineNorm:
+    """Every so many rows of a mean over equal steps, no fewer than are asked for; all of those of others."""
     grid = norm.grid
-    if not norm.norm.averages or grid.bends or grid.steps % THIN or grid.steps < THIN * LEAST_STEPS:
+    thin = max((n for n in range(1, grid.steps // least + 1) if grid.steps % n == 0), default=1)
+    if not norm.norm.averages or grid.bends or thin == 1:
         return norm
-    weights = THIN * grid.weights[::THIN]
+    weights = thin * grid.weights[::thin]
     return replace(
-        norm, constant=norm.constant[::THIN], slope=norm.slope[::THIN], grid=Grid(weights, grid.steps // THIN)
+        norm, constant=norm.constant[::thin], slope=norm.slope[::thin], grid=Grid(weights, grid.steps // thin)
     )
 
 

@@ -57,7 +57,9 @@ def solve_cones(problem: AffineProblem, held: tuple[Array, Array] | None = None)
         problem, terms=tuple(problem.terms[k] for k in acting), limits=tuple(problem.limits[k] for k in binding)
     )
     found = _by_few_rows(fewer, held)
-    terms, limits = ([np.zeros_like(norm.constant) for _, norm in of] for of in (problem.terms, problem.limits))
+    # of a term that nothing acts on its own rows tell all
+    terms = [norm.subgradient(np.zeros(problem.size)) for _, norm in problem.terms]
+    limits = [np.zeros_like(norm.constant) for _, norm in problem.limits]
     for kept, rows, own in ((acting, terms, found.multipliers.terms), (binding, limits, found.multipliers.limits)):
         for k, z in zip(kept, own, strict=False):
             rows[k] = z
@@ -120,6 +122,9 @@ def _may_bind(problem: AffineProblem, maximum: float, norm: AffineNorm) -> bool:
 def _solved(problem: AffineProblem, held: tuple[Array, Array] | None) -> ConicSolution:
     """The first answer that the solver stands by; else the best of where it stopped."""
     blocks, starts, rows, cost = program_of(problem, held)
+    if not rows.right:
+        # nothing is open, and nothing forbids that
+        return ConicSolution(problem.start, Multipliers((), ()), 0.0)
     stopped: list[ConicSolution] = []
     for settings in ATTEMPTS:
         found = told(rows, cost, settings)

@@ -26,6 +26,7 @@ from laufruhe.solvers.cones.lightest import SAME_LOAD, lightest
 from laufruhe.solvers.cones.sharpening import Optimum, sharpened
 from laufruhe.solvers.conflicts import smallest
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.told_limits import told_excess
 
 MOST_DOUBLINGS = 4
 MOST_MARGINS = 3
@@ -120,11 +121,10 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optim
 
 def _is_kept(problem: Problem, found: Optimum) -> bool:
     """Whether many angles tell so of the limits too: a mean at a few may be less than over the cycle (P7)."""
-    sampled = [limit for limit in problem.load_limits if limit.measure.is_load]
-    if not sampled:
+    if not any(limit.measure.is_load for limit in problem.load_limits):
         return True
     values = [domain.complex_value(found.x) for domain in found.problem.domains]
-    return finely(evaluate(problem, problem.design(values))).excess(sampled) <= KEPT
+    return told_excess(problem, evaluate(problem, problem.design(values))) <= KEPT
 
 
 def _first_samples(model: AffineModel) -> int:

@@ -22,6 +22,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach, room_of
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, judged
+from laufruhe.solvers.told_limits import over_read
 
 # designs looked at for each start of the search; step of a slope, room that is none, and an objective that is far off
 LOOKS, STEP, HELD, FAR = 4, 1e-6, 1e-6, 1e3
@@ -189,6 +190,8 @@ def proven(program: LocalProgram, best: Array, bounded: Bounded) -> Proven:
         if found.design.excess <= KEPT:
             value = found.design.value
             room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine))
+            # boxes do not make good what few angles read too much
+            value -= over_read(problem, found.design.evaluation)
         found = replace(found, divided=bounded(value, room))
         places = [program.place(x) for x in found.divided.places]
         if not places or found.divided.bound >= value - room:

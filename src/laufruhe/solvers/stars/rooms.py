@@ -48,6 +48,5 @@ def with_room(problem: Problem, limits: Sequence[Limit], given: Evaluation) -> t
 
 
 def surely_broken(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[str, ...]:
-    """Of limits that nothing open moves those that are broken at many angles too."""
-    known = broken_limits(limits, evaluation)
-    return known and broken_limits([limit for limit in limits if limit.name in known], finely(evaluation))
+    """Of limits that nothing open moves those that are broken: many angles tell, and not the few of a fidelity (P7)."""
+    return broken_limits(limits, finely(evaluation))

@@ -304,7 +304,8 @@ def _kept(program: _Program, seeker: Adversary, best: Least) -> Least:
         if not KEPT < best.found.excess <= SMALL:
             break
         program.lower(best.found.excess)
-        solved = program.solved(best.angles)
+        # of the design as given no program is known yet
+        solved = program.solved(best.angles or program.angles)
         if solved is None:
             break
         found = seeker.at(solved[0], proven=True)
