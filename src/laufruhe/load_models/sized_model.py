@@ -11,17 +11,16 @@ import itertools
 import math
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from laufruhe.load_models.affine import AffineNorm
+from laufruhe.load_models.size_pieces import Piece, plain
 from laufruhe.machine import Engine
 from laufruhe.machine.running_gear import ROD_LENGTH, Size
 from laufruhe.numerics.arrays import Array, Mask
-from laufruhe.numerics.norms import Grid
-from laufruhe.numerics.norms.norm import lengths
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem.decision import Decision, Kind, domains_of, ends_of, vector_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
@@ -33,59 +32,6 @@ FINE = 1440
 """Angles at the least between which the means of bounds are averaged."""
 BETWEEN, BESIDE, SAME = 7, 0.02, 1e-9
 """Lengths of the rod at which bends are looked for, how much farther they are taken to move, and no move [rad]."""
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """Rows of a measure that have their factors together.
-
-    Attributes
-    ----------
-    affine
-        Of the columns; rows at the sizes that the problem starts from.
-    at
-        Of every operating point in it, its index, its places (all when None) and the rows of each.
-    given
-        Factors of these at the start, shape (places, 1 or d) each.
-    """
-
-    affine: AffineNorm
-    at: tuple[tuple[int, int | None, int], ...]
-    given: tuple[Array, ...]
-
-    def ratio(self, factors: Sequence[Array]) -> float | None:
-        """Factor of all rows over that at the start; None where they differ."""
-        found = [np.ones(1), *(new / old for new, old in zip(factors, self.given, strict=True))][bool(factors) :]
-        ratios = np.concatenate([each.ravel() for each in found])
-        return float(ratios[0]) if np.all(ratios == ratios[0]) else None
-
-    def scaled(self, factors: Sequence[Array]) -> AffineNorm:
-        """The norm with other factors."""
-        by = self.by(factors)
-        return replace(self.affine, constant=self.affine.constant * by, slope=self.affine.slope * by[..., None])
-
-    def by(self, factors: Sequence[Array]) -> Array:
-        """What every row is multiplied by for other factors, shape (k, 1 or d)."""
-        parts = zip(factors, self.given, self.at, strict=True)
-        return np.concatenate([np.repeat(new / old, rows, axis=0) for new, old, (_, _, rows) in parts])
-
-    def value(self, factors: Sequence[Array], columns: Array) -> float:
-        """The norm."""
-        ratio = self.ratio(factors)
-        return self.scaled(factors).value(columns) if ratio is None else ratio * self.affine.value(columns)
-
-    def pruned(self, low: Array, high: Array) -> Piece:
-        """Of a largest length with one factor: without rows that are not the longest for any columns between two."""
-        own, reach = self.affine, 0.5 * (high - low)
-        size = lengths(own.rows(low + reach))
-        moved = np.sqrt(np.square(own.slope).sum(axis=1)) @ reach
-        kept = size + moved >= (size - moved).max()
-        affine = replace(own, constant=own.constant[kept], slope=own.slope[kept], grid=_plain(int(kept.sum())))
-        return replace(self, affine=affine, at=tuple((k, place, affine.grid.steps) for k, place, _ in self.at))
-
-
-def _plain(rows: int) -> Grid:
-    return Grid(np.full(rows, 1.0 / max(rows, 1)), rows)
 
 
 class SizeModel:
@@ -306,7 +252,7 @@ class SizeModel:
         pieces = []
         for n, (k, place) in enumerate(itertools.product(points, range(places))):
             own = slice(n * each, (n + 1) * each)
-            affine = replace(whole, constant=whole.constant[own], slope=whole.slope[own], grid=_plain(each))
+            affine = replace(whole, constant=whole.constant[own], slope=whole.slope[own], grid=plain(each))
             at = ((k, place, each),)
             piece = Piece(affine, at, tuple(_factors(measure, found[0].engine, problem, at)))
             scalar = told is None and (not piece.given or piece.given[0].size == 1)

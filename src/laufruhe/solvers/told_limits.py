@@ -1,7 +1,7 @@
 """What many angles tell otherwise than those of a fidelity: a mean at few is not what it is over the cycle (P7).
 
-Whichever method decides, a design that keeps a limit at its own angles alone is none, one that these alone forbid is not
-to be missed, and a gap is not to be left open for what they read too much: the problem is solved again at more of them.
+Whichever method decides, a design that keeps a limit at its own angles alone is none, one that these alone forbid is
+not to be missed, and a gap is not to be left open for what they read too much: it is solved again at more of them.
 """
 
 from __future__ import annotations

@@ -112,7 +112,9 @@ def _near(phasing: Phasing, candidate: Candidate, moving: bool) -> StarDesign | 
     if moving:
         return local_optimum(phasing, candidate, phasing.intervals)
     found = _evaluated(phasing, candidate, 0.0, moved=True)
-    is_held = found is not None and _is_kept(found) and phasing.intervals.holds(firing_intervals(phasing, candidate), 1e-7)
+    is_held = (
+        found is not None and _is_kept(found) and phasing.intervals.holds(firing_intervals(phasing, candidate), 1e-7)
+    )
     return found if is_held else None
 
 
