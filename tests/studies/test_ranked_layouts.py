@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from laufruhe.physics.irregularity import irregularity
 from laufruhe.plots.picture import draw
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.equal_power import at_equal_power
-from laufruhe.studies.kinds.layout_comparison import LayoutComparison
+from laufruhe.studies.kinds.layout_comparison import LayoutComparison, _places
 from laufruhe.studies.scenes import Scenes
 from problem_files import PROBLEMS
 
@@ -59,6 +60,11 @@ def data() -> xr.Dataset:
     part, scenes = LayoutComparison.model_validate(told), Scenes(PROBLEMS)
     points = part.points(scenes)
     return part.dataset(points, [part.answer(point, scenes) for point in points])
+
+
+def test_what_looks_equal_on_the_page_has_one_place() -> None:
+    values = np.array([262.678125, 262.678129, 263.0196, math.nan, 1000.0])
+    assert _places(values) == [1, 1, 3, 0, 4]
 
 
 @pytest.mark.slow

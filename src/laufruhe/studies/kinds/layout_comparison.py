@@ -29,7 +29,7 @@ from laufruhe.studies.swept_shown import MOST_ROWS, bars, by_point, claimed, ove
 from laufruhe.studies.text import NOTHING, Rows, Text, number
 from laufruhe.units import readable
 
-_SAME, _NOTHING = 1e-9, 1e-7
+_SAME, _NOTHING, _FIGURES = 1e-9, 1e-7, 1e-5
 _LEAST_FLYWHEEL = "least flywheel"
 
 
@@ -175,7 +175,10 @@ def _ranking(data: xr.Dataset) -> list[Text]:
 
 
 def _places(values: np.ndarray) -> list[int]:
-    """From 1, of each value; 0 of what is not told."""
+    """From 1, of each value; 0 of what is not told. What five figures do not tell apart shares a place."""
     told = values[np.isfinite(values)]
     near = _SAME * float(np.abs(told).max(initial=0.0))
-    return [1 + int((told < value - near).sum()) if math.isfinite(value) else 0 for value in values]
+    return [
+        1 + int((told < value - max(near, _FIGURES * abs(value))).sum()) if math.isfinite(value) else 0
+        for value in values
+    ]
