@@ -131,7 +131,8 @@ def _own_claims(document: Document, problem: Problem, result: Result, folder: Pa
         yield f"called global with a gap of {gap:.3g}"
     given = evaluate(problem, samples=result.final.samples)
     worth = objective_value(problem, given)
-    if given.excess(problem.limits) <= ALLOWED and value > worth + room_of(value, SAME, nothing):
+    fires = problem.phasing is None or problem.phasing.intervals.holds(problem.engine.firing_intervals)
+    if fires and given.excess(problem.limits) <= ALLOWED and value > worth + room_of(value, SAME, nothing):
         yield f"worse than the design as given: {value:.9g} against {worth:.9g}"
     again = _loaded(document, _values(result), _order(result), folder)
     found = evaluate(again, samples=result.final.samples)
@@ -155,7 +156,10 @@ def _loaded(document: Document, values: Mapping[str, float], order: list[int] | 
     """The problem with its open numbers at values, written and read again; throws without a value follow the order."""
     document = {key: own for key, own in document.items() if key != "phasing"}
     if values.get("s built") == 0.0:
+        # what is not built weighs nothing and stands nowhere
         values = {**values, "s.unbalance": 0.0}
+        limits = document.get("constraints", [])
+        document["constraints"] = [limit for limit in limits if limit["limit"] != "shaft distance"]
     if "balancer_shafts" in document:
         keys = ("optional", "shaft_mass")
         document["balancer_shafts"] = [

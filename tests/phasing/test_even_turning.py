@@ -127,3 +127,21 @@ def test_stars_that_fire_evenly_turn_alike() -> None:
     broken = laufruhe.solve(problem_of(opened, constraints=[{**limit, "max": "0.0001"}]))
     assert broken.status is Status.INFEASIBLE
     assert "all that fire evenly turn the crank as evenly" in broken.message
+
+
+@pytest.mark.slow
+def test_a_number_of_the_wheel_alone_is_the_same_for_uneven_throws() -> None:
+    """Throws move the torque, and nothing of the wheel itself; no mounts are needed for it."""
+    rim = {"mean_diameter": "300 mm", "width": "60 mm", "height": "40 mm"}
+    problem = problem_of(
+        {
+            "layout": "vee", "cycle": "two-stroke", "cylinders": 4, "bank_angle": 60, "split_pin_angle": 20,
+            "throws": "open",
+        },
+        phasing={"intervals": {"largest_deviation": "20 deg"}}, flywheel={"rim": rim},
+        objective={"minimise": "flywheel mass"}, search={"boxes": 10},
+    )  # fmt: skip
+    result = laufruhe.solve(problem)
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.objective.value == pytest.approx(result.objective.initial, rel=1e-12)
+    assert result.certificate.lower_bound == pytest.approx(result.objective.value, rel=1e-3)

@@ -38,7 +38,7 @@ from laufruhe.physics.mount_numbers import AxisResidual, mass_root
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.decision import domains_of
+from laufruhe.problem.decision import Kind, domains_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import off_resonance
@@ -203,7 +203,8 @@ class SmoothProgram:
 
     def _least(self, measure: Measure, unit: float) -> Any:
         """A measure to be minimised, softened by a share of its unit (N3); a number where nothing moves it."""
-        if self.moves is None and not measure.channel.is_moved_by({d.kind for d in self.problem.decisions}):
+        kinds = {d.kind for d in self.problem.decisions} | ({Kind.STAR} if self.moves is not None else set())
+        if not measure.channel.is_moved_by(kinds):
             return evaluate(off_resonance(self.problem)).value(measure)
         if measure.is_mounting:
             return self._mount_number(measure)
