@@ -84,7 +84,9 @@ def elastic(springs: int, points: int = 1, cylinders: int = 4) -> dict[str, Any]
         ]
         places.append({"name": f"m{k}", "position": [f"{x} m", f"{y} m", "0 m"], "stiffness": stiffness})
     tables = scene(cylinders, shafts=0, points=points)
-    engine = {**tables["engine"], "throws": [0, 180, 180, 0], "bore": "100 mm", "firing_order": [1, 3, 4, 2]}
+    order = [1, 3, 4, 2] if cylinders == 4 else list(range(1, cylinders + 1))
+    engine = {key: own for key, own in tables["engine"].items() if key != "throws"}
+    engine |= {"bore": "100 mm", "firing_order": order}
     return {
         **tables, "engine": engine,
         "gas": {"model": "wiebe", "imep": "5.5 bar", "start": -5, "duration": 50, "compression_ratio": 17},
@@ -147,6 +149,7 @@ SWEEPS = (
     Sweep("solve unbalances", "cylinders", (1, 3, 6, 12, 24, 48), lambda n: scene(n), solved),
     Sweep("solve unbalances", "orders kept", (2, 4, 8, 16, 32), lambda n: scene(orders=n), solved),
     Sweep("solve unbalances", "samples", (360, 720, 1440, 2880), lambda n: scene(samples=n), solved),
+    Sweep("solve unbalances", "mounts", (4, 8, 16, 32), lambda n: scene(mounts=n), solved),
     Sweep("solve unbalances", "operating points", (1, 3, 10, 30, 100), lambda n: scene(points=n), solved),
     Sweep("solve unbalances", "shafts", (2, 6, 16, 50), lambda n: scene(shafts=n), solved),
     Sweep("solve unbalances", "counterweights", (2, 6, 16, 50), lambda n: scene(shafts=0, counterweights=n), solved),
@@ -159,6 +162,10 @@ LARGE = (
     ("48 cylinders, 50 unbalances open, one point", lambda: scene(48, shafts=0, counterweights=50)),
     ("4 cylinders, two shafts open, 100 points", lambda: scene(points=100)),
     ("12 cylinders, 50 unbalances open, 10 points", lambda: scene(12, shafts=0, counterweights=50, points=10)),
+    ("48 cylinders, 25 unbalances open, 100 points", lambda: scene(48, shafts=0, counterweights=25, points=100)),
+    ("48 cylinders, crank and firing order open", lambda: star(48)),
+    ("48 cylinders, six springs open", lambda: elastic(ELASTIC_SPRINGS, cylinders=48)),
+    ("4 cylinders, six springs open, 100 points", lambda: elastic(ELASTIC_SPRINGS, 100)),
 )
 
 
