@@ -233,6 +233,7 @@ def test_losses_drive_no_more_than_is_told(seed: int) -> None:
             assert np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] >= -of.drives[box] - 1e-9 * np.abs(damping).max()
 
 
+@pytest.mark.slow
 def test_a_box_that_reaches_to_a_free_block_is_not_bounded() -> None:
     """What no spring holds moves as far as it is pushed: nothing is said of it, and nothing false."""
     told = random_tables(7)
@@ -244,13 +245,42 @@ def test_a_box_that_reaches_to_a_free_block_is_not_bounded() -> None:
     assert least(found.under)[0] == -np.inf
 
 
-def test_stops_are_left_to_what_bounds_them_without_run_ups() -> None:
+def stopped(most: str, stiffness: str = "300 N/mm", **more: Any) -> Problem:
+    """With stops at 1.1 mm, and a limit of travel."""
+    told = random_tables(7, constraints=[{"limit": "run-up travel", "max": most}], **more)
+    for place in told["mounts"]["places"]:
+        place["stop"] = {"gap": "1.1 mm", "stiffness": stiffness}
+    return load_tables(told, Path("stopped.toml"))
+
+
+@pytest.mark.slow
+def test_stops_that_limits_keep_away_from_are_not_met() -> None:
+    """Else what bounds a design without run-ups is all there is; firm stops may be met between two steps."""
     assert bounds_runs(random_problem(1))
-    stopped = random_tables(1)
-    for place in stopped["mounts"]["places"]:
-        place["stop"] = {"gap": "1 mm", "stiffness": "300 N/mm"}
-    assert not bounds_runs(load_tables(stopped, Path("stopped.toml")))
     assert not bounds_runs(random_problem(1, objective={"minimise": "static sag"}))
+    assert bounds_runs(stopped("1.05 mm"))
+    assert not bounds_runs(stopped("1.0995 mm"))
+    assert not bounds_runs(stopped("1.2 mm"))
+    assert not bounds_runs(stopped("1.05 mm", "1e9 N/mm"))
+
+
+@pytest.mark.slow
+def test_designs_that_keep_away_from_stops_are_not_under_the_bound() -> None:
+    """Of 200 designs with stops: those under the bound break the limit, and the search comes near to the bound."""
+    problem = stopped("1.05 mm", objective={"minimise": "run-up force"})
+    result = laufruhe.solve(problem)
+    assert result.certificate.kind is Proof.GLOBAL
+    assert "run-ups" in result.certificate.method
+    given, r = evaluate(problem), np.random.default_rng(2)
+    low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
+    kept = met = 0
+    for x in low + (high - low) * r.random((200, len(low))):
+        design = remounted(given, problem.design(x.tolist()))
+        met += design.value(OF_RUNS[1]) > 1.1e-3
+        if design.excess(problem.limits) <= 0.0:
+            kept += 1
+            assert objective_value(problem, design) >= result.certificate.lower_bound
+    assert min(kept, met) > 5
 
 
 @pytest.mark.slow

@@ -78,7 +78,7 @@ def responses_to(
     known = [run for run in runs if run is not None]
     if not any(run.model.has_stops for run in known):
         return [run.response(own) if run and run.is_known else None for run, own in zip(runs, wrenches, strict=True)]
-    firm = any(_quickest(run.model) * sweep.step > QUICKEST or not run.is_resolved for run in known)
+    firm = any(quickest(run.model) * sweep.step > QUICKEST or not run.is_resolved for run in known)
     if firm or len(known) < len(runs) or len({len(run.kept[0]) for run in known}) > 1:
         return [None] * len(runs)
     side = _side_by_side(known, sweep.step)
@@ -86,7 +86,7 @@ def responses_to(
     return [run.seen(own) for run, own in zip(known, _followed(side, driven), strict=True)]
 
 
-def _quickest(model: TimeModel) -> float:
+def quickest(model: TimeModel) -> float:
     """Frequency that the stops alone may give the block at most [rad/s]."""
     return float(np.linalg.norm(np.sqrt(model.stops)[:, None] * model.travels, 2))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +13,10 @@ from laufruhe.load_models.run_look import run_measures
 from laufruhe.load_models.run_moments import RunMoments
 from laufruhe.load_models.run_peaks import RunPeaks
 from laufruhe.numerics.arrays import Array, Indices
+from laufruhe.physics.stopped_run import QUICKEST, quickest
+from laufruhe.physics.time_model import time_model
+from laufruhe.problem import channels
+from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.box_dampers import Maps, mapped, pairs_of
@@ -22,6 +27,8 @@ from laufruhe.prove.mounts.run_motion import FARTHEST, REACH, Equations, Motion,
 
 # long steps that a run has at least
 LEAST_STEPS = 60
+# share of a limit of travel that a stop is beyond it
+APART = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +113,24 @@ def run_boxes(model: BoxModel) -> RunBoxes | None:
 
 
 def bounds_runs(problem: Problem) -> bool:
-    """Whether run-ups are asked about that go in steps and meet no bump stop: with one they are not linear in loads."""
+    """Whether run-ups are asked about that go in steps, and that meet no bump stop in any design allowed."""
     measures = run_measures(problem)
     peaks = RunPeaks(problem, measures)
-    return bool(measures) and peaks.is_known and not peaks.is_stopped
+    return bool(measures) and peaks.is_known and (not peaks.is_stopped or _stays_off_stops(problem, peaks))
+
+
+def _stays_off_stops(problem: Problem, peaks: RunPeaks) -> bool:
+    """Whether what keeps the limits meets no stop, so that its run-up is that without stops.
+
+    Travel may not come to the gap of any. In steps in which stops alone turn no motion by more than half a radian, they
+    take back a 24th of what goes beyond their gaps: what meets one is seen beyond it, and is not allowed.
+    """
+    limits = (limit for limit in problem.limits if limit.measure.channel is channels.RUN_TRAVEL)
+    most = min((limit.maximum for limit in limits), default=math.inf)
+    model = time_model(mounting_in(problem.engine))
+    gaps = model.gaps[model.stops > 0.0]
+    firm = any(quickest(model) * sweep.step > QUICKEST for sweep in peaks.sweeps)
+    return not firm and most * (1.0 + APART) < float(gaps.min())
 
 
 def _tops(squares: Array) -> Array:
