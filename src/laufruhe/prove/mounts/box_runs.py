@@ -15,7 +15,6 @@ from laufruhe.load_models.run_peaks import RunPeaks
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.physics.stopped_run import QUICKEST, quickest
 from laufruhe.physics.time_model import time_model
-from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
@@ -125,7 +124,8 @@ def _stays_off_stops(problem: Problem, peaks: RunPeaks) -> bool:
     Travel may not come to the gap of any. In steps in which stops alone turn no motion by more than half a radian, they
     take back a 24th of what goes beyond their gaps: what meets one is seen beyond it, and is not allowed.
     """
-    limits = (limit for limit in problem.limits if limit.measure.channel is channels.RUN_TRAVEL)
+    travels = [measure for measure in peaks.measures if measure.unit == "m"]
+    limits = (limit for limit in problem.limits if limit.measure in travels)
     most = min((limit.maximum for limit in limits), default=math.inf)
     model = time_model(mounting_in(problem.engine))
     gaps = model.gaps[model.stops > 0.0]
