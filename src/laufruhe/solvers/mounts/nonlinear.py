@@ -249,8 +249,13 @@ def _none(
 
 def ruled_out(problem: Problem) -> tuple[str, ...]:
     """Limits that no box keeps together, each needed for that."""
+    sides = [[getattr(d, side) for d in problem.mount_decisions] for side in ("start_number", "lower", "upper")]
+    designs = [design for design in (judged_at(problem, values) for values in sides) if design is not None]
 
     def excluded(kept: Sequence[Limit]) -> bool:
+        # what one design keeps no box excludes, however small
+        if any(design.evaluation.excess(kept) <= 0.0 for design in designs):
+            return False
         return bool(kept) and divided_bound(replace(problem, limits=tuple(kept)), math.inf, math.inf).bound == math.inf
 
     return smallest_conflict(problem.limits, excluded)
