@@ -126,7 +126,7 @@ def least(under: Under) -> Array:
 def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
     """Of 200 in every box, corners among them: nor under the linear function; bounds of small boxes are near."""
     boxes = of_seed(seed)
-    found = [boxes.runs.under(measure, boxes.lower, boxes.upper).under for measure in OF_RUNS]
+    found = [boxes.runs.under(measure, boxes.lower, boxes.upper) for measure in OF_RUNS]
     tight = []
     for box in range(len(SIZES)):
         best = np.full(len(OF_RUNS), np.inf)
@@ -153,11 +153,11 @@ def test_a_smaller_box_has_no_worse_bound_and_is_known_to_its_cube(seed: int) ->
     width = sizes[:, None] * np.minimum(middle - boxes.model.lower, boxes.model.upper - middle)
     for number, measure in enumerate(OF_RUNS):
         found = boxes.runs.under(measure, middle - width, middle + width)
-        bounds = least(found.under)
+        bounds = least(found)
         assert np.all(np.diff(np.maximum(bounds, 0.0)) >= -1e-9 * bounds[-1])
         assert bounds[-1] == pytest.approx(boxes.values(middle[0])[number], rel=1e-5)
         # squares are in the rest as well, as far as they are under
-        assert found.under.rest[5] < 1.2e-2 * found.under.rest[4] + 1e-12 * bounds[-1]
+        assert found.rest[5] < 1.2e-2 * found.rest[4] + 1e-12 * bounds[-1]
 
 
 @pytest.mark.slow
@@ -166,7 +166,7 @@ def test_scipy_reaches_what_boxes_are_not_under() -> None:
     boxes = of_seed(3)
     problem, run = boxes.problem, boxes.problem.engine.run
     assert run is not None
-    bounds = np.array([least(boxes.runs.under(measure, boxes.lower, boxes.upper).under) for measure in OF_RUNS])
+    bounds = np.array([least(boxes.runs.under(measure, boxes.lower, boxes.upper)) for measure in OF_RUNS])
     inertia, gas = run_loads(problem.engine, problem.points[0], problem.fidelity)
     for box in range(2):
         for x in boxes.designs(box, 4):
@@ -242,7 +242,7 @@ def test_a_box_that_reaches_to_a_free_block_is_not_bounded() -> None:
     problem = load_tables(told, Path("loose.toml"))
     model = BoxModel(problem, evaluate_start(problem))
     found = RunBoxes(model, OF_RUNS).under(OF_RUNS[1], model.lower[None], model.upper[None])
-    assert least(found.under)[0] == -np.inf
+    assert least(found)[0] == -np.inf
 
 
 def stopped(most: str, stiffness: str = "300 N/mm", **more: Any) -> Problem:

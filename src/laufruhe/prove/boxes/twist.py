@@ -28,7 +28,7 @@ from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.boxes.twist_coordinates import TwistCoordinates
 from laufruhe.prove.mounts.box_norms import Under, root_under
-from laufruhe.prove.mounts.box_response import Answer, Expansion, inverses, mapped, series
+from laufruhe.prove.mounts.box_series import Answer, Expansion, Sides, inverses, mapped, series, sides_of
 from laufruhe.prove.mounts.ranges import SLACK
 
 # orders whose share of the squares is less, in the middle of the bounds and at their corners, are left out
@@ -52,6 +52,8 @@ class _Lines:
     middle, sides
         Dynamic stiffness in the middle of the bounds, and what one of each coordinate adds, shapes (orders, n, n) and
         (coordinates, orders, n, n).
+    along, inside
+        Directions of what each adds, and how much of it is along them (E37).
     """
 
     loads: PointLoads
@@ -61,6 +63,8 @@ class _Lines:
     mean: Array
     middle: ComplexArray
     sides: ComplexArray
+    along: Sides
+    inside: ComplexArray
 
 
 class _OfInertia:
@@ -139,7 +143,7 @@ class TwistBoxes:
         if any(_least([(1.0, self._under(q, chains, twists))]) > most * (1.0 + SLACK) for most, q in self._limits):
             return math.inf, int(np.argmax(wide))
         least = _least([(weight, self._under(measure, chains, twists)) for weight, measure in self._terms])
-        pull = np.max([twist.sides[0] for twist in twists], axis=0)
+        pull = np.max([twist.pull[0].max(axis=0, initial=0.0) for twist in twists], axis=0)
         turning = sum(weight * of.least(chains) for weight, of in self._turning)
         if not self._terms:
             # each goes one way with every inertia, and nothing else moves it
@@ -175,7 +179,12 @@ class TwistBoxes:
             low, high = (dynamic_stiffness(own.chain(x), orders, speed) for x in ends)
             sides.append((high - low) / (own.upper[k] - own.lower[k]))
         highest = len(torques.coefficients) - 1
-        return _Lines(loads, highest, orders, drives, torques.coefficients[0].real, at, np.array(sides))
+        apart = _apart(len(chain.sections), at.shape[-1])
+        along = sides_of([
+            [*side.real, *side.imag, of[:, None] * apart] for side, of in zip(sides, own.owners, strict=True)
+        ])  # fmt: skip
+        inside = along.inside(np.moveaxis(np.array(sides), 0, 1))
+        return _Lines(loads, highest, orders, drives, torques.coefficients[0].real, at, np.array(sides), along, inside)
 
     def _expanded(self, lines: _Lines, chain: Torsion, centre: Array, half: Array) -> Expansion:
         """Angles of discs and rings times the roots of their inertia."""
@@ -185,8 +194,8 @@ class TwistBoxes:
         dynamic = lines.middle + np.tensordot(centre - middle, lines.sides, axes=(0, 0))
         inverse = inverses(dynamic / scale)
         still = np.einsum("lab,lb->la", inverse, lines.torques / root)
-        sides = np.moveaxis(lines.sides / scale, 0, 1)
-        return series(centre[None], half[None], inverse[None], sides[None], still[None])
+        along = replace(lines.along, columns=lines.along.columns / root[:, None])
+        return series(centre[None], half[None], inverse[None], along, lines.inside, still[None])
 
     def _under(self, measure: Measure, chains: Sequence[Torsion], twists: Sequence[Expansion]) -> Under:
         """A linear function under a root mean square over orders, sections and operating points."""
@@ -202,7 +211,8 @@ class TwistBoxes:
                 found.append(self._mean(measure, chains, lines, chosen))
                 weights.append(np.array([share]))
         parts = (
-            np.concatenate([getattr(each, part) for each in found], axis=1) for part in ("value", "slopes", "rest")
+            np.concatenate([getattr(each, part) for each in found], axis=1)
+            for part in ("value", "slopes", "rest", "bends")
         )
         return root_under(Answer(*parts), np.concatenate(weights))
 
@@ -210,21 +220,22 @@ class TwistBoxes:
         self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, twist: Expansion, chosen: Indices
     ) -> Answer:
         """What a measure makes of the twist of the chosen sections in every order."""
-        root, own = np.sqrt(inertias(chains[1])), np.arange(len(chains[1].sections))
-        apart = np.zeros((len(own), len(root)))
-        apart[own, own], apart[own, own + 1] = 1.0 / root[own], -1.0 / root[own + 1]
+        root = np.sqrt(inertias(chains[1]))
+        twisted = _apart(len(chains[1].sections), len(root))
+        apart = twisted / root
         low, here, high = (
             measure.load.factors(chain, lines.orders, lines.loads.point.speed)[:, chosen, None] for chain in chains
         )
         # each factor is of its own stiffness, and bends one way: so much the secant may be off
         turn, bend = 0.5 * (high - low), np.abs(here - 0.5 * (high + low))[..., 0]
         owners = self.coordinates.owners[:, chosen, None]
-        slopes = owners * turn[:, None] * apart[chosen]
-        found = mapped(twist, (here * apart[chosen])[None], slopes[None])
+        # in coordinates of the discs: a section turns along what its stiffness moves
+        slopes = owners * turn[:, None] * twisted[chosen]
+        found = mapped(twist, (here * apart[chosen])[None], lines.along.along(slopes)[None])
         if not bend.any():
             return found
         moved = np.broadcast_to(apart[chosen], (1, len(lines.orders), len(chosen), len(root)))
-        alone = mapped(twist, moved, 0.0 * slopes[None])
+        alone = mapped(twist, moved)
         most = np.abs(alone.value) + np.abs(alone.slopes).sum(axis=2) + alone.rest[..., None]
         return replace(found, rest=found.rest + np.linalg.norm(np.where(bend > 0.0, bend * most, 0.0), axis=-1))
 
@@ -237,7 +248,7 @@ class TwistBoxes:
         )
         slopes = self.coordinates.owners[:, chosen] * (0.5 * (high - low))
         rest = np.array([[float(np.linalg.norm(here - 0.5 * (high + low)))]])
-        return Answer(here[None, None], slopes[None, None], rest)
+        return Answer(here[None, None], slopes[None, None], rest, np.zeros((1, 1, len(slopes))))
 
     def _breaks(self, limit: Limit, lower: Array, upper: Array) -> bool:
         """Whether natural frequencies break a limit all over a box: they rise with stiffness and fall with inertia."""
@@ -253,6 +264,11 @@ class TwistBoxes:
                 if np.any((low > a) & (high < b)):
                     return True
         return False
+
+
+def _apart(sections: int, angles: int) -> Array:
+    """Twist of sections of the angles of discs and rings."""
+    return np.asarray(np.eye(sections, angles) - np.eye(sections, angles, 1))
 
 
 def _turns(measure: Measure) -> bool:

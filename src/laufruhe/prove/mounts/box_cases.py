@@ -17,7 +17,8 @@ from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, counted_cases
 from laufruhe.problem.measure import Measure
 from laufruhe.prove.mounts.box_norms import counted_rows
-from laufruhe.prove.mounts.box_response import BoxModel, Expansion, Lines, is_travel, mapped, series
+from laufruhe.prove.mounts.box_response import BoxModel, Lines, is_travel
+from laufruhe.prove.mounts.box_series import Expansion, mapped, series
 
 STEPS, HALVINGS = 30, 12
 # how often bounds of travels are widened, by how much more than they have to be, and by how much more each time
@@ -71,23 +72,27 @@ def _with_stops(
     pushed = load + np.einsum("bk,ki->bi", signs * stops.stiffness * stops.gaps, stops.rows)
     inverse = np.linalg.inv(np.asarray(matrices + stops.added(on), dtype=np.float64))
     at = series(
-        centres, halves, inverse[:, None], model.stiffness_slopes[None, None],
+        centres, halves, inverse[:, None], model.sides, model.sides.inside(model.stiffness_slopes),
         np.einsum("bij,bj->bi", inverse, pushed)[:, None],
     )  # fmt: skip
     corner = np.asarray(np.linalg.cholesky(np.asarray(soft + stops.added(on), dtype=np.float64)))
     off_by, first = _strayed(stops, at, corner, signs, met)
     rows, factors = counted_rows(model, asked)
-    value, slopes = (part.real * factors[:, None] for part in model.maps(STILL, at, _AS_LOADS[asked.channel], rows))
+    maps, turned = model.maps(STILL, at, _AS_LOADS[asked.channel], rows)
+    value = maps.real * factors[:, None]
+    by_side = None if turned is None else turned.real * factors[:, None]
     ends = stops.directions[rows] * factors[:, None] * (not is_travel(_AS_LOADS[asked.channel]))
     value = value + np.einsum("rk,bk,ki->bri", ends, on * stops.stiffness, stops.rows)[:, None]
-    answer = mapped(at, value, slopes)
+    answer = mapped(at, value, by_side)
     points = answer.value[:, 0] - (signs * stops.stiffness * stops.gaps) @ ends.T
     points, bends = (part.reshape(*part.shape[:-1], -1, 3) for part in (points, answer.slopes[:, 0]))
     size = np.linalg.norm(points, axis=-1)
     along = points / np.where(size > 0.0, size, 1.0)[..., None]
     bent = np.abs(np.einsum("bnpa,bpa->bpn", bends, along)).sum(axis=-1)
     # what stops that may be on either side of their gap may add
-    reach = _along(corner, value[:, 0]) + sum(_along(corner, side) for side in slopes[:, 0].swapaxes(0, 1))
+    reach = _along(corner, value[:, 0])
+    if by_side is not None:
+        reach = reach + sum(_along(corner, side) for side in model.sides.apart(by_side[:, 0]))
     stray = reach * np.sum(off_by * _along(corner, stops.rows), axis=1, keepdims=True) + off_by @ np.abs(ends).T
     lost = answer.rest[:, 0, None] + np.linalg.norm(stray.reshape(*size.shape, 3), axis=-1)
     # next to a free mode an expansion does not end
@@ -119,8 +124,7 @@ def _balanced(matrices: Array, stops: Stops, load: Array) -> Array:
 
 def _strayed(stops: Stops, at: Expansion, corner: Array, signs: Array, met: Array) -> tuple[Array, Array]:
     """What the force of stops may differ from that of springs or of nothing, (boxes, k), infinite if not known; E60."""
-    none = np.zeros((len(signs), 1, at.first.shape[2], *stops.rows.shape))
-    told = mapped(at, np.broadcast_to(stops.rows, (len(signs), 1, *stops.rows.shape)), none)
+    told = mapped(at, np.broadcast_to(stops.rows, (len(signs), 1, *stops.rows.shape)))
     travel = np.asarray(told.value[:, 0].real)
     first = np.abs(told.slopes[:, 0]).sum(axis=1) + told.rest[:, 0, None]
     # how far springs are past their gaps, and the others within

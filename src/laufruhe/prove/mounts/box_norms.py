@@ -10,16 +10,26 @@ from numpy.typing import NDArray
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Measure
-from laufruhe.prove.mounts.box_response import Answer, BoxModel, Expansion, Lines
+from laufruhe.prove.mounts.box_response import BoxModel, Lines
+from laufruhe.prove.mounts.box_series import Answer, Expansion
 
 
 @dataclass(frozen=True, eq=False)
 class Under:
-    """value + slopes . s - rest is nowhere above a quantity, s from -1 to 1 in each (E38)."""
+    """value + slopes . s - rest is nowhere above a quantity, s from -1 to 1 in each (E38).
+
+    Attributes
+    ----------
+    value, rest
+        Shape (boxes,).
+    slopes, bends
+        And what each side adds to the rest, (boxes, n).
+    """
 
     value: Array
     slopes: Array
     rest: Array
+    bends: Array
 
 
 def under(model: BoxModel, quantity: Measure, lines: Lines, at: Expansion) -> Under:
@@ -33,18 +43,18 @@ def under(model: BoxModel, quantity: Measure, lines: Lines, at: Expansion) -> Un
     found = [_sampled(model, quantity, answer, lines, p) for p in points]
     if not found:
         nothing = np.zeros(len(at.centres))
-        return Under(nothing, np.zeros_like(at.centres), nothing)
+        return Under(nothing, np.zeros_like(at.centres), nothing, np.zeros_like(at.centres))
     if not quantity.norm.sums_lengths:
         best = np.argmax([each.value for each in found], axis=0)
         pick = np.arange(len(best))
-        value, slopes, rest = (np.array([getattr(e, part) for e in found]) for part in ("value", "slopes", "rest"))
-        return Under(value[best, pick], slopes[best, pick], rest[best, pick])
+        parts = (np.array([getattr(each, part) for each in found]) for part in ("value", "slopes", "rest", "bends"))
+        return Under(*(part[best, pick] for part in parts))
     value, slopes = (
         sum(share[p] * getattr(each, part) for p, each in zip(points, found, strict=True))
         for part in ("value", "slopes")
     )
-    rest = np.sqrt(np.einsum("k,bk->b", weights, answer.rest**2))
-    return Under(np.asarray(value), np.asarray(slopes), rest)
+    rest, bends = root_of(weights, answer.rest), root_of(weights, answer.bends)
+    return Under(np.asarray(value), np.asarray(slopes), rest, bends)
 
 
 def counted_rows(model: BoxModel, quantity: Measure) -> tuple[NDArray[np.intp], Array]:
@@ -64,34 +74,44 @@ def line_weights(model: BoxModel, quantity: Measure, lines: Lines) -> Array:
 def _sampled(model: BoxModel, quantity: Measure, answer: Answer, lines: Lines, p: int) -> Under:
     """Mean, maximum or peak to peak over the samples of one period at one operating point."""
     own = np.flatnonzero(lines.points == p)
-    value, slopes, rest = answer.value[:, own], answer.slopes[:, own], answer.rest[:, own]
+    value, slopes, rest, bends = answer.value[:, own], answer.slopes[:, own], answer.rest[:, own], answer.bends[:, own]
     turns = _turns(model, lines, p, own)
     boxes, samples, mounts = len(value), len(turns), value.shape[-1] // 3
-    rows = np.einsum("tk,bkr->btr", turns, value).real.reshape(boxes, samples, mounts, 3)
-    box = np.arange(boxes)
+    # the three directions of all mounts one after the other, and real and imaginary parts as orders of their own
+    waves = np.hstack([turns.real, -turns.imag])
+    parts = value.reshape(boxes, len(own), mounts, 3).swapaxes(2, 3).reshape(boxes, len(own), -1)
+    rows = np.matmul(waves, np.concatenate([parts.real, parts.imag], axis=1)).reshape(boxes, samples, 3, mounts)
     if quantity.norm.sums_lengths or quantity.norm.joins_points:
-        size = np.linalg.norm(rows, axis=-1)
-        along = rows / np.where(size > 0.0, size, 1.0)[..., None]
+        size = _lengths(rows)
+        along = rows / np.where(size > 0.0, size, 1.0)[:, :, None]
         share = 1.0 / (samples * mounts)
-        duals = np.einsum("tk,btr->bkr", turns, along.reshape(boxes, samples, -1))
-        slope = share * np.einsum("bkr,bknr->bn", duals, slopes).real
+        duals = np.matmul(waves.T, along.reshape(boxes, samples, -1)).reshape(boxes, 2, len(own), 3, mounts)
+        there = slopes.reshape(*slopes.shape[:3], mounts, 3)
+        slope = np.einsum("bkxm,bknmx->bn", duals[:, 0], there.real)
+        slope = share * (slope + np.einsum("bkxm,bknmx->bn", duals[:, 1], there.imag))
         # a mean of lengths is not over their root mean square
         squares = np.where(lines.orders[own] > 0.0, 0.5, 1.0) / mounts
-        return Under(share * size.sum(axis=(1, 2)), slope, np.sqrt(rest**2 @ squares))
+        return Under(share * size.sum(axis=(1, 2)), slope, root_of(squares, rest), root_of(squares, bends))
     # a signal reaches as far as its longest row; of a peak to peak as its row farthest from another
-    first, times = np.zeros((boxes, mounts, 3)), 1.0
+    box, first, times = np.arange(boxes), np.zeros((boxes, 3, mounts)), 1.0
     if not quantity.norm.of_row_lengths:
-        start = np.linalg.norm(rows - rows.mean(axis=1, keepdims=True), axis=-1).argmax(axis=1)
-        first = rows[box[:, None], start, np.arange(mounts)]
+        start = _lengths(rows - rows.mean(axis=1, keepdims=True)).argmax(axis=1)
+        first = rows[box[:, None], start, :, np.arange(mounts)].swapaxes(1, 2)
         times = 2.0
-    apart = np.linalg.norm(rows - first[:, None], axis=-1)
+    apart = _lengths(rows - first[:, None])
     t, mount = np.divmod(apart.reshape(boxes, -1).argmax(axis=1), mounts)
     length = apart[box, t, mount]
-    along = (rows[box, t, mount] - first[box, mount]) / np.where(length > 0.0, length, 1.0)[:, None]
+    along = (rows[box, t, :, mount] - first[box, :, mount]) / np.where(length > 0.0, length, 1.0)[:, None]
     there = slopes.reshape(*slopes.shape[:3], mounts, 3)[box, :, :, mount]
-    waves = turns[t] if times == 1.0 else turns[t] - turns[start[box, mount]]
-    slope = np.einsum("bk,bkna,ba->bn", waves, there, along).real
-    return Under(length, slope, times * rest.sum(axis=1))
+    phases = turns[t] if times == 1.0 else turns[t] - turns[start[box, mount]]
+    slope = np.einsum("bk,bkna,ba->bn", phases, there, along).real
+    return Under(length, slope, times * rest.sum(axis=1), times * bends.sum(axis=1))
+
+
+def _lengths(rows: Array) -> Array:
+    """Of vectors, (boxes, samples, 3, mounts) to (boxes, samples, mounts)."""
+    x, y, z = rows[:, :, 0], rows[:, :, 1], rows[:, :, 2]
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
 def _turns(model: BoxModel, lines: Lines, p: int, own: NDArray[np.intp]) -> NDArray[np.complex128]:
@@ -111,5 +131,10 @@ def root_under(answer: Answer, weights: Array) -> Under:
     value, slopes = np.where(known[..., None], answer.value, 0.0), np.where(known[..., None, None], answer.slopes, 0.0)
     size = np.sqrt(np.einsum("k,bkr->b", weights, np.abs(value) ** 2))
     slopes = np.einsum("k,bkr,bknr->bn", weights, value.conj(), slopes).real
-    rest = np.sqrt(np.einsum("k,bk->b", weights, np.where(known, answer.rest, 0.0) ** 2))
-    return Under(size, slopes / np.where(size > 0.0, size, 1.0)[:, None], rest)
+    rest = root_of(weights, np.where(known, answer.rest, 0.0))
+    return Under(size, slopes / np.where(size > 0.0, size, 1.0)[:, None], rest, root_of(weights, answer.bends))
+
+
+def root_of(weights: Array, parts: Array) -> Array:
+    """Root of a weighted sum of squares over orders, (boxes, lines, ...) to (boxes, ...)."""
+    return np.asarray(np.sqrt(np.tensordot(parts**2, weights, axes=(1, 0))))

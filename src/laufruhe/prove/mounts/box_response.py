@@ -1,19 +1,13 @@
 """Response of a block over a whole box of mount stiffnesses, with what the box can at most change (E37, E38, E41).
 
-In coordinates in which the mass is one the impedance D(x) = A + i B - W^2 is linear in the stiffnesses x. About the
-centre c of a box, with D_j its slopes and Q = sum_j (x_j - c_j) D(c)^-1 D_j,
-
-    y = y0 - Q y0 + Q^2 y0 - ...,    y0 = D(c)^-1 r                                      (E37)
-
-and what follows the square is at most rho / (1 - rho) |Q^2 y0|, rho = sum_j |x_j - c_j| |D(c)^-1 D_j|. Forces and
-travel of the mounts are linear in x times y, so they are known up to the second order, and the rest is bounded.
+In coordinates in which the mass is one the impedance D(x) = A + i B - W^2 is linear in the stiffnesses x, and so are
+the forces that motion makes in the mounts: over a box they are a series (`laufruhe.prove.mounts.box_series`).
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +24,7 @@ from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
+from laufruhe.prove.mounts.box_series import Answer, Expansion, inverses, mapped, series, sides_of
 
 NOTHING = 1e-13
 
@@ -62,50 +57,6 @@ class Lines:
     def still(self) -> Lines:
         """The same loads at rest: what the mounts carry if they give no way (E11)."""
         return Lines(self.points, self.places, self.orders, np.zeros_like(self.omegas), self.loads)
-
-
-@dataclass(frozen=True, eq=False)
-class Expansion:
-    """Motion over boxes (E37): first and second order in shares of the half widths, shapes (boxes, lines, ...).
-
-    Attributes
-    ----------
-    centres, halves
-        Of the boxes, shape (boxes, n).
-    motion
-        y0, (..., 6).
-    first, second
-        Q_j y0 and Q_i Q_j y0, (..., n, 6) and (..., n, n, 6).
-    size
-        Bound of |Q^2 y0|, (...).
-    rest
-        Bound of what follows the square, (...); infinite where the series need not end.
-    pull
-        |Q_j|, (..., n): what splitting a side would lessen.
-    """
-
-    centres: Array
-    halves: Array
-    motion: ComplexArray
-    first: ComplexArray
-    second: ComplexArray
-    size: Array
-    rest: Array
-    pull: Array
-
-    @property
-    def sides(self) -> Array:
-        """By how much each side of every box keeps the expansion from ending, shape (boxes, n)."""
-        return np.asarray(np.nan_to_num(self.pull, nan=1.0, posinf=1.0).max(axis=1, initial=0.0))
-
-
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """Forces or travel over boxes: value and slopes at the centre, and a bound of the rest (E37)."""
-
-    value: ComplexArray
-    slopes: ComplexArray
-    rest: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +119,9 @@ class BoxModel:
             )
             for name in ("stiffness", "loss", "damping", "springs", "losses", "dampers")
         }
+        self.sides = sides_of([[each[j] for each in self.slopes.values()] for j in range(len(decisions))])
+        self._inside = [self.sides.inside(self.slopes[name]) for name in ("stiffness", "loss", "damping")]
+        self._along = [self.sides.along(self.slopes[name]) for name in ("springs", "losses", "dampers")]
         self.highest = float(np.linalg.eigvalsh(self._parts(self.mounting(self.upper)).stiffness)[-1])
 
     def mounting(self, x: Array) -> ElasticMounting:
@@ -247,35 +201,31 @@ class BoxModel:
     def expanded(self, lines: Lines, lower: Array, upper: Array) -> Expansion:
         """Motion over boxes, shapes (boxes, n) (E37)."""
         centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
-        moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
         stiffness, loss, damping = (self.at(name, centres)[:, None] for name in ("stiffness", "loss", "damping"))
-        impedance: ComplexArray = stiffness + 1j * (moving * loss + omegas * damping) + self.added(lines.omegas)
-        impedance = impedance - omegas**2 * np.eye(6)
-        lost = moving[:, None] * self.slopes["loss"] + omegas[:, None] * self.slopes["damping"]
-        slopes = self.slopes["stiffness"] + 1j * lost
+        impedance: ComplexArray = _together(lines, stiffness, loss, damping) + self.added(lines.omegas)
+        impedance = impedance - lines.omegas[:, None, None] ** 2 * np.eye(6)
         inverse = inverses(np.asarray(impedance, dtype=np.complex128))
-        motion = np.einsum("bkij,kj->bki", inverse, lines.loads)
-        return series(centres, halves, inverse, slopes[None], motion)
+        motion = np.matmul(inverse, lines.loads[:, :, None])[..., 0]
+        return series(centres, halves, inverse, self.sides, _together(lines, *self._inside), motion)
 
     def answer(self, lines: Lines, at: Expansion, channel: Channel, rows: Indices, factors: Array) -> Answer:
         """Forces or travel, the rows of the mounts that count, with factors on them (E37)."""
-        value, slopes = self.maps(lines, at, channel, rows)
-        return mapped(at, value * factors[:, None], slopes * factors[:, None])
+        value, turned = self.maps(lines, at, channel, rows)
+        return mapped(at, value * factors[:, None], None if turned is None else turned * factors[:, None])
 
-    def maps(self, lines: Lines, at: Expansion, channel: Channel, rows: Indices) -> tuple[ComplexArray, ComplexArray]:
-        """From motion to forces or travel at the centres, (boxes, lines, r, 6), and by side, (..., n, r, 6)."""
-        boxes, count, open_numbers = len(at.centres), len(lines.omegas), len(self.lower)
+    def maps(
+        self, lines: Lines, at: Expansion, channel: Channel, rows: Indices
+    ) -> tuple[ComplexArray, ComplexArray | None]:
+        """From motion to forces or travel at the centres, (boxes, lines, r, 6); what half a side adds, (..., r, m)."""
         if is_travel(channel):
-            flat = np.broadcast_to(self.travels[rows].astype(complex), (boxes, count, len(rows), 6))
-            return flat, np.zeros((boxes, count, open_numbers, len(rows), 6), dtype=complex)
-        moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
+            flat = self.travels[rows].astype(complex)
+            return np.broadcast_to(flat, (len(at.centres), len(lines.omegas), *flat.shape)), None
         springs, losses, dampers = (
             self.at(name, at.centres)[:, None, rows] for name in ("springs", "losses", "dampers")
         )
-        value = springs + 1j * (moving * losses + omegas * dampers) + self.added_forces(lines.omegas)[:, rows]
-        lost = moving[:, None] * self.slopes["losses"][:, rows] + omegas[:, None] * self.slopes["dampers"][:, rows]
-        by_side = self.slopes["springs"][:, rows] + 1j * lost
-        return value, by_side * at.halves[:, None, :, None, None]
+        value = _together(lines, springs, losses, dampers) + self.added_forces(lines.omegas)[:, rows]
+        by_side = _together(lines, *(each[rows] for each in self._along))
+        return value, by_side * at.halves[:, None, None, self.sides.own]
 
     def felt_at_most(self, lines: Lines, channel: Channel) -> Array:
         """What an order above all natural frequencies can do to all mounts anywhere in the bounds, (lines,) (E41)."""
@@ -293,45 +243,7 @@ class BoxModel:
         return np.asarray(motion * (still + lines.omegas * math.sqrt(most) * float(np.linalg.norm(top.dampers))))
 
 
-def series(centres: Array, halves: Array, inverse: Any, slopes: Any, motion: Any) -> Expansion:
-    """Motion over boxes from that at their centres, D(c)^-1 and the slopes of D, (boxes, lines, ...) each (E37)."""
-    pulled = np.matmul(inverse[:, :, None], slopes) * halves[:, None, :, None, None]
-    first = np.matmul(pulled, motion[:, :, None, :, None])[..., 0]
-    second = _each_by_each(first, pulled)
-    pull = np.linalg.norm(pulled, axis=(-2, -1))
-    size = np.linalg.norm(_both_ways(second), axis=-1).sum(axis=(-2, -1))
-    rho = pull.sum(axis=-1)
-    share = np.where(rho < 1.0, rho / np.where(rho < 1.0, 1.0 - rho, 1.0), np.inf)
-    rest = np.where(size > 0.0, share * np.where(size > 0.0, size, 1.0), np.where(rho < 1.0, 0.0, np.inf))
-    return Expansion(centres, halves, motion, first, second, size, rest, pull)
-
-
-def mapped(at: Expansion, value: Any, slopes: Any) -> Answer:
-    """What maps at the centres, (boxes, lines, r, 6), and by side, (..., n, r, 6), make of motion (E37)."""
-    first = np.matmul(slopes, at.motion[:, :, None, :, None])[..., 0] - np.matmul(at.first, np.swapaxes(value, -2, -1))
-    second = np.matmul(at.second, np.swapaxes(value, -2, -1)[:, :, None]) - _each_by_each(at.first, slopes)
-    rest = np.linalg.norm(_both_ways(second), axis=-1).sum(axis=(-2, -1))
-    turned = np.linalg.norm(slopes, axis=(-2, -1)).sum(axis=-1)
-    rest = rest + np.linalg.norm(value, axis=(-2, -1)) * at.rest + turned * at.size
-    rest = rest + np.where(turned > 0.0, turned * np.where(turned > 0.0, at.rest, 0.0), 0.0)
-    return Answer(np.einsum("bkri,bki->bkr", value, at.motion), first, rest)
-
-
-def _each_by_each(first: ComplexArray, maps: ComplexArray) -> ComplexArray:
-    """What the map of every side, (..., m, r, i), makes of every motion, (..., n, i), shape (..., m, n, r)."""
-    return np.asarray(np.matmul(first[:, :, None], np.swapaxes(maps, -2, -1)))
-
-
-def _both_ways(second: ComplexArray) -> ComplexArray:
-    """The mean of (i, j) and (j, i): their sum is all that matters."""
-    return np.asarray(0.5 * (second + np.swapaxes(second, 2, 3)))
-
-
-def inverses(matrices: ComplexArray) -> ComplexArray:
-    """Inverses; infinite where there is none, which leaves a box without a bound."""
-    try:
-        return np.asarray(np.linalg.inv(matrices))
-    except np.linalg.LinAlgError:
-        singular = np.linalg.det(matrices) == 0.0
-        found = np.linalg.inv(np.where(singular[..., None, None], np.eye(matrices.shape[-1]), matrices))
-        return np.asarray(np.where(singular[..., None, None], np.inf, found))
+def _together(lines: Lines, springs: Array, losses: Array, dampers: Array) -> ComplexArray:
+    """Of every line, what does not move with frequency and what does, (..., i, j) to (..., lines, i, j)."""
+    moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
+    return np.asarray(springs + 1j * (moving * losses + omegas * dampers))

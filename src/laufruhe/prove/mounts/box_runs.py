@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -28,14 +27,6 @@ from laufruhe.prove.mounts.run_motion import FARTHEST, REACH, Equations, Motion,
 LEAST_STEPS = 60
 # share of a limit of travel that a stop is beyond it
 APART = 1e-3
-
-
-@dataclass(frozen=True, eq=False)
-class RunUnder:
-    """A linear function under a measure of every box, and what splitting a side would lessen, (boxes, open numbers)."""
-
-    under: Under
-    pull: Array
 
 
 class RunBoxes:
@@ -76,34 +67,30 @@ class RunBoxes:
             runs.append(RunMoments(sweep, wrenches, self._matrices.base.load, max(int(most), 1)))
         return tuple(runs)
 
-    def under(self, measure: Measure, lower: Array, upper: Array) -> RunUnder:
+    def under(self, measure: Measure, lower: Array, upper: Array) -> Under:
         """Of boxes, shapes (boxes, open numbers); with an infinite rest where nothing is known."""
         of = self._equations(lower, upper)
         step = max(run.step for run in self._runs)
         which = np.flatnonzero(of.known & (np.linalg.norm(of.matrix, 2, axis=(-2, -1)) * step <= FARTHEST))
-        nothing = Under(np.zeros(len(lower)), np.zeros_like(lower), np.full(len(lower), np.inf))
-        out = RunUnder(nothing, np.ones_like(lower))
+        out = Under(np.zeros(len(lower)), np.zeros_like(lower), np.full(len(lower), np.inf), np.ones_like(lower))
         if len(which):
             of = of if len(which) == len(lower) else self._equations(lower[which], upper[which])
             found = self._under(measure, of)
-            for name in ("value", "slopes", "rest"):
-                getattr(out.under, name)[which] = getattr(found.under, name)
-            out.pull[which] = found.pull
+            for name in ("value", "slopes", "rest", "bends"):
+                getattr(out, name)[which] = getattr(found, name)
         return out
 
     def _equations(self, lower: Array, upper: Array) -> Equations:
         return equations(self._model, self._matrices, self._scale, lower, upper)
 
-    def _under(self, measure: Measure, of: Equations) -> RunUnder:
+    def _under(self, measure: Measure, of: Equations) -> Under:
         felt, d = self._rows[measure]
         maps = mapped(felt, of.above, of.halves, of.turn, of.roots)
         found = [_Look(of, run, maps, d).under() for run in self._runs]
-        bounds = [np.nan_to_num(_least(each.under), nan=-np.inf) for each in found]
+        bounds = [np.nan_to_num(_least(each), nan=-np.inf) for each in found]
         best, pick = np.argmax(bounds, axis=0), np.arange(of.count)
-        value, slopes, rest = (
-            np.array([getattr(each.under, name) for each in found])[best, pick] for name in ("value", "slopes", "rest")
-        )
-        return RunUnder(Under(value, slopes, rest), np.array([each.pull for each in found])[best, pick])
+        parts = ("value", "slopes", "rest", "bends")
+        return Under(*(np.array([getattr(each, part) for each in found])[best, pick] for part in parts))
 
 
 def run_boxes(model: BoxModel) -> RunBoxes | None:
@@ -159,7 +146,7 @@ class _Look:
         self._of, self._run, self._maps, self._d = of, run, maps, d
         self._steps = Steps(of, run.step)
 
-    def under(self) -> RunUnder:
+    def under(self) -> Under:
         """The best of all moments and places, of steps of which one ends where motion at the middle is largest."""
         steps = [self._run.ending_at(int(place)) for place in self._peaks()]
         count = min(each.count for each in steps)
@@ -200,7 +187,7 @@ class _Look:
         seen = self._rows(self._maps.position, self._maps.rate) @ z
         return np.asarray(np.linalg.norm(self._places(seen), axis=-2))
 
-    def _of_motion(self, motion: Motion) -> RunUnder:
+    def _of_motion(self, motion: Motion) -> Under:
         maps, pairs = self._maps, self._steps.pairs
         own, by = self._rows(maps.position, maps.rate), self._rows(maps.positions, maps.rates)
         value = own @ motion.middle
@@ -221,7 +208,7 @@ class _Look:
         bent = np.where(alike, np.maximum(-bent, 0.0), np.abs(bent))
         return self._best(size, slopes, bent, rest)
 
-    def _best(self, size: Array, slopes: Array, bent: Array, rest: Array) -> RunUnder:
+    def _best(self, size: Array, slopes: Array, bent: Array, rest: Array) -> Under:
         """Of all places and times that which is highest."""
         least = size - np.abs(slopes).sum(axis=1) - bent.sum(axis=1) - rest
         known = np.nan_to_num(least, nan=-np.inf)
@@ -235,8 +222,7 @@ class _Look:
         for number, (j, k) in enumerate(self._steps.pairs):
             for side in {j, k}:
                 pull[:, side] += bent[:, number]
-        scale = np.where(size > 0.0, size, 1.0)[:, None]
-        return RunUnder(Under(size, slopes, rest + bent.sum(axis=1)), pull / scale)
+        return Under(size, slopes, rest + bent.sum(axis=1), pull)
 
     def _gains(self, along: Array) -> Array:
         """What a motion of energy one is felt as at most along directions (boxes, places, d, times), without d."""

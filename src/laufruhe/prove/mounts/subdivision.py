@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,18 +145,19 @@ class StiffnessBoxes:
             return self._bounds(lower, upper)
 
     def _bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        boxes, pull = _Boxes.of(lower), np.zeros_like(lower)
+        boxes, pull, size = _Boxes.of(lower), np.zeros_like(lower), np.full(len(lower), self.constant)
         for weight, quantity, lines, left_out in self._terms:
             at = self.model.expanded(lines, lower, upper)
-            boxes.add(weight, under(self.model, quantity, lines, at), left_out)
-            pull = np.maximum(pull, at.sides)
+            least = under(self.model, quantity, lines, at)
+            boxes.add(weight, least, left_out)
+            pull, size = pull + weight * least.bends, size + weight * least.value
         for maximum, quantity, lines, left_out in self._limits:
             least = under(self.model, quantity, lines, self.model.expanded(lines, lower, upper))
             boxes.hold(least, left_out, maximum)
         numbers, pulled = self._numbers(lower, upper)
         broken = self._breaks(lower, upper)
         found = self.constant + numbers + boxes.least
-        pull = np.maximum(pull, pulled)
+        pull = (pull + pulled) / np.where(size + numbers > 0.0, size + numbers, 1.0)[:, None]
         # run-ups cost most, and tell nothing of boxes that are ruled out
         left = np.flatnonzero(~broken & (found < self.enough))
         if self.runs is not None and len(left):
@@ -173,11 +174,11 @@ class StiffnessBoxes:
         weights = {term.measure: term.weight for term in problem.objective}
         for measure in self.runs.measures:
             found = self.runs.under(measure, lower, upper)
-            boxes.add(weights.get(measure, 0.0), found.under)
+            boxes.add(weights.get(measure, 0.0), found)
             for limit in problem.limits:
                 if limit.measure == measure:
-                    boxes.hold(found.under, 0.0, limit.maximum * (1.0 + SLACK))
-            pull = np.maximum(pull, found.pull)
+                    boxes.hold(found, 0.0, limit.maximum * (1.0 + SLACK))
+            pull = np.maximum(pull, found.bends / np.where(found.value > 0.0, found.value, 1.0)[:, None])
         return pull
 
     def _numbers(self, lower: Array, upper: Array) -> tuple[Array, Array]:
@@ -186,7 +187,7 @@ class StiffnessBoxes:
         for asked, weight in ((term.measure, term.weight) for term in self.problem.mount_terms):
             if _is_ratio(asked):
                 ratio, pulled = self._ratio(asked, lower, upper)
-                found, pull = np.asarray(found + weight * ratio), np.maximum(pull, pulled)
+                found, pull = np.asarray(found + weight * ratio), pull + weight * pulled
             else:
                 found = np.asarray(found + weight * RANGES[asked.channel](self.model, asked, lower, upper)[0])
         return found, pull
@@ -217,16 +218,17 @@ class StiffnessBoxes:
             self.model.answer(each, expansion, channels.MOUNT_FORCE, rows, np.ones(len(rows)))
             for each, expansion in ((lines, at), (lines.still(), still))
         )
-        best = np.zeros(len(lower))
+        best, pull = np.zeros(len(lower)), np.zeros_like(lower)
         for group in _groups(quantity, lines):
             weights = group.astype(float)
             top, bottom = root_under(over, weights), root_under(firm, weights)
             bent = np.einsum("k,bk->b", weights, np.linalg.norm(firm.slopes, axis=-1).sum(axis=-1) ** 2)
             known = np.all(np.isfinite(firm.rest[:, group]), axis=1) & (bottom.value > 0.0)
             bend = bent / (2.0 * np.where(known, bottom.value, 1.0))
-            least = _least_ratio(top, Under(bottom.value, bottom.slopes, bottom.rest + bend))
+            least = _least_ratio(top, replace(bottom, rest=bottom.rest + bend))
             best = np.maximum(best, np.where(known, least, 0.0))
-        return best, at.sides
+            pull = np.maximum(pull, (top.bends + least[:, None] * bottom.bends) / bottom.value[:, None])
+        return best, pull
 
 
 def _is_ratio(quantity: Measure) -> bool:

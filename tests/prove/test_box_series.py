@@ -1,0 +1,89 @@
+"""Forces over a box of open numbers are within the bound of what their series leaves out (E37)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from laufruhe.prove.mounts.box_series import mapped, norm_over, series, sides_of
+
+
+def scene(seed: int, ranks: tuple[int, ...], damped: float = 0.1) -> dict[str, np.ndarray]:
+    """D = K (1 + i eta) - w^2 of six motions, springs along few directions, and the forces in them."""
+    rng = np.random.default_rng(seed)
+    along = [rng.normal(size=(6, rank)) for rank in ranks]
+    sides = np.array([(1.0 + 1j * damped * rng.random()) * each @ each.T for each in along])
+    base = rng.normal(size=(6, 6))
+    omegas = rng.uniform(0.5, 3.0, 3)
+    middle = np.array([(1.0 + 1j * damped) * base @ base.T + sides.sum(axis=0) - w**2 * np.eye(6) for w in omegas])
+    ends = np.array([rng.normal(size=(5, len(each.T))) @ each.T for each in along]) * (1.0 + 0.3j)
+    return {
+        "middle": middle, "sides": sides, "ends": ends, "value": rng.normal(size=(3, 5, 6)) + 0.2j,
+        "loads": rng.normal(size=(3, 6)) + 1j * rng.normal(size=(3, 6)),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("ranks", [(1,), (1, 1, 1), (2, 1), (3, 2, 1)])
+@pytest.mark.parametrize("wide", [0.2, 0.02])
+def test_no_design_of_a_box_is_farther_off_than_the_rest(ranks: tuple[int, ...], wide: float) -> None:
+    rng, tight, ended = np.random.default_rng(7), 0.0, 0
+    for seed in range(20):
+        told = scene(seed, ranks)
+        halves = wide * rng.random((1, len(ranks)))
+        sides = sides_of(
+            [[side.real, side.imag, end.real] for side, end in zip(told["sides"], told["ends"], strict=True)]
+        )
+        assert np.bincount(sides.own).tolist() == list(ranks)
+        inverse = np.linalg.inv(told["middle"])
+        motion = np.einsum("kij,kj->ki", inverse, told["loads"])
+        at = series(halves, halves, inverse[None], sides, sides.inside(told["sides"]), motion[None])
+        turned = sides.along(told["ends"]) * halves[0, sides.own]
+        answer = mapped(at, told["value"][None], turned)
+        ended += int(np.isfinite(answer.rest).sum())
+        corners = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * len(ranks))).reshape(len(ranks), -1).T
+        for s in [*corners, *rng.uniform(-1.0, 1.0, (20, len(ranks)))]:
+            moved = np.linalg.solve(
+                told["middle"] + np.einsum("n,nij->ij", s * halves[0], told["sides"]), told["loads"][:, :, None]
+            )[..., 0]
+            maps = told["value"] + np.einsum("n,nri->ri", s * halves[0], told["ends"])
+            off = np.einsum("kri,ki->kr", maps, moved) - answer.value[0] - np.einsum("n,knr->kr", s, answer.slopes[0])
+            size = np.linalg.norm(off, axis=-1)
+            assert np.all(size <= answer.rest[0] * (1.0 + 1e-9) + 1e-12)
+            tight = max(tight, float((size / answer.rest[0]).max()))
+    assert tight > 0.2
+    assert ended > 30
+
+
+def test_a_map_that_sees_nothing_has_no_rest_however_far_motion_goes() -> None:
+    told = scene(3, (1, 1))
+    sides, wide = sides_of([[side.real] for side in told["sides"]]), np.full((1, 2), 50.0)
+    inverse = np.linalg.inv(told["middle"])
+    motion = np.einsum("kij,kj->ki", inverse, told["loads"])
+    at = series(wide, wide, inverse[None], sides, sides.inside(told["sides"]), motion[None])
+    assert np.all(np.isinf(at.rest))
+    assert np.all(mapped(at, 0.0 * told["value"][None]).rest == 0.0)
+    assert np.all(np.isinf(mapped(at, told["value"][None]).rest))
+
+
+def test_a_number_of_no_width_moves_nothing() -> None:
+    told = scene(5, (2, 1))
+    sides, wide = sides_of([[side.real] for side in told["sides"]]), np.array([[0.05, 0.0]])
+    inverse = np.linalg.inv(told["middle"])
+    motion = np.einsum("kij,kj->ki", inverse, told["loads"])
+    at = series(wide, wide, inverse[None], sides, sides.inside(told["sides"]), motion[None])
+    answer = mapped(at, told["value"][None], sides.along(told["ends"]) * wide[0, sides.own])
+    assert np.all(answer.slopes[0, :, 1] == 0.0)
+    assert np.all(answer.bends[0, :, 1] == 0.0)
+    assert np.all(answer.bends[0, :, 0] > 0.0)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (4, 4), (12, 3), (6, 6)])
+def test_a_norm_is_never_under_the_largest_singular_value(shape: tuple[int, int]) -> None:
+    rng = np.random.default_rng(11)
+    matrices = rng.normal(size=(50, *shape)) + 1j * rng.normal(size=(50, *shape))
+    matrices[0] = 0.0
+    matrices[1] *= 1e-150
+    exact = np.linalg.norm(matrices, ord=2, axis=(-2, -1))
+    found = norm_over(matrices)
+    assert np.all(found >= exact * (1.0 - 1e-12))
+    assert np.all(found <= exact * min(shape) ** (1.0 / 16.0) * (1.0 + 1e-12))
