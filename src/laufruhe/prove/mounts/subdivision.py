@@ -29,9 +29,9 @@ from laufruhe.prove.mounts.box_runs import run_boxes
 from laufruhe.prove.mounts.ranges import SLACK
 
 # open numbers that are divided without being asked for, and what all boxes may cost together
-MOST_OPEN = 4
-WORK = 4e6
-MOST_BOXES = 20_000
+MOST_OPEN = 6
+WORK = 2e7
+MOST_BOXES = 60_000
 # numbers held at once
 HELD = 3e6
 HALVINGS = 45

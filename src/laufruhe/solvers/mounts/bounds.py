@@ -21,7 +21,7 @@ from laufruhe.solvers.result import Result
 
 MOST_DIVISIONS = 3
 # share of the expansions that are worth it which are tried first
-EARLY = 0.02
+EARLY = 0.2
 # seconds that a first bound has where time is over
 LEAST_SECONDS = 0.5
 
