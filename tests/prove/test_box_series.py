@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from laufruhe.prove.mounts.box_series import mapped, norm_over, series, sides_of
+from laufruhe.prove.mounts.box_series import directions_of, mapped, norm_over, series
 
 
 def scene(seed: int, ranks: tuple[int, ...], damped: float = 0.1) -> dict[str, np.ndarray]:
@@ -30,7 +30,7 @@ def test_no_design_of_a_box_is_farther_off_than_the_rest(ranks: tuple[int, ...],
     for seed in range(20):
         told = scene(seed, ranks)
         halves = wide * rng.random((1, len(ranks)))
-        sides = sides_of(
+        sides = directions_of(
             [[side.real, side.imag, end.real] for side, end in zip(told["sides"], told["ends"], strict=True)]
         )
         assert np.bincount(sides.own).tolist() == list(ranks)
@@ -56,7 +56,7 @@ def test_no_design_of_a_box_is_farther_off_than_the_rest(ranks: tuple[int, ...],
 
 def test_a_map_that_sees_nothing_has_no_rest_however_far_motion_goes() -> None:
     told = scene(3, (1, 1))
-    sides, wide = sides_of([[side.real] for side in told["sides"]]), np.full((1, 2), 50.0)
+    sides, wide = directions_of([[side.real] for side in told["sides"]]), np.full((1, 2), 50.0)
     inverse = np.linalg.inv(told["middle"])
     motion = np.einsum("kij,kj->ki", inverse, told["loads"])
     at = series(wide, wide, inverse[None], sides, sides.inside(told["sides"]), motion[None])
@@ -67,7 +67,7 @@ def test_a_map_that_sees_nothing_has_no_rest_however_far_motion_goes() -> None:
 
 def test_a_number_of_no_width_moves_nothing() -> None:
     told = scene(5, (2, 1))
-    sides, wide = sides_of([[side.real] for side in told["sides"]]), np.array([[0.05, 0.0]])
+    sides, wide = directions_of([[side.real] for side in told["sides"]]), np.array([[0.05, 0.0]])
     inverse = np.linalg.inv(told["middle"])
     motion = np.einsum("kij,kj->ki", inverse, told["loads"])
     at = series(wide, wide, inverse[None], sides, sides.inside(told["sides"]), motion[None])

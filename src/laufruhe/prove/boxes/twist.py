@@ -28,7 +28,7 @@ from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.boxes.twist_coordinates import TwistCoordinates
 from laufruhe.prove.mounts.box_norms import Under, root_under
-from laufruhe.prove.mounts.box_series import Answer, Expansion, Sides, inverses, mapped, series, sides_of
+from laufruhe.prove.mounts.box_series import Answer, Expansion, Sides, directions_of, inverses, mapped, series
 from laufruhe.prove.mounts.ranges import SLACK
 
 # orders whose share of the squares is less, in the middle of the bounds and at their corners, are left out
@@ -180,7 +180,7 @@ class TwistBoxes:
             sides.append((high - low) / (own.upper[k] - own.lower[k]))
         highest = len(torques.coefficients) - 1
         apart = _apart(len(chain.sections), at.shape[-1])
-        along = sides_of([
+        along = directions_of([
             [*side.real, *side.imag, of[:, None] * apart] for side, of in zip(sides, own.owners, strict=True)
         ])  # fmt: skip
         inside = along.inside(np.moveaxis(np.array(sides), 0, 1))

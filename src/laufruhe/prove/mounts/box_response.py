@@ -24,7 +24,7 @@ from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.box_series import Answer, Expansion, inverses, mapped, series, sides_of
+from laufruhe.prove.mounts.box_series import Answer, Expansion, directions_of, inverses, mapped, series
 
 NOTHING = 1e-13
 
@@ -119,7 +119,7 @@ class BoxModel:
             )
             for name in ("stiffness", "loss", "damping", "springs", "losses", "dampers")
         }
-        self.sides = sides_of([[each[j] for each in self.slopes.values()] for j in range(len(decisions))])
+        self.sides = directions_of([[each[j] for each in self.slopes.values()] for j in range(len(decisions))])
         self._inside = [self.sides.inside(self.slopes[name]) for name in ("stiffness", "loss", "damping")]
         self._along = [self.sides.along(self.slopes[name]) for name in ("springs", "losses", "dampers")]
         self.highest = float(np.linalg.eigvalsh(self._parts(self.mounting(self.upper)).stiffness)[-1])

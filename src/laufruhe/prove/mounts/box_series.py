@@ -71,7 +71,7 @@ class Sides:
         return values if len(self.own) == self.count else values @ (self.own[:, None] == np.arange(self.count))
 
 
-def sides_of(matrices: Sequence[Sequence[Array]]) -> Sides:
+def directions_of(matrices: Sequence[Sequence[Array]]) -> Sides:
     """Directions of numbers, of each of which some matrices are told, (any, d): what their rows span."""
     found = []
     for each in matrices:
