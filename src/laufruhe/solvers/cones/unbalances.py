@@ -106,6 +106,9 @@ def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optim
             # means averaged, for at a few angles alone one may be more than over the whole cycle (P7)
             if is_empty(model.at(samples, averaged=True)):
                 return None, samples
+            # a limit that is all but the least of what it limits is kept by what counts as kept
+            found = _attempt(problem, model, samples, nothing, FEASIBLE - KEPT)
+            best = found if found is not None and found.excess <= KEPT and _is_kept(problem, found) else best
             samples *= 2
             continue
         best = found
@@ -165,7 +168,7 @@ def _attempt(problem: Problem, model: AffineModel, samples: int, nothing: float,
 
 
 def tightened(affine: AffineProblem, margin: float) -> AffineProblem:
-    """Limits a little lower."""
+    """Limits a little lower; higher where the margin is less than none."""
     return replace(affine, limits=tuple((maximum * (1.0 - margin), norm) for maximum, norm in affine.limits))
 
 
