@@ -32,7 +32,7 @@ Times = tuple[float, float]
 Row = tuple[str, Times, str, Times]
 
 READS = "import numpy, typer; from pydantic import BaseModel"
-DECIDES = f"import clarabel, rich.console, rich.table; {READS}"
+DECIDES = f"import clarabel, jinja2, rich.console, rich.table, xlsxwriter; {READS}"
 DRAWS = f"import matplotlib.figure, matplotlib.backends.backend_agg, matplotlib.backends.backend_svg; {DECIDES}"
 """Libraries that a command ends with, bare."""
 

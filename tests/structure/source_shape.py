@@ -25,6 +25,7 @@ HEAVY = {
     "clarabel",
     "cvxpy",
     "distributed",
+    "jinja2",
     "matplotlib",
     "netCDF4",
     "pandas",
@@ -32,6 +33,7 @@ HEAVY = {
     "pyscipopt",
     "scipy",
     "xarray",
+    "xlsxwriter",
     "zarr",
 }
 LATE_ROOMS = ("", "cli")

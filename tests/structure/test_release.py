@@ -45,7 +45,7 @@ def test_a_wheel_carries_its_data(tmp_path: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
         archive.extractall(tmp_path / "installed")
-    own = {"files/engines.toml", "files/laufruhe.schema.json", "files/laufruhe-study.schema.json", "report/page.css",
+    own = {"files/engines.toml", "files/laufruhe.schema.json", "files/laufruhe-study.schema.json", "report/page.html",
            "py.typed"}  # fmt: skip
     ready = {f"problems/{path.name}" for path in (ROOT / "problems").iterdir() if path.is_file()}
     assert {f"laufruhe/{name}" for name in own | ready} <= names

@@ -16,7 +16,7 @@ from laufruhe.report import files
 from laufruhe.report.json_result import as_json
 from laufruhe.report.result_report import result_document
 from laufruhe.report.tables import writing_tables
-from laufruhe.report.web_page import as_html
+from laufruhe.report.web_page import as_html, template
 from laufruhe.solvers.result import Result, Status
 
 
@@ -49,9 +49,7 @@ def write_results(
         if request.kinds:
             say("drawing")
         with timed(result.timing, "plots"):
-            if not is_quiet():
-                # tables on the screen, which come last, are loaded while pictures are drawn
-                import_module("laufruhe.report.screen")
+            _get_ready()
             pictures = drawn()
         document = document.showing(pictures)
         files.write(stage / files.REPORT, document.as_markdown(f".{request.kinds[0]}" if request.kinds else ""))
@@ -60,6 +58,13 @@ def write_results(
             tables()
     for place in filter(None, (stage / files.RESULT, copy)):
         files.write(place, as_json(result, request.series))
+
+
+def _get_ready() -> None:
+    """Load what makes the page and the tables on the screen, while pictures are drawn."""
+    template()
+    if not is_quiet():
+        import_module("laufruhe.report.screen")
 
 
 def show(request: Request, result: Result, folder: Path) -> None:

@@ -29,7 +29,7 @@ from laufruhe.report.workbook import write_book
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result
 
 MOST_ROWS = 20 * STEPS
-MANY = 30_000
+MANY = 5_000
 """Cells that take longer to write than a process to begin."""
 
 
