@@ -37,7 +37,8 @@ def row_of(problem: Problem) -> str:
         assert result.objective is not None
         values.append(result.objective.value)
         print(problem.name, seed, values[-1], f"{seconds[-1]:.1f} s", file=sys.stderr, flush=True)
-    spread = max(values) / min(values) - 1.0
+    # where all seeds leave nothing there is no share of it
+    spread = max(values) / min(values) - 1.0 if min(values) > 0.0 else max(values)
     starts = "cone program, no starts" if is_convex(problem) else f"{problem.search.starts}"
     return (
         f"| `{problem.name}` | {starts} | {min(values):.8g} | {max(values):.8g} | {spread:.0e} | {max(seconds):.1f} |"
@@ -48,7 +49,8 @@ def main() -> None:
     lines = [
         "# Ready problems on elastic mounts from ten seeds",
         "",
-        "Objective in SI units; the spread is that of the worst seed above the best.",
+        "Objective in SI units; the spread is that of the worst seed above the best,",
+        "as a share of it where it is not zero.",
         "",
         "| problem | starts | best | worst | spread | longest [s] |",
         "| --- | --- | ---: | ---: | ---: | ---: |",
