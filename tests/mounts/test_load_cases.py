@@ -20,7 +20,7 @@ from laufruhe.physics.static_cases import case_wrench, settled, stops_of
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.box_cases import held_loads
-from laufruhe.prove.mounts.box_numbers import RANGES
+from laufruhe.prove.mounts.box_numbers import UNDER
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
@@ -134,9 +134,14 @@ def test_no_design_of_a_box_is_under_its_bound(name: str, gap: str, tmp_path: Pa
     # of loads that are held no operating point is asked
     still = evaluate(replace(problem, points=()))
     for low, high in zip(*boxes(problem, 30, 3), strict=True):
-        (least,), _ = RANGES[measure.channel](model, measure, low[None], high[None])
-        drawn = [problem.design((low + s * (high - low)).tolist()) for s in generator.random((5, 2))]
-        ratios.append(float(least) / min(remounted(still, engine).value(measure) for engine in drawn))
+        found = UNDER[measure.channel](model, measure, low[None], high[None])
+        shares = generator.random((5, 2))
+        drawn = [problem.design((low + s * (high - low)).tolist()) for s in shares]
+        values = np.array([remounted(still, engine).value(measure) for engine in drawn])
+        # the linear function itself is under every design, not its least alone
+        lines = found.value + (2.0 * shares - 1.0) @ found.slopes[0] - found.rest
+        assert np.all(lines <= values * (1.0 + 1e-9))
+        ratios.append(float(found.least[0]) / values.min())
     assert max(ratios) <= 1.0 + 1e-9
     assert max(ratios) > 0.99
 
@@ -159,9 +164,20 @@ def test_joined_and_hydraulic_mounts_with_stops_are_bounded_too(name: str, asked
         shares = generator.random((4, len(low)))
         drawn = [problem.design((low + s * (high - low)).tolist()) for s in (*shares, *np.round(shares))]
         least = min(remounted(still, engine).value(measure) for engine in drawn)
-        ratios.append(float(held_loads(model, measure, low[None], high[None])[0]) / least)
+        ratios.append(float(held_loads(model, measure, low[None], high[None]).least[0]) / least)
     assert max(ratios) <= 1.0 + 1e-9
     assert np.median(ratios) > 0.95
+
+
+@pytest.mark.slow
+def test_a_limit_beside_a_stop_is_met_and_proven() -> None:
+    """The bump of the powertrain meets its stops, full torque a limit of its own: prices of both close the boxes."""
+    result = solve(load(PROBLEMS / "powertrain-load-cases.toml"))
+    assert result.certificate.kind is Proof.GLOBAL
+    bump, torque = (next(limit for limit in result.limits if name in limit.name) for name in ("bump", "full torque"))
+    for limit in (bump, torque):
+        assert limit.value == pytest.approx(limit.limit, rel=1e-5)
+        assert limit.shadow_price > 1e3
 
 
 LIMIT = '[[constraints]]\nlimit = "static travel"\nmax = "9 mm"\n[search]\nstarts = 4\n'

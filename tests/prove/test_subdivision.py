@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 from lanes import first_fast
 from laufruhe.errors import InputError
@@ -16,7 +17,8 @@ from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.box_norms import under
-from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bound, divides
+from laufruhe.prove.mounts.box_numbers import sag, sag_under
+from laufruhe.prove.mounts.subdivision import StiffnessBoxes, _Boxes, divided_bound, divides
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.mounts.search import judged_at
@@ -113,6 +115,17 @@ def test_a_small_box_is_known_to_the_square_of_its_size(tmp_path: Path) -> None:
         assert float(found.value[0]) == pytest.approx(value, abs=float(found.rest[0]))
         lacking.append(float(found.rest[0]) / value)
     assert lacking[1] < 1.1e-2 * lacking[0]
+
+
+def test_a_line_under_the_sag_touches_it_in_the_middle(tmp_path: Path) -> None:
+    problem = asked_for(tmp_path, 'minimise = "static sag"')
+    search, measure = StiffnessBoxes(problem, 0.0), problem.objective[0].measure
+    low, high = boxes(problem, 40, 5)
+    found = sag_under(search.model, measure, low, high)
+    assert found.value == pytest.approx(sag(search.model, 0.5 * (low + high)), rel=1e-12)
+    for share in np.random.default_rng(6).random((20, low.shape[1])):
+        line = found.value + found.slopes @ (2.0 * share - 1.0)
+        assert np.all(line <= sag(search.model, low + share * (high - low)) * (1.0 + 1e-12))
 
 
 LIMITS = """
@@ -279,3 +292,21 @@ def test_what_is_not_divided(tmp_path: Path) -> None:
     assert divided_bound(many, 13.1, 1e-3).boxes == 0
     assert not divides(load(PROBLEMS / "tractor-four-elastic.toml"))
     assert divided_bound(replace(many, search=replace(many.search, boxes=3)), 13.1, 1e-3).boxes >= 3
+
+
+def test_prices_of_limits_are_never_over_what_a_box_has() -> None:
+    """Against linear programs: prices bound the least of a linear function on a box under linear limits from below."""
+    generator = np.random.default_rng(4)
+    tight = []
+    for _ in range(60):
+        n, limits = int(generator.integers(1, 5)), int(generator.integers(1, 4))
+        value, slopes = generator.uniform(2.0, 6.0), generator.normal(size=n)
+        overs, by = generator.uniform(-1.5, 0.5, limits), generator.normal(size=(limits, n))
+        boxes = _Boxes(np.array([value]), slopes[None], [(overs[k : k + 1], by[k : k + 1]) for k in range(limits)])
+        found = float(boxes.least[0])
+        exact = linprog(slopes, A_ub=by, b_ub=-overs, bounds=[(-1.0, 1.0)] * n)
+        if exact.status == 2:
+            continue
+        assert found <= max(value + exact.fun, 0.0) + 1e-9
+        tight.append(found >= value + exact.fun - 1e-6)
+    assert np.mean(tight) > 0.6

@@ -16,7 +16,7 @@ from laufruhe.physics.static_cases import Stops, case_wrench, stops_of
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, counted_cases
 from laufruhe.problem.measure import Measure
-from laufruhe.prove.mounts.box_norms import counted_rows
+from laufruhe.prove.mounts.box_norms import Under, counted_rows, nothing_under
 from laufruhe.prove.mounts.box_response import BoxModel, Lines, is_travel
 from laufruhe.prove.mounts.box_series import Expansion, mapped, series
 
@@ -32,9 +32,9 @@ _AS_LOADS: Mapping[Channel, Channel] = {
 }
 
 
-def held_loads(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
-    """Least of the largest travel or force under load cases over boxes, shape (boxes,) (E60)."""
-    mounting, best = model.mounting(model.lower), np.zeros(len(lower))
+def held_loads(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Under:
+    """A linear function under the largest travel or force under load cases, for every box (E60)."""
+    mounting, best = model.mounting(model.lower), nothing_under(lower)
     found = stops_of(mounting)
     some = found.stiffness > 0.0
     # in coordinates in which the mass is one
@@ -42,11 +42,11 @@ def held_loads(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> A
     for case in counted_cases(asked, model.problem.engine):
         load = model.root @ case_wrench(mounting.block, case)
         with np.errstate(invalid="ignore", over="ignore"):
-            best = np.maximum(best, _least(model, asked, stops, load, lower, upper))
+            best = best.or_else(_of_case(model, asked, stops, load, lower, upper))
     return best
 
 
-def _least(model: BoxModel, asked: Measure, stops: Stops, load: Array, lower: Array, upper: Array) -> Array:
+def _of_case(model: BoxModel, asked: Measure, stops: Stops, load: Array, lower: Array, upper: Array) -> Under:
     """Under one load case."""
     centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
     matrices, soft = model.stiffness(centres), model.stiffness(lower)
@@ -54,10 +54,10 @@ def _least(model: BoxModel, asked: Measure, stops: Stops, load: Array, lower: Ar
     matrices, soft = (np.where(held[:, None, None], each, np.eye(6)) for each in (matrices, soft))
     middle = _balanced(matrices, stops, load)
     travel = middle @ stops.rows.T
-    signs, best = np.sign(stops.beyond(travel)), np.zeros(len(lower))
+    signs, best = np.sign(stops.beyond(travel)), nothing_under(lower)
     for _ in range(2):
-        least, reach = _with_stops(model, asked, stops, load, (centres, halves, matrices, soft, travel), signs)
-        best = np.maximum(best, np.where(held, least, 0.0))
+        found, reach = _with_stops(model, asked, stops, load, (centres, halves, matrices, soft, travel), signs)
+        best = best.or_else(found.where(held))
         # a stop that is just not met may be taken as a spring as well
         signs = np.where(np.abs(travel) + NEXT * np.nan_to_num(reach) > stops.gaps, np.sign(travel), signs)
     return best
@@ -65,7 +65,7 @@ def _least(model: BoxModel, asked: Measure, stops: Stops, load: Array, lower: Ar
 
 def _with_stops(
     model: BoxModel, asked: Measure, stops: Stops, load: Array, boxes: tuple[Array, ...], signs: Array
-) -> tuple[Array, Array]:
+) -> tuple[Under, Array]:
     """With some stops as springs, by the signs of their travel; and what travels differ by all over a box at first."""
     centres, halves, matrices, soft, met = boxes
     on = signs != 0.0
@@ -88,7 +88,7 @@ def _with_stops(
     points, bends = (part.reshape(*part.shape[:-1], -1, 3) for part in (points, answer.slopes[:, 0]))
     size = np.linalg.norm(points, axis=-1)
     along = points / np.where(size > 0.0, size, 1.0)[..., None]
-    bent = np.abs(np.einsum("bnpa,bpa->bpn", bends, along)).sum(axis=-1)
+    bent = np.einsum("bnpa,bpa->bpn", bends, along)
     # what stops that may be on either side of their gap may add
     reach = _along(corner, value[:, 0])
     if by_side is not None:
@@ -96,8 +96,10 @@ def _with_stops(
     stray = reach * np.sum(off_by * _along(corner, stops.rows), axis=1, keepdims=True) + off_by @ np.abs(ends).T
     lost = answer.rest[:, 0, None] + np.linalg.norm(stray.reshape(*size.shape, 3), axis=-1)
     # next to a free mode an expansion does not end
-    least = np.where(np.isfinite(lost), size - bent - lost, 0.0)
-    return np.asarray(np.maximum(least.max(axis=1), 0.0)), first
+    least = np.where(np.isfinite(lost), size - np.abs(bent).sum(axis=-1) - lost, -np.inf)
+    own, best = np.arange(len(size)), np.argmax(least, axis=1)
+    found = Under(size[own, best], bent[own, best], lost[own, best], answer.bends[:, 0])
+    return found.where(np.isfinite(least[own, best])), first
 
 
 def _balanced(matrices: Array, stops: Stops, load: Array) -> Array:

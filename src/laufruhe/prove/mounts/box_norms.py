@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.problem.measure import Measure
 from laufruhe.prove.mounts.box_response import BoxModel, Lines
 from laufruhe.prove.mounts.box_series import Answer, Expansion
@@ -31,6 +31,28 @@ class Under:
     rest: Array
     bends: Array
 
+    @property
+    def least(self) -> Array:
+        """Over every box."""
+        return np.asarray(self.value - self.rest - np.abs(self.slopes).sum(axis=-1))
+
+    def where(self, known: Mask) -> Under:
+        """Of some boxes; of the others nothing is known, and a length is not under zero."""
+        one, many = known, known[:, None]
+        parts = zip((self.value, self.slopes, self.rest, self.bends), (one, many, one, many), strict=True)
+        return Under(*(np.where(which, part, 0.0) for part, which in parts))
+
+    def or_else(self, other: Under) -> Under:
+        """Of every box that which has the larger least."""
+        better = self.least >= other.least
+        mine, its = self.where(better), other.where(~better)
+        return Under(mine.value + its.value, mine.slopes + its.slopes, mine.rest + its.rest, mine.bends + its.bends)
+
+
+def nothing_under(lower: Array) -> Under:
+    """Where nothing is known of a length."""
+    return Under(np.zeros(len(lower)), np.zeros_like(lower), np.zeros(len(lower)), np.zeros_like(lower))
+
 
 def under(model: BoxModel, quantity: Measure, lines: Lines, at: Expansion) -> Under:
     """A linear function under a norm of forces or travel, for every box (E38)."""
@@ -42,8 +64,7 @@ def under(model: BoxModel, quantity: Measure, lines: Lines, at: Expansion) -> Un
     points = [p for p in model.counted(quantity.points) if np.any(lines.points == p)]
     found = [_sampled(model, quantity, answer, lines, p) for p in points]
     if not found:
-        nothing = np.zeros(len(at.centres))
-        return Under(nothing, np.zeros_like(at.centres), nothing, np.zeros_like(at.centres))
+        return nothing_under(at.centres)
     if not quantity.norm.sums_lengths:
         best = np.argmax([each.value for each in found], axis=0)
         pick = np.arange(len(best))

@@ -15,6 +15,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.prove.mounts.box_cases import held_loads
+from laufruhe.prove.mounts.box_norms import Under
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.prove.mounts.box_shares import most_shares, shortfall
 from laufruhe.prove.mounts.ranges import SLACK
@@ -27,6 +28,16 @@ def sag(model: BoxModel, x: Array) -> Array:
     held = np.linalg.eigvalsh(matrices)[:, 0] > 0.0
     settled = np.linalg.solve(np.where(held[:, None, None], matrices, np.eye(6)), pull)
     return np.where(held, settled @ pull / -weight[2], math.inf)
+
+
+def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> Under:
+    """Convex in x, so that its tangent at the middle is under it where no mode of the softest corner is free (E9)."""
+    weight, halves = weight_wrench(model.mounting(model.lower).block), 0.5 * (upper - lower)
+    matrices, pull = model.stiffness(0.5 * (lower + upper)), model.root @ weight
+    held = np.linalg.eigvalsh(model.stiffness(lower))[:, 0] > 0.0
+    y = np.linalg.solve(np.where(held[:, None, None], matrices, np.eye(6)), pull)
+    slopes = halves * np.einsum("bi,nij,bj->bn", y, model.stiffness_slopes, y) / weight[2]
+    return Under(y @ pull / -weight[2], slopes, np.zeros(len(lower)), np.abs(slopes)).where(held)
 
 
 def axis_residual(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
@@ -65,8 +76,8 @@ RANGES: Mapping[Channel, Ranges] = {
     channels.TORQUE_ROLL: lambda *at: (axis_residual(*at), math.inf),
     channels.RAW_TORQUE_ROLL: lambda *at: (axis_residual(*at), math.inf),
     channels.DECOUPLING: lambda *at: (-math.inf, most_shares(*at).min(axis=0)),
-    channels.STATIC_TRAVEL: lambda *at: (held_loads(*at), math.inf),
-    channels.STATIC_FORCE: lambda *at: (held_loads(*at), math.inf),
+    channels.STATIC_TRAVEL: lambda *at: (held_loads(*at).least, math.inf),
+    channels.STATIC_FORCE: lambda *at: (held_loads(*at).least, math.inf),
     channels.DECOUPLING_SHORTFALL: lambda *at: (shortfall(*at), math.inf),
     channels.FREQUENCIES: lambda model, _, lower, upper: (
         _frequencies(model, lower)[:, -1], _frequencies(model, upper)[:, 0]
@@ -74,6 +85,12 @@ RANGES: Mapping[Channel, Ranges] = {
 }  # fmt: skip
 """Of a number of the mounts on boxes, what it is not under and what it is not over: more stiffness lowers sag
 and raises every frequency (E39). Of several numbers the last is not under the one, the first not over the other."""
+UNDER: Mapping[Channel, Callable[[BoxModel, Measure, Array, Array], Under]] = {
+    channels.SAG: sag_under,
+    channels.STATIC_TRAVEL: held_loads,
+    channels.STATIC_FORCE: held_loads,
+}
+"""Linear functions nowhere over a number of the mounts, whose limits so have prices on a box (E38)."""
 
 
 def breaks(model: BoxModel, limit: Limit, lower: Array, upper: Array) -> Mask:

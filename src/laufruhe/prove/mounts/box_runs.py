@@ -87,7 +87,7 @@ class RunBoxes:
         felt, d = self._rows[measure]
         maps = mapped(felt, of.above, of.halves, of.turn, of.roots)
         found = [_Look(of, run, maps, d).under() for run in self._runs]
-        bounds = [np.nan_to_num(_least(each), nan=-np.inf) for each in found]
+        bounds = [np.nan_to_num(each.least, nan=-np.inf) for each in found]
         best, pick = np.argmax(bounds, axis=0), np.arange(of.count)
         parts = ("value", "slopes", "rest", "bends")
         return Under(*(np.array([getattr(each, part) for each in found])[best, pick] for part in parts))
@@ -127,10 +127,6 @@ def _tops(squares: Array) -> Array:
     inside = np.abs(lean) < -2.0 * bend
     tops = middle - np.where(inside, lean**2 / (8.0 * np.where(inside, bend, -1.0)), 0.0)
     return np.concatenate([tops, squares[..., -1:]], axis=-1)
-
-
-def _least(under: Under) -> Array:
-    return np.asarray(under.value - under.rest - np.abs(under.slopes).sum(axis=-1))
 
 
 class _Look:

@@ -23,7 +23,7 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import NEARLY, Divided, divided_on
 from laufruhe.prove.mounts.box_norms import Under, root_under, under
-from laufruhe.prove.mounts.box_numbers import RANGES, breaks
+from laufruhe.prove.mounts.box_numbers import RANGES, UNDER, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, Lines
 from laufruhe.prove.mounts.box_runs import run_boxes
 from laufruhe.prove.mounts.ranges import SLACK
@@ -35,6 +35,8 @@ MOST_BOXES = 60_000
 # numbers held at once
 HELD = 3e6
 HALVINGS = 45
+# times that prices of several limits are sought in turn
+ROUNDS = 2
 # numbers of a motion in time that cost as much as one of an order
 RUN_SHARE = 18
 # of the gap that counts as proven, what small orders may take of it
@@ -107,6 +109,8 @@ class StiffnessBoxes:
             for limit in problem.limits
             if limit.measure.on_mounts
         ]
+        numbers = [limit for limit in problem.mount_limits if math.isfinite(limit.maximum)]
+        self._priced = [limit for limit in numbers if limit.measure.channel in UNDER]
         self.runs = run_boxes(self.model)
 
     @property
@@ -154,6 +158,9 @@ class StiffnessBoxes:
         for maximum, quantity, lines, left_out in self._limits:
             least = under(self.model, quantity, lines, self.model.expanded(lines, lower, upper))
             boxes.hold(least, left_out, maximum)
+        for limit in self._priced:
+            least = UNDER[limit.measure.channel](self.model, limit.measure, lower, upper)
+            boxes.hold(least, 0.0, limit.maximum * (1.0 + SLACK))
         numbers, pulled = self._numbers(lower, upper)
         broken = self._breaks(lower, upper)
         found = self.constant + numbers + boxes.least
@@ -196,6 +203,8 @@ class StiffnessBoxes:
         """Boxes on which a limit of a number of the mounts is broken everywhere."""
         out = np.zeros(len(lower), dtype=bool)
         for limit in self.problem.mount_limits:
+            if limit in self._priced:
+                continue
             if _is_ratio(limit.measure):
                 out |= self._ratio(limit.measure, lower, upper)[0] > limit.maximum * (1.0 + SLACK)
             else:
@@ -312,16 +321,21 @@ class _Boxes:
 
     @property
     def least(self) -> Array:
-        """Least objective where each limit by itself is kept; infinite where one is not.
+        """Least objective where limits are kept; infinite where one is not.
 
-        By a price of the limit at which a side of the box changes its end (P4): the least over the box is linear in the
-        price between these.
+        By prices of the limits (P4), of one after the other, each at which a side of the box changes its end: the least
+        over the box is linear in a price between these.
         """
-        found = self.value - np.abs(self.slopes).sum(axis=1)
-        for over, slopes in self.limits:
-            price = np.where(self.slopes * slopes < 0.0, -self.slopes / np.where(slopes != 0.0, slopes, 1.0), 0.0)
-            leaning = np.abs(self.slopes[:, None] + price[:, :, None] * slopes[:, None]).sum(axis=2)
-            held = self.value[:, None] + price * over[:, None] - leaning
-            found = np.maximum(found, held.max(axis=1))
-            found = np.where(over > np.abs(slopes).sum(axis=1), np.inf, found)
+        value, slopes = self.value, self.slopes
+        found, broken = value - np.abs(slopes).sum(axis=1), np.zeros(len(value), dtype=bool)
+        for over, by in self.limits * (ROUNDS if len(self.limits) > 1 else 1):
+            broken |= over > np.abs(by).sum(axis=1)
+            prices = np.where(slopes * by < 0.0, -slopes / np.where(by != 0.0, by, 1.0), 0.0)
+            leaning = np.abs(slopes[:, None] + prices[:, :, None] * by[:, None]).sum(axis=2)
+            held = value[:, None] + prices * over[:, None] - leaning
+            best = held.argmax(axis=1)[:, None]
+            gain = np.take_along_axis(held, best, axis=1)[:, 0]
+            price = np.where(gain > found, np.take_along_axis(prices, best, axis=1)[:, 0], 0.0)
+            value, slopes, found = value + price * over, slopes + price[:, None] * by, np.maximum(found, gain)
+        found = np.where(broken, np.inf, found)
         return np.asarray(np.maximum(found, 0.0))

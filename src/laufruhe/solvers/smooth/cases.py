@@ -19,7 +19,7 @@ from laufruhe.problem.measure import Measure
 from laufruhe.solvers.smooth.gathered import Gathered
 
 # of a gap, over which a stop sets in: under it all along, so that a design does not stand better than it is
-SOFT = 1e-3
+SOFT = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
