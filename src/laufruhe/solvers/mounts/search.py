@@ -29,7 +29,7 @@ from laufruhe.solvers.smooth.program import SmoothProgram
 SLACK = 1e-5
 # share by which two designs are worth the same
 SAME = 1e-6
-MOST_MARGINS = 3
+MOST_MARGINS = 6
 # excess over a limit that is more than a peak between the samples
 NEAR = 0.05
 ITERATIONS = 100
