@@ -14,6 +14,20 @@ except ImportError:
     fcntl = None  # type: ignore[assignment]
 
 
+_KEPT: set[int] = set()
+"""Handles of folders that this process keeps."""
+
+
+def _let_go() -> None:
+    """A copy of a process keeps nothing: it may live a little longer, and the folder is free when its own is done."""
+    while _KEPT:
+        os.close(_KEPT.pop())
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_let_go)
+
+
 @contextmanager
 def held(folder: Path, wait: bool = True) -> Iterator[bool | None]:
     """Keep a folder to this process; False where another has it, which is not waited for, None where nothing tells."""
@@ -21,10 +35,13 @@ def held(folder: Path, wait: bool = True) -> Iterator[bool | None]:
         yield None
         return
     handle = os.open(folder, os.O_RDONLY)
+    _KEPT.add(handle)
     try:
         yield _locked(handle, wait)
     finally:
-        os.close(handle)
+        if handle in _KEPT:
+            _KEPT.discard(handle)
+            os.close(handle)
 
 
 def _locked(handle: int, wait: bool) -> bool | None:
