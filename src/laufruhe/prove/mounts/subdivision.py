@@ -203,8 +203,6 @@ class StiffnessBoxes:
         """Boxes on which a limit of a number of the mounts is broken everywhere."""
         out = np.zeros(len(lower), dtype=bool)
         for limit in self.problem.mount_limits:
-            if limit in self._priced:
-                continue
             if _is_ratio(limit.measure):
                 out |= self._ratio(limit.measure, lower, upper)[0] > limit.maximum * (1.0 + SLACK)
             else:
