@@ -238,7 +238,12 @@ def _lengths(squares: Array, tops: NDArray[np.intp], between: bool) -> Array:
     middle = squares[tops, places]
     if between:
         before, after = (squares[np.clip(tops + k, 0, len(squares) - 1), places] for k in (-1, 1))
-        bend, lean = before - 2.0 * middle + after, after - before
-        inside = np.abs(lean) < -2.0 * bend
-        middle = middle - np.where(inside, lean**2 / (8.0 * np.where(inside, bend, -1.0)), 0.0)
+        middle = parabola_tops(before, middle, after)
     return np.sqrt(np.maximum(middle, 0.0)).reshape(-1)
+
+
+def parabola_tops(before: Array, middle: Array, after: Array) -> Array:
+    """Top of the parabola through three values at equal steps, the middle one where it does not stand between them."""
+    bend, lean = before - 2.0 * middle + after, after - before
+    inside = np.abs(lean) < -2.0 * bend
+    return np.asarray(middle - np.where(inside, lean**2 / (8.0 * np.where(inside, bend, -1.0)), 0.0))

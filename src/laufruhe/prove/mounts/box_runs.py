@@ -10,7 +10,7 @@ import numpy as np
 
 from laufruhe.load_models.run_look import run_measures
 from laufruhe.load_models.run_moments import RunMoments
-from laufruhe.load_models.run_peaks import RunPeaks
+from laufruhe.load_models.run_peaks import RunPeaks, parabola_tops
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.physics.stopped_run import QUICKEST, quickest
 from laufruhe.physics.time_model import time_model
@@ -122,10 +122,7 @@ def _stays_off_stops(problem: Problem, peaks: RunPeaks) -> bool:
 
 def _tops(squares: Array) -> Array:
     """Of every time but the first: the top of the parabola through three, where that stands between them."""
-    before, middle, after = squares[..., :-2], squares[..., 1:-1], squares[..., 2:]
-    bend, lean = before - 2.0 * middle + after, after - before
-    inside = np.abs(lean) < -2.0 * bend
-    tops = middle - np.where(inside, lean**2 / (8.0 * np.where(inside, bend, -1.0)), 0.0)
+    tops = parabola_tops(squares[..., :-2], squares[..., 1:-1], squares[..., 2:])
     return np.concatenate([tops, squares[..., -1:]], axis=-1)
 
 
