@@ -48,7 +48,8 @@ sweep = [{{ quantity = "engine.rod_ratio", from = 0.2, to = 0.3, points = {point
 cases = [{{ name = "single", problem = "single.toml" }}]
 """
 LAUFRUHE = (sys.executable, "-c", "from laufruhe.cli import main; main()")
-EACH = ("--nthreads", "1", "--no-dashboard", "--death-timeout", "60")
+QUIET = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")  # the usual port may be taken, by another test too
+EACH = ("--nthreads", "1", *QUIET, "--death-timeout", "60")
 _SOURCE = str(Path(laufruhe.__file__).parents[1])
 _THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 TIMED = "## Where the time went"
@@ -91,7 +92,7 @@ class Cluster:
             with socket.socket() as one:
                 one.bind(("127.0.0.1", 0))
                 self.port = one.getsockname()[1]
-        self.scheduler = self._process("scheduler", "--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard")
+        self.scheduler = self._process("scheduler", "--host", "127.0.0.1", "--port", str(self.port), *QUIET)
         for _ in range(count):
             self.add()
 
