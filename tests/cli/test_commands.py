@@ -22,7 +22,7 @@ from problem_files import PROBLEMS, written
 
 PAGES = {".laufruhe.json", "result.json", "report.md", "report.html"}
 TABLES = {"tables.xlsx", "forces.csv", "orders.csv", "measures.csv"}
-DECIDED = {"decisions.csv", "limits.csv", "table-weights.csv"}
+DECIDED = {"decisions.csv", "limits.csv", "weights.csv"}
 ALL_FILES = PAGES | TABLES | DECIDED
 ALL_FILES |= {f"{name}.png" for name in ("engine", "polar", "cycle", "bars", "spectrum")}
 

@@ -13,6 +13,7 @@ import laufruhe
 from cli import scenes
 from laufruhe.cli import app
 from laufruhe.numerics.workers import HERE, working_on
+from laufruhe.report.screen import PIPE_WIDTH
 from problem_files import PROBLEMS, written
 
 RUN = CliRunner()
@@ -49,6 +50,10 @@ def test_trade_measures_every_fidelity(tmp_path: Path) -> None:
     answer = RUN.invoke(app, ["trade", str(path), "--out", str(out), "--json", str(tmp_path / "trade.json")])
     assert answer.exit_code == 0, answer.output
     assert {p.name for p in out.iterdir()} == {".laufruhe.json", "scene.html", "scene.md", "scene.png"}
+    # tables as every command draws them, not as Markdown has them
+    assert "|" not in answer.output
+    assert "auto 0.001 " in answer.output
+    assert max(map(len, answer.output.splitlines())) <= PIPE_WIDTH
     (data,) = json.loads((tmp_path / "trade.json").read_text(encoding="utf-8"))
     assert len(data["rows"]) >= 10
     for row in data["rows"]:
@@ -70,6 +75,7 @@ def test_trade_of_several_tells_each_by_its_name(tmp_path: Path) -> None:
         words = ["trade", *map(str, paths), "--out", str(tmp_path / "trade"), "--json", str(out)]
         answer = RUN.invoke(app, words)
     assert answer.exit_code == 0, answer.output
+    assert "|" not in answer.output
     told = json.loads(out.read_text(encoding="utf-8"))
     assert [one["problem"] for one in told] == ["given", "open"]
     assert [one["reference"]["optimum"] is None for one in told] == [True, False]

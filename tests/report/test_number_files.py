@@ -6,6 +6,7 @@ import csv
 import gc
 import math
 from dataclasses import replace
+from inspect import getsource
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from cli import scenes
 from laufruhe.files.reader import load
 from laufruhe.physics.torque import torque_parts
 from laufruhe.physics.torsion import chain_of, shaft_torque
-from laufruhe.present.pictures import CURVES, PRINTED, PRINTED_SHEETS, SHEETS
+from laufruhe.present.pictures import CURVES, PRINTED, SHEETS
 from laufruhe.problem.evaluation import measured
 from laufruhe.report import curves, tables
 from laufruhe.report.sections import SECTIONS
@@ -27,6 +28,9 @@ from laufruhe.report.workbook import write_book
 from laufruhe.solvers import Result, state
 from problem_files import PROBLEMS, loaded
 from ready import solved
+
+WHOLE = {"stars", "decisions", "limits", "mounts", "modes", "orders"}
+"""Sections whose numbers are files in full precision."""
 
 
 def write_tables(result: Result, folder: Path) -> None:
@@ -138,20 +142,34 @@ def test_a_name_that_looks_like_a_formula_stays_text(tmp_path: Path) -> None:
     assert [cell.value for cell in openpyxl.load_workbook(tmp_path / "dash.xlsx")["one"][2]] == ["-", "-26.8 %"]
 
 
+@pytest.mark.parametrize("text", ["<r>a & b</r>", "<r><t>bold</t></r>", "<r></r>", " <r>", "<r>", "</r>"])
+def test_a_text_that_looks_like_marks_of_formatting_is_a_text(text: str, tmp_path: Path) -> None:
+    write_book({"one": Sheet([text, "b"], [[text, 1.0], [1.0, text]])}, tmp_path / "marks.xlsx")
+    cells = list(openpyxl.load_workbook(tmp_path / "marks.xlsx")["one"].iter_rows(values_only=True))
+    assert cells == [(text, "b"), (text, 1.0), (1.0, text)]
+
+
 def test_names_are_known_before_anything_is_made(result: Result) -> None:
-    assert set(sheets_of(result)) <= {*SHEETS, *CURVES, *PRINTED_SHEETS}
-    known = {section.__name__.rpartition(".")[2] for section in SECTIONS}
+    assert set(sheets_of(result)) <= {*SHEETS, *CURVES, *PRINTED}
+    assert len({*SHEETS, *CURVES, *PRINTED}) == len(SHEETS) + len(CURVES) + len(PRINTED)
     # every section of a report is a file: in full precision, or as it is printed
-    assert known - set(PRINTED) == {"stars", "decisions", "limits", "mounts", "modes", "orders"}
-    assert set(PRINTED) <= known
+    named = {section.__name__.rpartition(".")[2]: getsource(section).count('sheet="') for section in SECTIONS}
+    assert {name for name, count in named.items() if not count} == WHOLE
+
+
+def test_a_file_is_named_after_the_table_that_it_holds() -> None:
+    found = sheets_of(solved("tractor-single"))
+    assert found["weights"].head[0] == "weight"
+    assert found["balance-factors"].head[0] == "throw of"
 
 
 @pytest.mark.slow
 def test_what_only_the_report_knows_is_a_file_too() -> None:
     result = state(load(PROBLEMS / "inline-five-torsion.toml"))
     found = sheets_of(result)
-    assert {"table-torque", "table-torsion", "table-torsion-2"} <= set(found) <= {*SHEETS, *CURVES, *PRINTED_SHEETS}
-    assert any(isinstance(cell, float) for row in found["table-torque"].rows for cell in row)
+    printed = {"crankshaft-torque", "crankshaft-modes", "strongest-critical-speeds-as-given"}
+    assert printed <= set(found) <= {*SHEETS, *CURVES, *PRINTED}
+    assert any(isinstance(cell, float) for row in found["crankshaft-torque"].rows for cell in row)
     assert set(curves.CURVES) == set(CURVES)
     # at every speed of the curve the torque is that of the operating point, were it there
     sheet = found["twist-response"]
@@ -165,7 +183,7 @@ def test_what_only_the_report_knows_is_a_file_too() -> None:
     modes = found["twist-modes"].rows
     assert len(modes) == len(chain.discs) * len({row[1] for row in modes})
     assert max(abs(row[4]) for row in modes) == pytest.approx(1.0)
-    assert len(found["critical-speeds"].rows) > len(found["table-torsion-2"].rows)
+    assert len(found["critical-speeds"].rows) > len(found["strongest-critical-speeds-as-given"].rows)
     work = np.array([row[found["torque"].head.index("as given: work stored [J]")] for row in found["torque"].rows])
     whole = np.array([row[found["torque"].head.index("as given: torque of all [N m]")] for row in found["torque"].rows])
     # the work is what the torque does beyond its mean

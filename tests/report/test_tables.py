@@ -11,9 +11,10 @@ import pytest
 
 import laufruhe
 from cli import scenes
-from laufruhe.report.grid import escaped
+from laufruhe.report.document import Bullets, Document, Paragraph
+from laufruhe.report.grid import Grid, escaped, unmarked
 from laufruhe.report.result_report import result_document
-from laufruhe.report.screen import show
+from laufruhe.report.screen import show, show_document
 from laufruhe.report.sections import tables_of
 from laufruhe.report.wording import explained, headline, why_star
 from laufruhe.solvers import Result
@@ -136,3 +137,45 @@ def test_weights_are_in_grams_and_throws_have_their_balance_factor() -> None:
     assert [tuple(row) for row in plain["Balance factors"].rows] == [("cylinder 1", "0.0 %", "50.0 %")]
     tight = {grid.title: grid for grid in tables_of(scenes.solved(scenes.TIGHT))}
     assert re.fullmatch(r"[\d.]+ kg m = [\d.]+ g mm", tight["Decisions"].rows[0][2])
+
+
+WIDE = Grid(
+    "Wide",
+    ("place of the mount", "first number", *(f"number {k} of many" for k in range(9)), "why"),
+    [("front left", "0.01230", *(f"{k}234.5678" for k in range(9)), "there is no gas")],
+    left=(0, 11),
+)
+
+
+def document_on(width: int, *blocks: Bullets | Grid | Paragraph) -> list[str]:
+    """Lines of a document on a screen of some width."""
+    stream = io.StringIO()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("laufruhe.report.screen.PIPE_WIDTH", width)
+        show_document(Document("Title", blocks), stream, Path("out"))
+    return stream.getvalue().splitlines()
+
+
+@pytest.mark.parametrize("width", [24, 40, 80, 110, 400])
+def test_no_number_of_a_table_is_broken_by_a_narrow_screen(width: int) -> None:
+    lines = document_on(width, WIDE)
+    assert max(map(len, lines)) <= width
+    words = " ".join(lines).split()
+    for cell in WIDE.rows[0][1:-1]:
+        assert words.count(cell) == 1, cell
+    # what does not fit stands in a further table, whose rows are named again
+    assert words.count("front") == words.count("place")
+    assert (words.count("front") == 1) == (width == 400)
+
+
+def test_a_marked_table_has_no_marks_on_the_screen() -> None:
+    blocks = (
+        Paragraph("**Take** `auto` of *this*", marked=True),
+        Paragraph("a * b * c"),
+        Bullets("lead", ["`auto` is safe"], marked=True),
+        Grid("", ("problem", "take"), [("[single](single.md)", "`two-order`")], left=2, marked=True),
+    )
+    text = "\n".join(document_on(80, *blocks))
+    for told in ("Take auto of this\n", "a * b * c\n", "- auto is safe", "single    two-order"):
+        assert told in text
+    assert unmarked(escaped("a_b [c](d) *e* `f`")) == "a_b [c](d) *e* `f`"

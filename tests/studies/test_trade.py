@@ -49,7 +49,7 @@ def test_a_design_beyond_a_limit_is_no_decision() -> None:
     page = str(trade_document(_trade(quick, sound), None, "trade"))
     assert "12 % beyond a limit" in page
     assert "-2.0e-01" not in page
-    assert "no fidelity decides as well" in index([_trade(quick)])
+    assert "no fidelity decides as well" in index([_trade(quick)]).as_markdown("")
 
 
 @pytest.mark.slow
@@ -97,8 +97,9 @@ def test_limits_of_a_run_up_are_decided_by_from_a_good_start_too() -> None:
 @pytest.mark.slow
 def test_an_index_lists_what_nothing_is_traded_for(tmp_path: Path) -> None:
     paths = [PROBLEMS / f"{name}.toml" for name in ("waterworks-steam-pump", "boxer-four")]
-    text, _ = traded(paths, tmp_path / "trade", lambda _: None)
-    lines = text.splitlines()
+    found, _ = traded(paths, tmp_path / "trade", lambda _: None)
+    lines = found.as_markdown("").splitlines()
+    assert (tmp_path / "trade/README.md").read_text(encoding="utf-8") == found.as_markdown("")
     pump, boxer = (next(line for line in lines if path.stem in line) for path in paths)
     assert "nothing is open" in boxer
     assert "the flywheel is open" in pump

@@ -272,9 +272,13 @@ def trade(
     """
     with exit_statuses(problems[0]), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler):
         from laufruhe.cli.fidelity import traded
+        from laufruhe.report.screen import show_document
 
-        with handing_out(json, *problems) as hand_out, progress() as say:
-            hand_out(*traded(problems, out or Path("results") / "trade", say))
+        folder = out or Path("results") / "trade"
+        with handing_out(json, *problems) as hand_out:
+            with progress() as say:
+                document, data = traded(problems, folder, say)
+            hand_out(lambda stream: show_document(document, stream, folder), data)
 
 
 def _show_version(wanted: bool) -> None:

@@ -23,6 +23,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report import explain, files
 from laufruhe.report import trade as report
+from laufruhe.report.document import Document
 from laufruhe.report.web_page import as_html
 from laufruhe.studies.trade import Trade, effort, seconds, trade, traded_part
 
@@ -61,8 +62,8 @@ def _mount_times(problem: Problem, choice: Choice) -> tuple[float, float]:
     return times[0], times[1]
 
 
-def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[str, Callable[[], str]]:
-    """Pages and pictures of every problem, an index of them all; returns the index, and what makes JSON."""
+def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[Document, Callable[[], str]]:
+    """Pages and pictures of every problem, an index of several; what is to be shown of them, and what makes JSON."""
     read = [(path, _with_objective(path)) for path in paths]
     of_wheels = [(path, problem.name) for path, problem in read if problem.flywheel_decisions]
     if len(of_wheels) == len(read):
@@ -80,11 +81,12 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
         what = f"{len(found)} of {len(problems)} problems are measured, with pages in {folder}"
         raise SolverError(f"the time limit is over: {what}; raise it")
     trades = [found[k] for k in range(len(problems))]
+    if len(read) == 1:
+        return _page(paths[0], trades[0]), lambda: _together(trades)
     index = report.index(trades, [name for _, name in of_wheels])
-    if len(read) > 1:
-        with files.staged(files.Set(folder, "--out", "trade", ["README.md"], adds=True)) as stage:
-            files.write(stage / "README.md", index)
-    return index + f"Results: {folder}\n", lambda: _together(trades)
+    with files.staged(files.Set(folder, "--out", "trade", ["README.md"], adds=True)) as stage:
+        files.write(stage / "README.md", index.as_markdown(""))
+    return index, lambda: _together(trades)
 
 
 def _together(trades: Sequence[Trade]) -> str:
@@ -135,9 +137,14 @@ def _pages(path: Path, one: Trade) -> Pages:
     if has_picture(one):
         drawn = figure(one)
         pages[f"{name}.png"], pictures[name] = as_png(drawn), as_svg(drawn)
-    document = report.trade_document(one, next(iter(pictures), None), shlex.join(["laufruhe", "trade", str(path)]))
+    document = _page(path, one, next(iter(pictures), None))
     texts = {"md": document.as_markdown(".png"), "html": as_html(document, pictures)}
     return pages | {f"{name}.{end}": text.encode() for end, text in texts.items()}
+
+
+def _page(path: Path, one: Trade, picture: str | None = None) -> Document:
+    """The page of a problem; a picture by its name."""
+    return report.trade_document(one, picture, shlex.join(["laufruhe", "trade", str(path)]))
 
 
 def _with_objective(path: Path) -> Problem:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
+from typing import TextIO, TypeAlias
 
 import typer
 
@@ -22,18 +23,25 @@ _loudness: ContextVar[int] = ContextVar("loudness", default=PLAIN)
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
+Shown: TypeAlias = str | Callable[[TextIO], None]
+"""What a command shows: a text, or what writes one to a screen."""
+
 
 @contextmanager
-def handing_out(json: str | None, *problems: Path) -> Iterator[Callable[[str, Callable[[], str]], None]]:
+def handing_out(json: str | None, *problems: Path) -> Iterator[Callable[[Shown, Callable[[], str]], None]]:
     """Text on the screen, data made where they were asked for; whether that can be written is found out on entry."""
     from laufruhe.report import files
 
     with ExitStack() as places:
         place = json_file(json, problems, places)
 
-        def hand_out(text: str, data: Callable[[], str]) -> None:
+        def hand_out(shown: Shown, data: Callable[[], str]) -> None:
             if not is_quiet():
-                typer.echo(text, nl=False, err=json == "-")
+                stream = sys.stderr if json == "-" else sys.stdout
+                if isinstance(shown, str):
+                    stream.write(shown)
+                else:
+                    shown(stream)
             if json == "-":
                 typer.echo(data(), nl=False)
             elif place is not None:

@@ -34,17 +34,12 @@ CURVES = (
     "willans", "bearings-on-crank", "wear", "turning-parts", "mount-critical-speeds",
 )  # fmt: skip
 """Further ones, which `report.curves` fills."""
-PRINTED = ("weights", "reach", "assembly", "ranks", "robust", "torque", "torsion", "load_cases", "run_up")
-"""Sections of the report whose tables are files as they are printed, and how many each may have."""
-MOST_PRINTED = 8
-
-
-def printed_sheet(name: str, k: int) -> str:
-    """Name of the file of the k-th table of a section."""
-    return f"table-{name.replace('_', '-')}{f'-{k}' if k > 1 else ''}"
-
-
-PRINTED_SHEETS = tuple(printed_sheet(name, k) for name in PRINTED for k in range(1, MOST_PRINTED + 1))
+PRINTED = (
+    "reach", "assembly", "objectives-in-order", "equal-optima", "weights", "balance-factors", "under-tolerance",
+    "tolerances", "crankshaft-torque", "crankshaft-modes", "strongest-critical-speeds-as-given",
+    "strongest-critical-speeds-as-decided", "barred-speeds", "load-cases", "through-resonance",
+)  # fmt: skip
+"""Tables of the report that are files as they are printed."""
 
 
 def rows_of(count: int, most: int) -> tuple[list[range], int]:

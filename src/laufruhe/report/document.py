@@ -37,14 +37,16 @@ class Paragraph:
 
 @dataclass(frozen=True)
 class Bullets:
-    """A list, and the words that lead it."""
+    """A list, and the words that lead it; `marked` as of a paragraph."""
 
     lead: str
     items: Sequence[str]
+    marked: bool = False
 
     def as_markdown(self) -> str:
         """A line each."""
-        return f"{self.lead}\n\n" + "\n".join(f"- {escaped(text)}" for text in self.items)
+        shown = str if self.marked else escaped
+        return f"{self.lead}\n\n" + "\n".join(f"- {shown(text)}" for text in self.items)
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from typing import Any
 
 from laufruhe.errors import InputError, refused
 from laufruhe.numerics.locks import held
-from laufruhe.present.pictures import CURVES, PICTURES, PRINTED_SHEETS, SHEETS
+from laufruhe.present.pictures import CURVES, PICTURES, PRINTED, SHEETS
 
 RESULT = "result.json"
 REPORT = "report.md"
@@ -27,7 +27,7 @@ KINDS = ("png", "svg")
 RESULT_FILES = (
     RESULT, REPORT, PAGE, BOOK, MOTION,
     *(f"{name}.{kind}" for name in PICTURES for kind in KINDS),
-    *(f"{name}.csv" for name in (*SHEETS, *CURVES, *PRINTED_SHEETS)),
+    *(f"{name}.csv" for name in (*SHEETS, *CURVES, *PRINTED)),
 )  # fmt: skip
 MADE = ".laufruhe.json"
 """What stands in a folder of results beside them: the command that made them, and their names."""

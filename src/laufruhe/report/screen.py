@@ -1,30 +1,32 @@
-"""The tables on the screen."""
+"""Tables and documents on the screen, as wide as that is."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TextIO
+from typing import Literal, TextIO
 
 from rich import box
+from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from laufruhe.report.grid import Grid
+from laufruhe.report.document import Bullets, Document, Heading, Paragraph
+from laufruhe.report.grid import Grid, unmarked
 from laufruhe.report.sections import tables_of
 from laufruhe.report.wording import explained, fidelity_of, headline, told
 from laufruhe.solvers.result import Result, Status
 
 PIPE_WIDTH = 110
+BETWEEN = 3
+"""Blanks between two columns."""
 _COLOURS = {Status.OPTIMAL: "green", Status.FEASIBLE: "green", Status.INFEASIBLE: "red", Status.FAILED: "red"}
 
 
 def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
     """Print a result, and where its files are."""
-    # titles and names are the user's: what looks like markup in them is text
-    console = Console(file=stream, markup=False, emoji=False, highlight=False)
-    if not console.is_terminal:
-        console.width = PIPE_WIDTH
+    console = _console(stream)
     console.print(Text(result.problem.title, style="bold"))
     console.print(Text(headline(result), style=_COLOURS[result.status]))
     if result.certificate is not None:
@@ -32,21 +34,100 @@ def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
     for sentence in told(result):
         console.print(Text(sentence))
     for grid in tables_of(result):
-        console.print()
-        console.print(Text(grid.title, style="bold"))
-        console.print(_table(grid))
-        if grid.note:
-            console.print(Text(grid.note, style="dim"))
+        _print_grid(console, grid)
     console.print()
     console.print(Text(fidelity_of(result), style="dim"))
     if folder is not None:
-        console.print(Text(f"Results: {folder}", overflow="fold"))
+        _print_place(console, folder)
 
 
-def _table(grid: Grid) -> Table:
+def show_document(document: Document, stream: TextIO, folder: Path) -> None:
+    """Print words and tables of a page, and where its files are; pictures and lines to type stand there."""
+    console = _console(stream)
+    console.print(Text(document.title, style="bold"))
+    for block in document.blocks:
+        match block:
+            case Heading(text):
+                console.print()
+                console.print(Text(text, style="bold"))
+            case Paragraph(text, marked):
+                console.print(Text(unmarked(text) if marked else text))
+            case Bullets(lead, items, marked):
+                console.print(Text(lead))
+                for item in items:
+                    _print_item(console, unmarked(item) if marked else item)
+            case Grid():
+                _print_grid(console, block)
+                console.print()
+    _print_place(console, folder)
+
+
+def _console(stream: TextIO) -> Console:
+    """Titles and names are the user's: what looks like markup in them is text."""
+    console = Console(file=stream, markup=False, emoji=False, highlight=False)
+    if not console.is_terminal:
+        console.width = PIPE_WIDTH
+    return console
+
+
+def _print_place(console: Console, folder: Path) -> None:
+    console.print(Text(f"Results: {folder}", overflow="fold"))
+
+
+def _print_item(console: Console, text: str) -> None:
+    """An entry of a list, its lines below each other."""
+    item = Table.grid(padding=(0, 1))
+    item.add_row("-", Text(text))
+    console.print(item)
+
+
+def _print_grid(console: Console, grid: Grid) -> None:
+    console.print()
+    if grid.title:
+        console.print(Text(grid.title, style="bold"))
+    for k, columns in enumerate(_parts(grid.plain(), console.width)):
+        if k:
+            console.print()
+        console.print(_table(grid.plain(), columns, console.width))
+    if grid.note:
+        console.print(Text(grid.note, style="dim"))
+
+
+def _parts(grid: Grid, width: int) -> Iterator[Sequence[int]]:
+    """Columns of tables that are no wider than the screen: each begins with the leading columns of text."""
+    least = [least for least, _ in _widths(grid)]
+    lead = next(k for k in range(len(grid.head) + 1) if k not in grid.texts or k == len(grid.head) - 1)
+    columns = list(range(lead))
+    for k in range(lead, len(grid.head)):
+        if len(columns) > lead and sum(least[j] + BETWEEN for j in (*columns, k)) > width + BETWEEN:
+            yield columns
+            columns = list(range(lead))
+        columns.append(k)
+    yield columns
+
+
+def _widths(grid: Grid) -> list[tuple[int, int]]:
+    """Of every column the least width at which no number and no word of it is broken, and that of whole lines."""
+    found = []
+    for k, head in enumerate(grid.head):
+        cells = [row[k] for row in grid.rows]
+        whole = [piece for text in ([head, *cells] if k in grid.texts else [head]) for piece in text.split()]
+        least = max(map(cell_len, whole if k in grid.texts else [*whole, *cells]), default=1)
+        found.append((least, max(map(cell_len, [head, *cells]))))
+    return found
+
+
+def _table(grid: Grid, columns: Sequence[int], width: int) -> Table:
     table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
-    for k, name in enumerate(grid.head):
-        table.add_column(Text(name), justify="left" if k < grid.left else "right", overflow="fold")
+    widths = [_widths(grid)[k] for k in columns]
+    room = width - BETWEEN * (len(columns) - 1)
+    # the widest lines are wrapped first
+    caps = range(max(most for _, most in widths), 0, -1)
+    shares = ([min(most, max(least, cap)) for least, most in widths] for cap in caps)
+    fitting: Sequence[int | None] = next((share for share in shares if sum(share) <= room), [None] * len(columns))
+    for column, own in zip(columns, fitting, strict=True):
+        side: Literal["left", "right"] = "left" if column in grid.texts else "right"
+        table.add_column(Text(grid.head[column]), justify=side, overflow="fold", width=own)
     for row in grid.rows:
-        table.add_row(*(Text(cell, style="red" if cell == "broken" else "") for cell in row))
+        table.add_row(*(Text(row[k], style="red" if row[k] == "broken" else "") for k in columns))
     return table

@@ -16,14 +16,14 @@ from laufruhe.numerics.processes import meanwhile
 from laufruhe.present.measures import has_loads, has_ranking, limits_of, loaded, places_of, ranking_of
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.present.numbers import DEGREE, RPM
-from laufruhe.present.pictures import MOST_PRINTED, PRINTED, printed_sheet
 from laufruhe.present.run_up import runs_up, shown_runs
 from laufruhe.present.speed_curves import speeds_of, transmissibility_of
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
 from laufruhe.problem.evaluation import measured
 from laufruhe.report import files
 from laufruhe.report.curves import CURVES
-from laufruhe.report.sections import SECTIONS
+from laufruhe.report.grid import Grid
+from laufruhe.report.sections import tables_of as printed_tables
 from laufruhe.report.sheet import Sheet, Sheets
 from laufruhe.report.workbook import write_book
 from laufruhe.solvers.result import DecisionValue, LimitValue, Result
@@ -41,16 +41,12 @@ def sheets_of(result: Result) -> dict[str, Sheet]:
 
 def _printed(result: Result) -> dict[str, Sheet]:
     """Tables of the report that have no sheet of their own, as they are printed."""
-    found = {}
-    for section in SECTIONS:
-        name = section.__name__.rpartition(".")[2]
-        if name in PRINTED:
-            grids = [grid for grid in section.tables(result) if grid.rows][:MOST_PRINTED]
-            for k, grid in enumerate(grids, 1):
-                rows = [[_number(cell) for cell in row] for row in grid.rows]
-                head = [f"{grid.title}: {grid.head[0]}", *grid.head[1:]]
-                found[printed_sheet(name, k)] = Sheet(head, rows)
-    return found
+    return {grid.sheet: _as_printed(grid) for grid in printed_tables(result) if grid.sheet}
+
+
+def _as_printed(grid: Grid) -> Sheet:
+    head = [grid.head[0] or grid.title, *grid.head[1:]]
+    return Sheet(head, [[_number(cell) for cell in row] for row in grid.rows])
 
 
 def _number(cell: str) -> str | float:

@@ -8,13 +8,14 @@ from dataclasses import asdict
 
 from laufruhe.fidelity.knobs import NO_GAS, TWO_ORDER
 from laufruhe.fidelity.mount_knobs import RIGID
-from laufruhe.present.numbers import DASH
-from laufruhe.report.document import Block, Code, Document, Illustration, Paragraph
-from laufruhe.report.grid import Grid, piped
+from laufruhe.present.numbers import DASH, figure
+from laufruhe.report.document import Block, Bullets, Code, Document, Illustration, Paragraph
+from laufruhe.report.grid import Grid
 from laufruhe.report.strict_json import strict
 from laufruhe.solvers.nearby import compares_stars
 from laufruhe.studies.trade import KEEPS, REFERENCE_NAME, Row, Trade, is_local, is_open
 
+TITLE = "Speed against accuracy"
 ALIKE, SMALLEST = 1.3, 1e-4
 LOCAL = (
     " What is open here has many optima. Every fidelity begins at the design of the reference and finds an optimum "
@@ -38,31 +39,43 @@ INDEX = (
     "problem", "value within 0.1 %", "per design", "decision within 0.1 %", "per solve", "error of two-order",
     "of no gas", "of auto 0.001", "regret of two-order", "of auto 0.001", "uneven speed", "why a dash",
 )  # fmt: skip
+INDEX_COLUMNS = (
+    "*Per design, per solve*: time of the objective of one more design, and of an optimum, at the fidelity named. "
+    "*Regret*: by how much the exact objective of the design that a fidelity decides exceeds that of the best design "
+    "known; *beyond a limit*: by how much that design exceeds a limit by the exact model, where that is more than "
+    "0.1 %, so that it is no decision. Unbalances alone have one optimum, which each fidelity finds at its own angles; "
+    "even stars are ranked by each fidelity's own physics; what else is open is searched for from the design of the "
+    "reference, and from nothing too where that is worth a tenth more or less. Nothing is proven, of the reference "
+    "neither: the share by which another design is worse needs no proof. *Uneven speed*: change of the objective with "
+    "a flywheel that leaves 2 % of irregularity."
+)
 OPEN_FLYWHEEL = "the flywheel is open, and a cheap model makes one that breaks its limits"
 
 
 def trade_document(found: Trade, picture: str | None, command: str) -> Document:
     """Table, picture if there is one, by its name, and the choice for one problem."""
     problem = found.problem
-    optimum = "" if math.isnan(found.optimum) else f", of its optimum {found.optimum:.6g}"
+    given, least = (figure(value, problem.objective_unit or "", 6) for value in (found.value, found.optimum))
+    optimum = "" if math.isnan(found.optimum) else f", of the optimum {least}"
     blocks: list[Block] = [
         Paragraph(
-            f"Reference: {REFERENCE_NAME} over the cycle; objective of the design as given {found.value:.6g}{optimum} "
-            "(SI)."
+            f"Reference: {REFERENCE_NAME} over the cycle; {problem.objective_name} of the design as given {given}"
+            f"{optimum}."
         ),
         Paragraph(f"**Take** {advice(found)}", marked=True),
-        Illustration(picture, "Time against error of every fidelity; colour is regret", is_captioned=False)
-        if picture
-        else Paragraph("What is asked depends on no load, so every fidelity gives the same number."),
-        Grid("", HEAD, [_cells(row) for row in found.rows]),
     ]
+    if picture:
+        blocks.append(Illustration(picture, "Time against error of every fidelity; colour is regret", False))
+    elif not problem.load_terms:
+        blocks.append(Paragraph("What is asked depends on no load, so every fidelity gives the same number."))
+    blocks.append(Grid("", HEAD, [_cells(row) for row in found.rows]))
     if not found.whole:
         blocks.append(Paragraph("Stopped at the time limit: fidelities beyond the last row were not measured."))
     mounts = OF_MOUNTS if problem.mount_decisions and problem.load_terms else ""
     searched = OF_STARS if compares_stars(problem) else LOCAL if is_local(problem) else ""
     blocks.append(Paragraph(COLUMNS + searched + mounts, marked=True))
     blocks.extend(Paragraph(line) for line in (*found.left_out, *_beyond(found)))
-    return Document(f"Speed against accuracy: {problem.title}", (*blocks, Code(command)))
+    return Document(f"{TITLE}: {problem.title}", (*blocks, Code(command)))
 
 
 def _beyond(found: Trade) -> list[str]:
@@ -119,37 +132,25 @@ def as_json(found: Trade) -> str:
     })  # fmt: skip
 
 
-def index(trades: Sequence[Trade], refused: Sequence[str] = ()) -> str:
+def index(trades: Sequence[Trade], refused: Sequence[str] = ()) -> Document:
     """One line for every problem, and what they have in common; those for whose open flywheel nothing is traded."""
     rows = [*map(_index_row, trades), *([f"`{name}`", *[DASH] * (len(INDEX) - 2), OPEN_FLYWHEEL] for name in refused)]
-    lines = [
-        "# Speed against accuracy",
-        "",
-        f"Which fidelity to take, measured on {len(trades)} problem{'s' * (len(trades) > 1)}. In short:",
-        "",
-        "- `auto` is the safe choice: it states a bound of its error and keeps it. Problems that ask only for "
-        "modes or sag need no loads.",
-        f"- {_cost(trades, TWO_ORDER, 'The two-order formulas of textbooks cost')} "
+    short = (
+        "`auto` is the safe choice: it states a bound of its error and keeps it. Problems that ask only for modes or "
+        "sag need no loads.",
+        f"{_cost(trades, TWO_ORDER, 'The two-order formulas of textbooks cost')} "
         "Where the second order of an engine cancels, all that remains is what these formulas leave out.",
-        f"- {_cost(trades, NO_GAS, 'Leaving gas out costs')} Gas determines how the roll moment is balanced.",
-        f"- {_cost(trades, RIGID, 'Taking elastic mounts for rigid costs')} Keeping a few "
-        "modes saves nothing: all that are excited take the same time.",
-        "- More than 720 steps in a cycle improve peaks and proofs, not means.",
-        "- Regret may be far below the error, because an optimum is flat, or far above it, because a shaft that "
+        f"{_cost(trades, NO_GAS, 'Leaving gas out costs')} Gas determines how the roll moment is balanced.",
+        f"{_cost(trades, RIGID, 'Taking elastic mounts for rigid costs')} Keeping a few modes saves nothing: all that "
+        "are excited take the same time.",
+        "More than 720 steps in a cycle improve peaks and proofs, not means.",
+        "Regret may be far below the error, because an optimum is flat, or far above it, because a shaft that "
         "balances the wrong load leaves the right one. Read both columns.",
-        "",
-        piped(INDEX, sorted(rows, key=lambda row: row[0].strip("[`")), (0, 1, 3, len(INDEX) - 1)),
-        "",
-        "*Per design, per solve*: time of the objective of one more design, and of an optimum, at the fidelity named. "
-        "*Regret*: by how much the exact objective of the design that a fidelity decides exceeds that of the best "
-        "design known; *beyond a limit*: by how much that design exceeds a limit by the exact model, where that is "
-        "more than 0.1 %, so that it is no decision. Unbalances alone have one optimum, which each fidelity finds at "
-        "its own angles; even stars are ranked by each fidelity's own physics; what else is open is searched for from "
-        "the design of the reference, and from nothing too where that is worth a tenth more or less. Nothing is "
-        "proven, of the reference neither: the share by which another design is worse needs no proof. *Uneven speed*: "
-        "change of the objective with a flywheel that leaves 2 % of irregularity.",
-    ]
-    return "\n".join(lines) + "\n"
+    )
+    lead = f"Which fidelity to take, measured on {len(trades)} problem{'s' * (len(trades) > 1)}. In short:"
+    rows = sorted(rows, key=lambda row: row[0].strip("[`"))
+    table = Grid("", INDEX, rows, left=(0, 1, 3, len(INDEX) - 1), marked=True)
+    return Document(TITLE, (Bullets(lead, short, marked=True), table, Paragraph(INDEX_COLUMNS, marked=True)))
 
 
 def _index_row(found: Trade) -> list[str]:
@@ -214,7 +215,7 @@ def _percent(share: float) -> str:
 
 def _cells(row: Row) -> list[str]:
     times = map(_time, (row.evaluation, row.gradient, row.solve, row.fresh))
-    return [row.name, f"{row.error:.1e}", f"{row.estimate:.1e}", *times, f"{row.memory / 1e6:.2f} MB", _regret(row)]
+    return [row.name, _share(row.error), _share(row.estimate), *times, f"{row.memory / 1e6:.2f} MB", _regret(row)]
 
 
 def _time(seconds: float) -> str:
@@ -226,7 +227,11 @@ def _time(seconds: float) -> str:
 
 
 def _error(row: Row | None) -> str:
-    return DASH if row is None else f"{row.error:.1e}"
+    return DASH if row is None else _share(row.error)
+
+
+def _share(error: float) -> str:
+    return f"{error:.1e}" if error else "0"
 
 
 def _regret(row: Row | None) -> str:

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping
 from datetime import UTC, datetime
+from functools import partial
 from itertools import chain, count
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -27,8 +28,10 @@ def write_book(sheets: Mapping[str, Sheet], path: Path) -> None:
     with TemporaryDirectory() as rows:
         book = Workbook(path, {**_PLAINLY, "tmpdir": rows})
         book.set_properties({"created": _WHENEVER})
+        plain = book.add_format()
         for name, sheet in zip(_page_names(sheets), sheets.values(), strict=True):
             page = book.add_worksheet(name)
+            page.add_write_handler(str, partial(_as_text, plain=plain))
             page.freeze_panes(1, 0)
             for k, row in enumerate(chain([sheet.head], sheet.rows)):
                 # numbers first: most cells are
@@ -40,6 +43,13 @@ def write_book(sheets: Mapping[str, Sheet], path: Path) -> None:
         except FileCreateError as error:
             # a full disk is told as that of any other file
             raise error.args[0] from None
+
+
+def _as_text(page: Any, row: int, column: int, text: str, _: Any, plain: Any) -> int | None:
+    """A text that XlsxWriter would take for its own marks of formatting, in two pieces of one format; else None."""
+    if not (text.startswith("<r>") and text.endswith("</r>")):
+        return None
+    return int(page.write_rich_string(row, column, text[:2], plain, text[2:]))
 
 
 def _page_names(names: Iterable[str]) -> list[str]:

@@ -18,7 +18,7 @@ def tables(result: Result) -> list[Grid]:
     for kind in found.kinds:
         head += [kind, "mass [g]"]
     rows = [_row(place) for place in found.places]
-    return [Grid("Assembly", head, rows, note=_beside(found, unit))]
+    return [Grid("Assembly", head, rows, note=_beside(found, unit), sheet="assembly")]
 
 
 def _row(place: Place) -> tuple[str, ...]:

@@ -26,4 +26,4 @@ def tables(result: Result) -> list[Grid]:
             met = "yes" if mount.name in found.on_stops else DASH
             rows.append((case.name, mount.name, *moved, number(float(np.linalg.norm(force))), met))
     note = "From where the engine stands without these loads."
-    return [Grid("Load cases", HEAD, tuple(rows), left=2, note=note)]
+    return [Grid("Load cases", HEAD, tuple(rows), left=2, note=note, sheet="load-cases")]

@@ -27,7 +27,10 @@ def tables(result: Result) -> list[Grid]:
     names = [found.name for found in ranks[0].designs] if any(rank.equal for rank in ranks) else []
     ends = tuple((name, *(_ends(rank, name) for rank in ranks)) for name in names)
     head = ("decision", *(f"best by {k}" if k == 1 else f"by 1 to {k}" for k in range(1, len(ranks) + 1)))
-    return [Grid("Objectives in order", HEAD, rows, note=ORDER), Grid("Equal optima", head, ends, note=EQUAL)]
+    return [
+        Grid("Objectives in order", HEAD, rows, note=ORDER, sheet="objectives-in-order"),
+        Grid("Equal optima", head, ends, note=EQUAL, sheet="equal-optima"),
+    ]
 
 
 def _row(number: int, rank: RankValue, last: RankValue) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ def tables(result: Result) -> list[Grid]:
     first = ("value reached", *(figure(found.value, found.unit) for _, found in designs))
     rows = tuple((name, *(_value(each.get(name)) for each in known)) for name in names)
     head = ("", *(title for title, _ in designs))
-    return [Grid("What the limits can reach", head, (first, *rows) if names else (), note=NOTE)]
+    return [Grid("What the limits can reach", head, (first, *rows) if names else (), note=NOTE, sheet="reach")]
 
 
 def _value(decision: DecisionValue | None) -> str:

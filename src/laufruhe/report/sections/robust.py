@@ -23,7 +23,10 @@ def tables(result: Result) -> list[Grid]:
     told = ("tolerance, dearest first", "is", "errors", "shadow price", "costs")
     own = [_tolerance(tolerance, unit) for tolerance in found.tolerances]
     note = "Costs: shadow price times tolerance, an estimate of what removing the tolerance would save."
-    return [Grid("Under tolerance", head, rows, note=_checked(found)), Grid("Tolerances", told, own, 2, note=note)]
+    return [
+        Grid("Under tolerance", head, rows, note=_checked(found), sheet="under-tolerance"),
+        Grid("Tolerances", told, own, 2, note=note, sheet="tolerances"),
+    ]
 
 
 def _design(design: BuiltDesign, unit: str) -> tuple[str, ...]:

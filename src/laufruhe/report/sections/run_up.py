@@ -23,4 +23,4 @@ def tables(result: Result) -> list[Grid]:
         for name, time, found in (("run-up", run.up, up), ("shut-down", run.down, down))
     )  # fmt: skip
     note = f"On any mount, between rest and {shown(run.speed, 'rad/s')}, with the gas of {run_point(result).name}."
-    return [Grid("Through resonance", HEAD, rows, note=note)]
+    return [Grid("Through resonance", HEAD, rows, note=note, sheet="through-resonance")]

@@ -21,7 +21,8 @@ def tables(result: Result) -> list[Grid]:
     if not asks_torque(result):
         return []
     facts = ((point.name, torque_facts(engine, point, problem.fidelity)) for point in problem.points)
-    return [Grid("Torque of the crankshaft", HEAD, tuple(_row(*pair) for pair in facts), note=NOTE)]
+    rows = tuple(_row(*pair) for pair in facts)
+    return [Grid("Torque of the crankshaft", HEAD, rows, note=NOTE, sheet="crankshaft-torque")]
 
 
 def _row(name: str, facts: TorqueFacts) -> tuple[str, ...]:

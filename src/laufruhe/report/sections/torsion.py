@@ -30,7 +30,7 @@ def _modes(result: Result, facts: TorsionFacts) -> Grid:
     rest = len(facts.modes.frequencies) - len(shown)
     more = f" {rest} higher one(s) are in result.json." if rest else ""
     note = f"Undamped. Angle of every disc, the largest of each mode one.{more}"
-    return Grid("Natural modes of the crankshaft", ("mode", "Hz", *names), rows, note=note)
+    return Grid("Natural modes of the crankshaft", ("mode", "Hz", *names), rows, note=note, sheet="crankshaft-modes")
 
 
 def _criticals(facts: TorsionFacts, which: str) -> Grid:
@@ -46,7 +46,8 @@ def _criticals(facts: TorsionFacts, which: str) -> Grid:
         "order. Torque: amplitude of that order in the section that it loads most."
     )
     head = ("rpm", "order", "mode", "vector sum", "torque [N m]")
-    return Grid(f"Critical speeds of the crankshaft {which}", head, rows, note=note)
+    sheet = f"strongest-critical-speeds-{which.replace(' ', '-')}"
+    return Grid(f"Critical speeds of the crankshaft {which}", head, rows, note=note, sheet=sheet)
 
 
 def _barred(result: Result) -> Grid:
@@ -56,4 +57,4 @@ def _barred(result: Result) -> Grid:
     )
     low, high = (number(speed * RPM) for speed in speed_range(result))
     note = f"Between {low} and {high} rpm, with the load of the operating points: where the limit would be exceeded."
-    return Grid("Barred speed ranges", ("limit", "rpm"), rows, note=note)
+    return Grid("Barred speed ranges", ("limit", "rpm"), rows, note=note, sheet="barred-speeds")

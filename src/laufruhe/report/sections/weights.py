@@ -46,7 +46,7 @@ def _weights(result: Result) -> Grid:
     sides = (" before", " after") if two else ("",)
     sizes = [f"{what}{side}" for side in sides for what in ("g mm", "deg")]
     head = ("weight", "x [mm]", *sizes, "kg m", "mass [g]", "at radius [mm]")
-    return Grid("Weights" + (" as decided" if two else ""), head, tuple(rows), note=_ANGLES)
+    return Grid("Weights" + (" as decided" if two else ""), head, tuple(rows), note=_ANGLES, sheet="weights")
 
 
 def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
@@ -68,4 +68,4 @@ def _factors(result: Result) -> Grid:
         for cylinders in names
     ]
     head = ("throw of", *(("as given", "as decided") if len(found) > 1 else ("balance factor",)))
-    return Grid("Balance factors", head, tuple(rows), note=_FACTOR)
+    return Grid("Balance factors", head, tuple(rows), note=_FACTOR, sheet="balance-factors")
