@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 LANES := -n auto --maxprocesses 8 --dist worksteal
 STAMP := $(VENV)/.installed
 
-.PHONY: help solve study test test-fast test-long lanes attack matrix faults bench proofs speed pictures docs lint format clean distclean
+.PHONY: help solve study test test-fast test-long lanes attack matrix faults benchmarks proofs speed pictures docs lint format clean distclean
 
 help:
 	@echo "make solve      design the balance of PROBLEM ($(PROBLEM))"
@@ -21,7 +21,7 @@ help:
 	@echo "make lint       style, types, direction of imports"
 	@echo "make format     put the source into the project's style"
 	@echo "make faults     100,000 damaged files, which writes results/faults/; half an hour and more"
-	@echo "make bench      benchmarks, which write results/benchmarks/; an hour and more"
+	@echo "make benchmarks every page of results/benchmarks/, BENCHMARKS='growth torsion' for these alone; half an hour"
 	@echo "make proofs     every ready problem's value, bound and gap, which writes results/proofs/; minutes"
 	@echo "make speed      what users wait for, timed; SPEED=--benchmark-compare against the last run"
 	@echo "make pictures   the pictures of README.md again, under docs/pictures/"
@@ -74,9 +74,9 @@ matrix: export OMP_NUM_THREADS = 1
 matrix: $(STAMP)
 	$(BIN)/python tests/matrix/whole.py $(MATRIX)
 
-# Scripts that write under results/benchmarks/.
-bench: $(STAMP)
-	@set -e; for script in tests/benchmarks/bench_*.py; do echo "$$script"; $(BIN)/python "$$script"; done
+# Scripts that write results/benchmarks/, one after the other, none for longer than a quarter of an hour.
+benchmarks: $(STAMP)
+	$(BIN)/python tests/benchmarks/every.py $(BENCHMARKS)
 
 # Value, bound, gap and time of every ready problem; writes results/proofs/README.md.
 proofs: $(STAMP)

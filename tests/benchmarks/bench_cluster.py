@@ -1,14 +1,13 @@
 """Studies on a cluster of this machine: bits, kills, a full disk, overhead, and growth with size and workers.
 
-Writes results/benchmarks/cluster.md and cluster.png. `python tests/benchmarks/bench_cluster.py 40 1e6 2000` kills so
-many
-runs, evaluates so many designs, and solves so many scenes; a store with random scenes that are finished, its seconds
-and
-bytes of memory may follow, and are told too.
+Writes results/benchmarks/cluster.md and cluster.png. `--kills`, `--evaluations` and `--solves` say how many runs are
+killed, and how many designs and scenes the largest studies have, `--long` how many scenes are solved on all processors
+by one command: 100000 take seven minutes on four. `--kills 40` takes a quarter of an hour.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import random
 import shutil
@@ -17,6 +16,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +31,7 @@ from laufruhe.plots.picture import save_picture
 from laufruhe.studies import picture as p
 from studies import clusters
 
-OUT, PICTURE = PAGES / "cluster.md", PAGES / "cluster.png"
+OUT = PAGES / "cluster.md"
 WORKERS = (1, 2, 4, 7)
 TASKS = 1000
 SMALL = {"draws": 4000, "chunk": 500, "scenes": 40, "few": 2, "points": 3}
@@ -49,8 +49,8 @@ from laufruhe.cli import main; main()"""
 DAY = 86_400.0
 HEAD = """# Many designs, on this machine and on a cluster
 
-Studies of two kinds: random designs, evaluated many at once, and random scenes, each decided to a proof. Others used
-the {} cores of this machine too (load {:.0f} at the start), so times by the clock say little and processor time counts.
+Studies of two kinds: random designs, evaluated many at once, and random scenes, each decided to a proof. Seconds
+by the clock stand beside seconds of processors, which count where the machine did other work too.
 
 ## Overhead of a piece
 
@@ -84,15 +84,16 @@ def each_of(costs: list[Cost]) -> float:
 
 
 def timed(folder: Path, *words: str) -> tuple[float, float, int]:
-    """A study to its end: seconds by the clock and of processors, and most memory that a process of it had."""
+    """A study to its end: seconds by the clock and of processors, and most memory that a process of it had [byte]."""
     began = time.perf_counter()
     process = subprocess.Popen(
         [*clusters.LAUFRUHE, "study", "s.toml", "--out", "out", *words], cwd=folder, env=clusters.environment(),
         stdout=subprocess.DEVNULL,
     )  # fmt: skip
     _, status, used = os.wait4(process.pid, 0)
-    process.returncode = status
-    assert status == 0, status
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise SystemExit(f"the study in {folder} ended with {process.returncode}")
     return time.perf_counter() - began, used.ru_utime + used.ru_stime, used.ru_maxrss * 1024
 
 
@@ -109,8 +110,8 @@ def stored(root: Path, part: str) -> tuple[float, int, int, int]:
     return float(seconds.sum()), draws, len(files), sum(path.stat().st_size for path in files)
 
 
-def overheads(own: clusters.Cluster) -> list[str]:
-    """Milliseconds of one piece that does nothing."""
+def overheads(own: clusters.Cluster) -> tuple[list[str], float]:
+    """What one piece costs that does nothing; of a cluster [ms]."""
 
     def spent(executor: Executor) -> float:
         list(each(abs, [-1] * 50, executor))
@@ -121,7 +122,7 @@ def overheads(own: clusters.Cluster) -> list[str]:
     with Processes(2) as pool, on_cluster(own.address) as dask:
         rows = [("this process", spent(HERE)), ("processes, 2", spent(pool)), ("Dask, 2 workers", spent(dask))]
     told = [f"| {name} | {milliseconds:.2f} |" for name, milliseconds in rows]
-    return ["| who works | ms a piece |", "| --- | ---: |", *told]
+    return ["| who works | ms a piece |", "| --- | ---: |", *told], rows[-1][1]
 
 
 def shared(folder: Path) -> tuple[list[str], list[tuple[int, float, float, float]]]:
@@ -224,17 +225,28 @@ def grown(folder: Path, evaluations: int, solves: int) -> tuple[list[Cost], list
     return found
 
 
-def plan(evaluated: list[Cost], solved: list[Cost]) -> list[str]:
-    """What a thousand million of each would take, from these figures."""
+def at_once(folder: Path, solves: int) -> Cost:
+    """Random scenes on all processors, by one command."""
+    here = clusters.prepared(folder, draws=1, scenes=solves, few=500, points=2)
+    wall, _, memory = timed(here)
+    cores, done, files, size = stored(clusters.regions_in(here / "out"), "engines")
+    assert done == solves
+    return Cost(done, wall, cores, files, size, memory)
+
+
+def plan(evaluated: list[Cost], solved: list[Cost], handing: float) -> list[str]:
+    """What a thousand million of each would take, from these figures and what handing out a piece costs [ms]."""
     rows = []
     for name, costs, chunk in (("evaluations", evaluated, 100_000), ("proven solves", solved, 10_000)):
         seconds, pieces = 1e9 * each_of(costs), 1e9 / chunk
         cells = [f"{seconds:.2g}", f"{seconds / 1000 / 3600:.2g} h", f"{chunk:,}", f"{pieces:,.0f}"]
-        cells += [f"{1e3 * each_of(costs) * chunk:,.0f} ms", f"{4e-3 * pieces / 60:.1f} min", f"{2 * pieces:,.0f}"]
+        cells += [
+            f"{1e3 * each_of(costs) * chunk:,.0f} ms",
+            f"{1e-3 * handing * pieces / 60:.1f} min",
+            f"{2 * pieces:,.0f}",
+        ]
         rows.append(f"| {' | '.join([name, *cells, f'{1e9 * costs[-1].stored / costs[-1].size / 1e9:.0f} GB'])} |")
-    head = (
-        "| 1e9 | core-seconds | on 1000 cores | `chunk` | pieces | each takes | to hand out, at 4 ms | files | store |"
-    )
+    head = "| 1e9 | core-seconds | on 1000 cores | `chunk` | pieces | each takes | to hand out | files | store |"
     return [head, "| --- " + "| ---: " * 8 + "|", *rows]
 
 
@@ -259,32 +271,51 @@ def drawn(sizes: tuple[list[Cost], list[Cost]], counts: list[tuple[int, float, f
     right = p.Panel(marks, across, p.Axis("core-seconds", (0.0, 1.2 * most)), "Workers, the same study")
     words = "Random designs and random scenes of one cylinder; Dask workers on one machine."
     credit = "Computed with Laufruhe."
-    save_picture(p.Picture("Many designs: what they cost", words, [left, right], credit, columns=2, gap=0.7), PICTURE)
+    picture = p.Picture("Many designs: what they cost", words, [left, right], credit, columns=2, gap=0.7)
+    save_picture(picture, OUT.with_suffix(""))
+
+
+def asked() -> argparse.Namespace:
+    """How much of it."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--kills", type=int, default=8)
+    parser.add_argument("--evaluations", type=at_least(100_000), default=1_000_000)
+    parser.add_argument("--solves", type=at_least(100), default=1000)
+    parser.add_argument("--long", type=int, default=5000)
+    return parser.parse_args()
+
+
+def at_least(least: int) -> Callable[[str], int]:
+    """Numbers so large that what one more takes shows beside what starting takes."""
+
+    def number(word: str) -> int:
+        if int(float(word)) < least:
+            raise argparse.ArgumentTypeError(f"{word} is too few to tell growth from what starting takes: {least}")
+        return int(float(word))
+
+    return number
 
 
 def main() -> None:
     """All of it."""
-    given = [float(word) for word in (*sys.argv[1:4], *("20", "1e6", "1000")[len(sys.argv) - 1 :])]
-    kills, evaluations, solves = map(int, given)
-    lines = [HEAD.format(os.cpu_count(), os.getloadavg()[0], TASKS)]
+    given = asked()
+    lines = [HEAD.format(TASKS)]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with clusters.cluster(folder / "empty", 2) as own:
-            lines += [*overheads(own), ""]
+            rows, handing = overheads(own)
+            lines += [*rows, ""]
         told, counts = shared(folder / "shared")
-        lines += [SHARES.format(**SHARED), *told, "", IMPORTS, *killed(folder / "kills", kills)]
+        lines += [SHARES.format(**SHARED), *told, "", IMPORTS, *killed(folder / "kills", given.kills)]
         lines += ["", "## A full disk", "", *full_disk(folder / "disk"), ""]
-        sizes = grown(folder / "grown", evaluations, solves)
+        sizes = grown(folder / "grown", given.evaluations, given.solves)
+        long = [LONG, "", COSTS, BAR, at_once(folder / "long", given.long).row(), ""] if given.long else []
     each_one = [f"One more takes {1e6 * each_of(costs):,.1f} µs of one core." for costs in sizes]
     lines += ["## Growth with size", "", "Evaluations:", "", COSTS, BAR, *(cost.row() for cost in sizes[0]), ""]
     lines += [each_one[0], "", "Proven solves (least mean mount force, 144 samples of a cycle):", ""]
     lines += [COSTS, BAR, *(cost.row() for cost in sizes[1]), "", each_one[1]]
-    if len(sys.argv) > 6:
-        cores, done, files, size = stored(Path(sys.argv[4]), "engines")
-        long = Cost(done, float(sys.argv[5]), cores, files, size, int(float(sys.argv[6])))
-        lines += ["", LONG, "", COSTS, BAR, long.row()]
-    lines += ["", "![Growth with size and workers](cluster.png)", "", "## A thousand million, on paper", ""]
-    lines += [*plan(*sizes), "", PAPER]
+    lines += ["", *long, "![Growth with size and workers](cluster.png)", "", "## A thousand million, on paper", ""]
+    lines += [*plan(*sizes, handing), "", PAPER.format(handing)]
     drawn(sizes, counts)
     publish(OUT, "\n".join(lines))
 
@@ -302,10 +333,8 @@ IMPORTS = """Each worker imports the package once, which takes one to two second
 SIGKILL at random moments, one to three times a run; a worker or a scheduler that is killed is started again, a client
 that is killed is the same command again. Every file and number is compared with those of one process.
 """
-LONG = """A hundred thousand engines with four numbers drawn, least RMS of the mount force, in pieces of 500 on four
-processes of a machine that was used for other things as well, by one command. Every one is a proven optimum.
-"""
-PAPER = """A scheduler hands out a piece each 4 ms, 9 on a machine as busy as this one, so a piece must take longer
+LONG = """As many as this by one command on all processors, in pieces of 500. Every one is a proven optimum."""
+PAPER = """The scheduler of this run handed out a piece each {:.1f} ms, so a piece must take longer
 than that times the number of workers: of evaluations, which take microseconds, a million a piece keep a
 thousand busy and no more, and a dozen cores do the work in minutes without a cluster. Who started the
 study writes the store: 1 to 2 ms a piece beside the bytes. `done` is checked when a study goes on, which

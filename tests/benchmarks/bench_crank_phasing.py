@@ -29,7 +29,7 @@ from laufruhe.machine.firing import even_patterns
 from laufruhe.machine.layouts import inline
 from laufruhe.physics.crank_stars import score_stars
 from laufruhe.physics.star_space import StarSpace
-from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.report.grid import Grid
 from laufruhe.report.sections import stars
@@ -165,7 +165,7 @@ def joint(n: int) -> tuple[str, ...]:
     phasing = problem.phasing
     assert phasing is not None
     (family,), _ = families_of(phasing)
-    floor = 1e-3 * objective_value(problem, evaluate(problem))
+    floor = nothing_of(problem)
     start = time.perf_counter()
     model = StarModel(phasing, family.space, family.geometry)
     found = search_designs(model, family.stars, 1, problem.tolerance, 90.0, floor)

@@ -61,7 +61,9 @@ def four_cylinder() -> list[str]:
     cheap, whole = prepare(auto), prepare(exact, prune=False)
     values = random_decisions(problem, DESIGNS)
     engine = problem.design(list(values[0]))
-    other, known = ([seconds(work(p, engine), 200) for p in (exact, auto)] for work in (_other_engine, _other_rotors))
+    unseen, heavier, known = (
+        [seconds(work(p, engine), 200) for p in (exact, auto)] for work in (_other_rods, _other_pistons, _other_rotors)
+    )
     x = np.concatenate([[1.0], *(d.columns_of(u) for d, u in zip(cheap.model.domains, values[0], strict=True))])
     one_whole, one = (seconds(lambda d=d: d.one(x), 2000) for d in (whole, cheap))
     empty = _one_row(cheap)
@@ -82,7 +84,8 @@ def four_cylinder() -> list[str]:
         "",
         "| what | exact | auto | ratio |",
         "| --- | ---: | ---: | ---: |",
-        line("from an engine object whose pistons were never seen", other),
+        line("from an engine object whose rods were never seen", unseen),
+        line("from an engine object, the masses of its pistons new", heavier),
         line("from an engine object, the rotors new", known),
         line("one design of a prepared scene, the decisions new", (one_whole, one)),
         f"| {DESIGNS} designs of a prepared scene in one call | {many_whole:.2f} s | {many:.3f} s "
@@ -90,7 +93,7 @@ def four_cylinder() -> list[str]:
         "",
         f"One design of a prepared scene is a handful of NumPy calls: on a single row they take {1e6 * floor:.1f} us. "
         f"With no angle left at all the ratio could be {one_whole / floor:.1f}, so ten times is out of reach there. "
-        "From an engine object both pay for the rotors, the mounts and the objects, and, where pistons are new, "
+        "From an engine object both pay for the rotors, the mounts and the objects, and, where rods are new, "
         "for the gas. Where there is much to do, in batches, what is left out is what is saved. "
         f"From exact engine objects with new rotors to automatic and prepared it is {known[0] / one:.0f} times: "
         f"{known[0] / one_whole:.0f} by preparing, {one_whole / one:.1f} by what is left out.",
@@ -107,13 +110,22 @@ def four_cylinder() -> list[str]:
     ]
 
 
-def _other_engine(problem: Problem, engine: Engine) -> Callable[[], object]:
-    """Objective of engines whose pistons differ from call to call."""
+def _other_rods(problem: Problem, engine: Engine) -> Callable[[], object]:
+    """Objective of engines whose rods differ in length from call to call."""
+    return _other_parts(problem, engine, "rod_length")
+
+
+def _other_pistons(problem: Problem, engine: Engine) -> Callable[[], object]:
+    """Objective of engines whose pistons differ in mass from call to call."""
+    return _other_parts(problem, engine, "reciprocating_mass")
+
+
+def _other_parts(problem: Problem, engine: Engine, number: str) -> Callable[[], object]:
     count = iter(range(1, 10**9))
 
     def work() -> object:
         factor = 1.0 + 1e-9 * next(count)
-        parts = tuple(replace(p, reciprocating_mass=factor * p.reciprocating_mass) for p in engine.slider_cranks)
+        parts = tuple(replace(p, **{number: factor * getattr(p, number)}) for p in engine.slider_cranks)
         return objective_value(problem, evaluate(problem, replace(engine, slider_cranks=parts)))
 
     return work
@@ -242,7 +254,7 @@ def draw(found: list[tuple[str, Sequence[int], list[float], float]], path: Path)
 
 def main() -> None:
     """Measure and write."""
-    lines = ["# Fidelity, batches and growth", "", "Least of several calls on one core of one machine.", ""]
+    lines = ["# Fidelity, batches and growth", "", "Processor time, the least of several calls on one core.", ""]
     table, found = growth()
     text = "\n".join([*lines, *four_cylinder(), *pruned(), *table]) + "\n"
     publish(OUT, text)

@@ -1,7 +1,8 @@
 """Studies and solves killed at random moments, alone and two at once in one folder, kept points damaged in between.
 
 Writes results/benchmarks/kills.md: what was tried, and everything whose files were not those of one run.
-`python tests/benchmarks/bench_kills.py 300` tries so many studies, and a third as many solves.
+`python tests/benchmarks/bench_kills.py 60` tries so many studies, and a third as many solves, a
+quarter of an hour long.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from cli import solve_kills
 from studies import kills
 
 OUT = PAGES / "kills.md"
-TRIED = 60
+TRIED = 18
 WORDS = """{} studies of {} points in three parts, each killed one to four times at seeded random moments by SIGINT,
 SIGTERM or SIGKILL, alone or two at once in one folder, their kept points damaged after every kill, and then left to
 end. Datasets, CSV files, pictures and the report but for its table of times are compared byte by byte with those of one

@@ -1,14 +1,13 @@
 """A frame of the live page, and what an update takes beside a dashboard framework, in one run.
 
-Writes results/benchmarks/live-page.md. `--dash PYTHON` names a Python that has Dash (`pip install dash` in an
-environment of its own); without it those rows are left out, and said to be.
+Writes results/benchmarks/live-page.md. `--dash PYTHON` or LAUFRUHE_DASH names a Python that has Dash (`pip install
+dash` in an environment of its own); without it those rows are left out, and said to be.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
-import platform
 import socket
 import statistics
 import subprocess
@@ -20,10 +19,10 @@ from pathlib import Path
 
 import numpy as np
 from live_in_dash import __file__ as IN_DASH
-from pages import PAGES, ROOT, publish
+from pages import PAGES, ROOT, publish, skip
 from playwright.sync_api import CDPSession, Page
 
-from browser.chromium import launched, watched
+from browser.chromium import MISSING, executable, launched, watched
 from laufruhe import load, solve
 from laufruhe.live import live_model
 from laufruhe.problem.evaluation import evaluate
@@ -174,8 +173,10 @@ def _row(name: str, times: list[float]) -> str:
 def main() -> None:
     """Measure and write."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--dash", default="", help="a Python that has Dash")
+    parser.add_argument("--dash", default=os.environ.get("LAUFRUHE_DASH", ""), help="a Python that has Dash")
     python = parser.parse_args().dash
+    if executable() is None:
+        skip(MISSING)
     scenes: dict[str, Callable[[], Problem]] = {
         "ready four-cylinder, four mounts, one point": lambda: load(FOUR),
         "twelve cylinders, four mounts, two points": twelve,
@@ -193,17 +194,16 @@ def main() -> None:
         assert seen.refused == []
     publish(OUT, TEXT.format(
         drags="\n".join(drags), rows="\n".join(rows), moves=MOVES, updates=UPDATES, frame=FRAME,
-        load=os.getloadavg()[0],
-        cores=os.cpu_count(),
-        chromium=version, machine=platform.machine(), python=platform.python_version(),
-        left="" if python else "Dash was not at hand in this run: `--dash PYTHON` names a Python that has it.\n\n",
+        chromium=version,
+        left="" if python else WITHOUT,
     ))  # fmt: skip
 
 
+WITHOUT = "Dash was not at hand: `--dash PYTHON`, or LAUFRUHE_DASH, names a Python that has it.\n\n"
 TEXT = """# Live page: what a frame takes
 
-`bench_live_page.py --dash PYTHON`, headless Chromium {chromium} without a graphics card, {machine}, Python {python}.
-Milliseconds of this machine, on which {load:.0f} other processes were waiting for {cores} cores.
+Headless Chromium {chromium} without a graphics card. Milliseconds by the clock but for the last column of the first
+table.
 
 ## A frame while a slider is dragged
 

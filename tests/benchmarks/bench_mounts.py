@@ -206,7 +206,7 @@ def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tup
 
 def main() -> None:
     problem = load(PROBLEM)
-    lines = ["# Elastic mounts: benchmark", "", "Seconds are processor time.", ""]
+    lines = ["# Elastic mounts: benchmark", "", f"`problems/{PROBLEM.name}`; seconds are processor time.", ""]
     for part in (one_speed, many_speeds, joint):
         lines += part(problem)
         print("\n".join(lines[-16:]), flush=True)

@@ -5,17 +5,15 @@ Writes results/benchmarks/served-page.md.
 
 from __future__ import annotations
 
-import os
-import platform
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
-from pages import PAGES, ROOT, publish
+from pages import PAGES, ROOT, publish, skip
 
-from browser.chromium import launched, watched
+from browser.chromium import MISSING, executable, launched, watched
 
 OUT = PAGES / "served-page.md"
 MOVES, SPACING, PATIENCE = 60, 120, 120_000
@@ -40,9 +38,8 @@ SLIDE = """async ({ control, moves, spacing }) => {
 RUN = "from laufruhe.cli import main; main()"
 PAGE = """# Served page: from a slider to the optimum that follows
 
-`bench_served_page.py`, headless Chromium {chromium} without a graphics card, {machine}, Python {python}.
-Milliseconds from the input event to the end of the frame that shows the answer, the wait for the next frame of the
-screen included, {moves} events each, on a machine where {waiting:.0f} other processes were waiting for {cores} cores.
+Headless Chromium {chromium} without a graphics card. Milliseconds by the clock from the input event to the end of the
+frame that shows the answer, the wait for the next frame of the screen included, {moves} events each.
 
 | problem | slider | least | median | 95 % | to the answer, median | processor time of the server, median |
 | --- | --- | ---: | ---: | ---: | ---: | ---: |
@@ -85,17 +82,15 @@ def chromium_version() -> str:
 
 def main() -> None:
     """All scenes, one after the other."""
+    if executable() is None:
+        skip(MISSING)
     rows = []
-    waiting = os.getloadavg()[0]
     with tempfile.TemporaryDirectory() as folder:
         for name, control, words in SCENES:
             drawn, answered, spent = measured(name, control, Path(folder)).T
             numbers = (drawn.min(), np.median(drawn), np.quantile(drawn, 0.95), np.median(answered), np.median(spent))
             rows.append(f"| {name} | {words} | " + " | ".join(f"{number:.0f}" for number in numbers) + " |")
-    text = PAGE.format(
-        chromium=chromium_version(), machine=platform.machine(), python=platform.python_version(), moves=MOVES,
-        waiting=waiting, cores=len(os.sched_getaffinity(0)), rows="\n".join(rows),
-    )  # fmt: skip
+    text = PAGE.format(chromium=chromium_version(), moves=MOVES, rows="\n".join(rows))
     publish(OUT, text)
 
 

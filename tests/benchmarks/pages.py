@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import os
+import platform
 import resource
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import NoReturn
+
+import psutil
 
 ROOT = Path(__file__).resolve().parents[2]
 # what tests share is shared with benchmarks
 sys.path.insert(0, str(ROOT / "tests"))
 # The rest of results/ is what the commands write, and not committed.
 PAGES = ROOT / "results" / "benchmarks"
-_BEFORE = os.getloadavg()[0]
+SKIPPED = 77
+"""Exit status of a script that cannot run here, as test programs have it."""
+QUIET = 0.2
+"""So many processors busy with other work disturb nothing."""
 
 
 def spent(work: Callable[[], object]) -> float:
@@ -30,17 +37,37 @@ def processor_seconds() -> float:
     return sum(each.ru_utime + each.ru_stime for each in both)
 
 
+def _busy_seconds() -> float:
+    """Of all processors since the machine was started, whoever had them."""
+    told = psutil.cpu_times()._asdict()
+    # what guests had is counted as user time too
+    return float(sum(told.values()) - sum(told.get(name, 0.0) for name in ("idle", "iowait", "guest", "guest_nice")))
+
+
+_BEGAN, _BUSY, _OWN = time.perf_counter(), _busy_seconds(), processor_seconds()
+
+
 def _machine() -> str:
-    """How busy the machine was."""
-    now, idle = os.getloadavg()[0], _BEFORE < 1.0
-    told = "nothing else ran" if idle else "it did other work too, which makes times longer"
-    load = f"{_BEFORE:.1f} and {now:.1f} on {os.cpu_count()} processors"
-    return f"Load of the machine when this was begun and ended: {load}; {told}."
+    """What made the page, on what machine, and how busy that was with other work."""
+    elapsed, own = time.perf_counter() - _BEGAN, processor_seconds() - _OWN
+    others = max(_busy_seconds() - _BUSY - own, 0.0) / elapsed
+    words = " ".join(["python", f"tests/benchmarks/{Path(sys.argv[0]).name}", *sys.argv[1:]])
+    made = f"Made by `{words}` in {elapsed:.0f} s, {own:.0f} s of a processor, "
+    made += f"with Python {platform.python_version()} on {platform.machine()}."
+    told = "too little to disturb" if others < QUIET else "which makes times longer, those by the clock most"
+    load = f"Load of the machine meanwhile: other programs had {others:.1f} of its {os.cpu_count()} processors, {told}."
+    return f"{made} {load}"
 
 
 def publish(path: Path, text: str) -> None:
-    """A page in its place, and on the screen; it says how busy the machine was."""
+    """A page in its place, and on the screen; it says what made it and how busy the machine was."""
     text = f"{text.rstrip()}\n\n{_machine()}\n"
     print(text)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
+
+
+def skip(reason: str) -> NoReturn:
+    """End without a page, and say why."""
+    print(f"left out: {reason}")
+    sys.exit(SKIPPED)

@@ -1,5 +1,6 @@
 """Uneven throws: never worse than the start, never beyond the intervals, exact where it counts."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -47,6 +48,18 @@ def test_slightly_uneven_angles_cut_the_couple(name):
     assert all(point.kkt_residual < 1e-6 for point in trade)
     assert result.certificate.kind is Proof.GLOBAL
     assert result.certificate.gap <= 1e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["inline-seven-uneven", "two-stroke-eight-uneven"])
+def test_a_ranking_has_no_crank_twice(name):
+    """Several starts lead to the best crank of these; a rank is told by its throws and how it fires."""
+    ranked = solved(name).phasing.ranking
+    assert len(ranked) > 3
+    for one, other in itertools.combinations(ranked, 2):
+        turned = np.exp(1j * np.subtract(one.throws, other.throws))
+        fires_alike = one.firing_orders[0].order == other.firing_orders[0].order
+        assert not fires_alike or np.abs(np.angle(turned)).max() > 1e-4, (one.throws, other.throws)
 
 
 @pytest.mark.slow

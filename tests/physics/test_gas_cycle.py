@@ -16,6 +16,7 @@ from scipy.integrate import solve_ivp
 from laufruhe.errors import ModelError
 from laufruhe.machine import Cycle, PressureTrace, Seiliger, Shaft, SliderCrank, Wiebe
 from laufruhe.physics.cylinder_volume import dead_centres, swept_volume
+from laufruhe.physics.gas_loads import _one_cylinder, gas_coefficients
 from laufruhe.physics.pressure_trace import trace_pressure
 from laufruhe.physics.seiliger_cycle import (
     compression_end_pressure,
@@ -625,3 +626,28 @@ class TestHasselgruber:
         """Whether 80 kp/cm2 is absolute or a gauge pressure hardly matters; the compression ratio does."""
         assert self.force(replace(DIESEL, peak_pressure=81 * AT)) == pytest.approx(263, abs=1.5)
         assert self.force(replace(DIESEL, compression_ratio=20.5)) == pytest.approx(300, abs=3)
+
+
+class TestCylindersAlike:
+    """The gas of a cylinder is computed once for all that it drives alike."""
+
+    @every_part
+    def test_what_it_weighs_and_where_it_stands_is_no_matter(self, part: SliderCrank) -> None:
+        gas, cycle = replace(DIESEL, imep=8.7 * AT), Cycle.FOUR_STROKE
+        heavier = replace(part, reciprocating_mass=2.0, rotating_mass=0.3, x=0.4, throw=1.0, bank=0.5, firing_angle=1.0)
+        first = gas_coefficients(gas, part, cycle)
+        missed = _one_cylinder.cache_info().misses
+        assert gas_coefficients(gas, heavier, cycle) is first
+        assert _one_cylinder.cache_info().misses == missed
+        _one_cylinder.cache_clear()
+        anew = gas_coefficients(gas, heavier, cycle)
+        np.testing.assert_array_equal(anew.coefficients, first.coefficients)
+
+    @every_part
+    def test_another_bore_rod_or_way_to_turn_is(self, part: SliderCrank) -> None:
+        turned = replace(part, shaft=replace(part.shaft, ratio=-part.shaft.ratio))
+        first = gas_coefficients(DIESEL, part, Cycle.FOUR_STROKE).coefficients
+        # what has no offset does the same to a crank that turns backwards
+        for other in (replace(part, bore=0.11), replace(part, crank_radius=0.055), *([turned] if part.offset else [])):
+            own = gas_coefficients(DIESEL, other, Cycle.FOUR_STROKE).coefficients
+            assert not np.array_equal(own, first)

@@ -1,4 +1,4 @@
-"""Scripts that nothing but `make bench` runs still find what they import."""
+"""Scripts that nothing but `make benchmarks` runs still find what they import, and end as they should."""
 
 import os
 import subprocess
@@ -10,13 +10,50 @@ import pytest
 import laufruhe
 
 SCRIPTS = Path(__file__).parents[1] / "benchmarks"
+SHORT = {
+    "well": ("print('fine')", "s"),
+    "wrong": ("print('no room'); raise SystemExit(3)", "FAILED with exit status 3"),
+    "missing": ("from pages import skip; skip('no browser')", "left out: no browser"),
+    "endless": ("import time; time.sleep(600)", "FAILED: took longer than 10 s"),
+}
+
+
+def ran(*words: str) -> subprocess.CompletedProcess[str]:
+    """Python with the package under test, wherever another one is installed."""
+    source = str(Path(laufruhe.__file__).parents[1])
+    own = {**os.environ, "PYTHONPATH": os.pathsep.join([source, str(SCRIPTS)])}
+    return subprocess.run([sys.executable, *words], cwd=SCRIPTS, env=own, capture_output=True, text=True)
 
 
 @pytest.mark.slow
 def test_scripts_can_be_imported():
     names = ", ".join(sorted(path.stem for path in SCRIPTS.glob("*.py")))
-    # of the package under test, wherever another one is installed
-    own = {**os.environ, "PYTHONPATH": str(Path(laufruhe.__file__).parents[1])}
-    words = [sys.executable, "-c", f"import {names}"]
-    done = subprocess.run(words, cwd=SCRIPTS, env=own, capture_output=True, text=True)
+    done = ran("-c", f"import {names}")
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.slow
+def test_a_study_too_small_to_tell_growth_is_refused():
+    """A hundredth of four scenes was none, and its study failed after minutes."""
+    done = ran("bench_cluster.py", "--solves", "4")
+    assert done.returncode == 2
+    assert "4 is too few" in done.stderr
+
+
+@pytest.mark.slow
+def test_one_after_the_other_whatever_becomes_of_them(tmp_path: Path):
+    """What fails or takes too long is told, and those after it are run."""
+    for name, (text, _) in SHORT.items():
+        (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
+    scripts = {name: tmp_path / f"{name}.py" for name in SHORT}
+    program = "import every, sys; from pathlib import Path; every.SCRIPTS = {}; sys.exit(every.main())"
+    paths = {name: str(path) for name, path in scripts.items()}
+    given = program.format("{n: Path(p) for n, p in " + repr(paths) + ".items()}")
+    done = ran("-c", given, "--limit", "10")
+    lines = done.stdout.splitlines()
+    assert done.returncode == 1, done.stderr
+    for k, (name, (_, told)) in enumerate(SHORT.items(), 1):
+        (line,) = [line for line in lines if line.startswith(f"[{k}/{len(SHORT)}] {name} ... ")]
+        assert told in line
+    assert "no room" in lines
+    assert lines[-1].endswith("; 2 failed")

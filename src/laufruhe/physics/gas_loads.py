@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Hashable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
@@ -46,12 +46,22 @@ def gas_coefficients(gas: GasModel, part: SliderCrank, cycle: Cycle, fidelity: F
 
     A cylinder that fires at phi_k has these coefficients times e^{-i h phi_k}.
     """
-    return fidelity.kept_of_gas(_one_cylinder(gas, part, cycle, fidelity.gas_steps))
+    driven = _Driven((type(part), alike_under(gas, part), part.shaft.ratio), part)
+    return fidelity.kept_of_gas(_one_cylinder(gas, driven, cycle, fidelity.gas_steps))
+
+
+@dataclass(frozen=True)
+class _Driven:
+    """A cylinder as the gas knows it: equal whatever it weighs, wherever it stands, whenever it fires."""
+
+    alike: Hashable
+    part: SliderCrank = field(compare=False)
 
 
 @lru_cache(maxsize=64)
-def _one_cylinder(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> Spectrum:
+def _one_cylinder(gas: GasModel, driven: _Driven, cycle: Cycle, samples: int) -> Spectrum:
     """The same at every speed, its corners taken out before the transform (L5a)."""
+    part = driven.part
     found = bent_spectrum(
         lambda angles: _torque_at(gas, part, cycle, angles),
         samples,

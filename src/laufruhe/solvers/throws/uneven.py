@@ -48,6 +48,8 @@ SOFT_LIMIT = 1e-7
 SOFTEST = 1e-6
 # share by which two ends of a search are one optimum
 SAME = 1e-6
+# angle that tells two cranks apart in a ranking [rad]
+SHOWN = 1e-4
 # how often limits are tightened that the best design breaks, by what share of its excess, and up to which
 _ATTEMPTS, _TIGHTENED, _MOST_TIGHTENED = 3, 1.2, 0.2
 TRADE_STEPS = (0.0, 0.125, 0.25, 0.5, 0.75, 1.0)
@@ -260,6 +262,23 @@ def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[fl
     return steady_bound(problem), "the steady part of the loads"
 
 
+def _different(found: Sequence[StarDesign]) -> list[StarDesign]:
+    """Of designs, best first, those that are no better one again: several starts may lead to one optimum."""
+    kept: list[StarDesign] = []
+    for design in found:
+        if not any(_is_again(design.candidate, other.candidate) for other in kept):
+            kept.append(design)
+    return kept
+
+
+def _is_again(one: Candidate, other: Candidate) -> bool:
+    """Whether cranks are built and fire alike, with no throw farther apart than is shown."""
+    if replace(one, throws=other.throws, bank_angle=other.bank_angle, split_pin=other.split_pin) != other:
+        return False
+    first, second = ((*each.throws, each.bank_angle or 0.0, each.split_pin or 0.0) for each in (one, other))
+    return bool(np.abs(np.angle(np.exp(1j * np.subtract(first, second)))).max() < SHOWN)
+
+
 def _result(
     problem: Problem, phasing: Phasing, even: Result | None, found: Sequence[StarDesign],
     trade: tuple[TradePoint, ...], bound: float, source: str,
@@ -272,7 +291,7 @@ def _result(
     )
     ranking = [
         ranked_star(replace(phasing, firing_order=d.candidate.firing_order), d.candidate, None, d.value, 0.0, False)
-        for d in found
+        for d in _different(found)
     ]
     designs = even.phasing.designs if even is not None and even.phasing is not None else len(found)
     details = ranking_result(phasing, best.candidate, ranking, designs, len(found), method)
