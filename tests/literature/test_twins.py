@@ -19,6 +19,7 @@ from laufruhe.plots.results import twins
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Result
 from problem_files import PROBLEMS, changed, loaded
+from ready import solved
 
 ComplexArray = NDArray[np.complex128]
 
@@ -200,3 +201,27 @@ def test_the_picture_shows_the_firings_and_both_parts() -> None:
     titles = {axes.get_title(loc="left") for axes in drawn.axes}
     assert {"primary force", "secondary force", "primary couple", "secondary couple"} <= titles
     assert twins.applies(_solved("boxer"))
+
+
+def _words(name: str) -> str:
+    drawn = twins.figure(solved(name))
+    return " ".join([*(text.get_text() for text in drawn.texts), *(axes.get_title(loc="left") for axes in drawn.axes)])
+
+
+@pytest.mark.slow
+def test_the_picture_names_the_cranks_of_parallel_twins_alone() -> None:
+    """A vee on one pin has the throws of a parallel-360 and the crank of none."""
+    assert "; crank parallel-270." in _words("twin-parallel-270")
+    assert "parallel" not in _words("twin-vee-open")
+
+
+@pytest.mark.slow
+def test_the_picture_says_of_no_steam_engine_that_it_fires() -> None:
+    words = _words("steam-two-crank")
+    assert "iring" not in words
+    assert "Dead centres at the head end, and what turns" in words
+
+
+@pytest.mark.slow
+def test_nothing_left_is_no_picture() -> None:
+    assert not twins.applies(solved("rotary-two"))

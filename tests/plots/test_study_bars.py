@@ -50,3 +50,22 @@ def test_values_that_grow_by_a_factor_stand_on_a_logarithmic_axis(speeds: list[f
     assert axes.get_xscale() == scale
     ticks = [float(label.get_text().replace("−", "-")) for label in axes.get_xticklabels() if label.get_text()]
     assert sum(speeds[0] <= tick <= speeds[-1] for tick in ticks) >= 2
+
+
+@pytest.mark.parametrize(
+    ("cases", "speeds", "at", "words"),
+    [
+        (["a", "b"], {}, "equal cylinders", "Engines of equal cylinders."),
+        (["a", "b"], {}, "the power of 4 cylinders", "At the power of 4 cylinders."),
+        (["a", "b"], {"speed": [1.0, 2.0]}, "equal cylinders", "Every point: proven optimum."),
+        (["a", "a"], {"speed": [1.0, 2.0]}, "equal cylinders", "Every point: proven optimum."),
+        (["a", "b"], {"speed": [1.0, 2.0]}, "the power of 4 cylinders",
+         "At the power of 4 cylinders. Every point: proven optimum."),
+    ],
+)  # fmt: skip
+def test_a_sweep_says_what_its_points_are(
+    cases: list[str], speeds: dict[str, list[object]], at: str, words: str
+) -> None:
+    """And not that its engines have equal cylinders, which says nothing of one engine with two limits."""
+    data = part([2.0, 1.0], ["global"] * 2, **speeds).assign_coords(case=("point", cases)).assign_attrs(at=at)
+    assert KINDS["layout comparison"].picture(data).words == words

@@ -16,8 +16,10 @@ from laufruhe.report.grid import Grid, escaped, unmarked
 from laufruhe.report.result_report import result_document
 from laufruhe.report.screen import show, show_document
 from laufruhe.report.sections import tables_of
+from laufruhe.report.study_report import told
 from laufruhe.report.wording import explained, headline, why_star
 from laufruhe.solvers import Result
+from laufruhe.studies.text import Rows
 from ready import solved
 
 _OPEN_FACTOR = """
@@ -176,6 +178,16 @@ def test_a_marked_table_has_no_marks_on_the_screen() -> None:
         Grid("", ("problem", "take"), [("[single](single.md)", "`two-order`")], left=2, marked=True),
     )
     text = "\n".join(document_on(80, *blocks))
-    for told in ("Take auto of this\n", "a * b * c\n", "- auto is safe", "single    two-order"):
-        assert told in text
+    for line in ("Take auto of this\n", "a * b * c\n", "- auto is safe", "single    two-order"):
+        assert line in text
     assert unmarked(escaped("a_b [c](d) *e* `f`")) == "a_b [c](d) *e* `f`"
+
+
+def test_numbers_of_a_study_stand_below_each_other() -> None:
+    rows = Rows(["case", "speed", "force [N]", "change", "proof"], [
+        ["one", "6", "704.88", "–", "as given"], ["**one**", "**8**", "**1.2e-05**", "**-14.4 %**", "**proven**"],
+    ])  # fmt: skip
+    (grid,) = told(rows)
+    assert isinstance(grid, Grid)
+    assert grid.texts == {0, 4}
+    assert "| --- | ---: | ---: | ---: | --- |" in grid.as_markdown()

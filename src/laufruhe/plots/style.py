@@ -158,7 +158,7 @@ def _moved(figure: Figure, size: tuple[float, float], by: tuple[float, float]) -
 def headed(drawn: Page, result: Result, title: str, lines: str, legend: Sequence[Artist], note: str = "") -> Figure:
     """The page of a result, finished; the note says what it leaves out."""
     problem = result.problem
-    described = f"Engine: {problem.source}. " if problem.source else ""
+    described = f"Source: {problem.source}. " if problem.source else ""
     source = f"{note}{described}Computed with Laufruhe, {problem.fidelity.summary}."
     heading(drawn.figure, title, lines, legend, source, problem.title)
     return drawn.figure

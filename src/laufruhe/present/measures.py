@@ -120,6 +120,13 @@ def has_firing(result: Result) -> bool:
     return not any(isinstance(point.gas, Chambers) for point in result.problem.points)
 
 
+def firing_words(result: Result) -> tuple[str, str]:
+    """What is marked over a cycle, of all cylinders and of one."""
+    if has_firing(result):
+        return "firings", "a cylinder fires"
+    return "dead centres at the head end", "a dead centre at the head end"
+
+
 def has_loads(result: Result) -> bool:
     """Whether there are loads to draw: on a resonance they are infinite."""
     return bool(result.problem.points) and not load_designs(result)[-1].resonance

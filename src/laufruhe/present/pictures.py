@@ -4,7 +4,7 @@ PICTURES = {
     "engine": "The engine to scale, from the front and from beside; what is open is marked.",
     "star": "The best crank stars, from the front and from the side.",
     "firings": "Firing orders of the best stars over one working cycle.",
-    "twins": "When a twin fires, and what turns forward and backward of its first and second order.",
+    "twins": "When the cylinders of a twin work, and what turns forward and backward of its first and second order.",
     "polar": "Force on each mount over one cycle: the path of its tip, or a force along one line over the crank angle.",
     "cycle": "Shaking force, moments, and the force on every mount over the crank angle of one cycle.",
     "bars": "Mean and maximum of each mount's force over one cycle.",

@@ -4,21 +4,29 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
+import numpy as np
+
 from laufruhe.machine import Engine
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.wrench import turning_parts
-from laufruhe.present.measures import has_loads
+from laufruhe.present.measures import hardest_point, has_loads
 from laufruhe.solvers.result import Result
 
 ORDERS = {1: "primary", 2: "secondary"}
 KINDS = {"force": ((1, 2), "N"), "couple": ((4, 5), "N m")}
 """Lateral and vertical columns of the wrench, and unit."""
+NEXT_TO_NOTHING = 1e-6
 Parts: TypeAlias = dict[tuple[str, int], tuple[complex, complex]]
 
 
 def is_twin(result: Result) -> bool:
-    """Whether two cylinders fire, and the loads are known."""
-    return len(result.final.engine.cylinders) == 2 and has_loads(result)
+    """Whether there are two cylinders, and something of these orders is left of their loads."""
+    engine = result.final.engine
+    if len(engine.cylinders) != 2 or not has_loads(result):
+        return False
+    k = hardest_point(result)
+    given, left = (abs(np.array([*parts_of(result, each, k).values()])) for each in (result.initial.engine, engine))
+    return bool(left.max() > NEXT_TO_NOTHING * max(given.max(), left.max()))
 
 
 def parts_of(result: Result, engine: Engine, k: int) -> Parts:

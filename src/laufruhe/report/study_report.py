@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import xarray as xr
 
 from laufruhe.report import files
 from laufruhe.report.document import Block, Bullets, Document, Heading, Illustration, Paragraph
-from laufruhe.report.grid import Grid
+from laufruhe.report.grid import Grid, unmarked
 from laufruhe.report.sheet import Sheet
 from laufruhe.report.strict_json import strict
 from laufruhe.report.web_page import as_html
@@ -19,7 +20,9 @@ from laufruhe.studies.part import Part
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.replication.judging import counted
-from laufruhe.studies.text import Rows, Text
+from laufruhe.studies.text import NOTHING, Rows, Text
+
+_NUMBER = re.compile(rf"[-+−]?\d[\d.,]*(e[-+]?\d+)?( %)?|{NOTHING}|")
 
 
 def file_names(study: StudyFile) -> list[str]:
@@ -106,7 +109,8 @@ def told(text: Text) -> Iterator[Block]:
     if not isinstance(text, Rows):
         yield Paragraph(text, marked=True)
         return
-    yield Grid("", text.head, text.rows, left=len(text.head), marked=True)
+    words = [k for k in range(len(text.head)) if not all(_NUMBER.fullmatch(unmarked(row[k])) for row in text.rows)]
+    yield Grid("", text.head, text.rows, left=words, marked=True)
     rest = text.whole - len(text.rows)
     if rest > 0:
         yield Paragraph(f"{rest} more rows are in the CSV file.")

@@ -18,7 +18,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.plots.style import Series, entry, headed, page, series_of, styled
 from laufruhe.plots.words import FAINT, INK, aligned, empty, fitted, in_thousands, left_out, round_ticks, width_of
-from laufruhe.present.measures import hardest_point, has_firing, has_loads
+from laufruhe.present.measures import firing_words, hardest_point, has_loads
 from laufruhe.problem.evaluation import over
 from laufruhe.solvers.result import Result
 
@@ -86,10 +86,8 @@ def figure(result: Result) -> Figure:
     what = "Loads on the block and forces on the mounts" if mounts else "Loads on the block"
     largest = [max(row, key=lambda each: each.ends[1]) for row in balanced]
     none = f" Not shown: {', '.join(f'{row.label} ({row.left_out})' for row in largest)}." if balanced else ""
-    marked, mark = ("the cylinders that fire", "a cylinder fires")
-    if not has_firing(result):
-        marked, mark = "the cylinders whose dead centre at the head end it is", "a dead centre at the head end"
-    lines = f"{what}{at}; above, {marked}.{none}"
+    firings, mark = firing_words(result)
+    lines = f"{what}{at}; above, the {firings} by cylinder.{none}"
     firing = entry(mark, color=FAINT, linewidth=0.8, linestyle=STYLES[2])
     legend = [*(one.entry() for one in series), firing]
     return headed(

@@ -38,7 +38,10 @@ def figure(result: Result) -> Figure:
         end.set_title(_title(result, star, k), loc="left", size=10, parse_math=False)
         along.set_title(_balance(star), loc="left", size=SMALL, color=FAINT, parse_math=False)
     legend = [entry("best star", color=AFTER, marker="o"), entry("next in the ranking", color=BEFORE, marker="o")]
-    lines = "From the front, turning clockwise; and from the left: full pins point to you, crossed ones away."
+    lines = (
+        "From the front, turning clockwise; and from the left: full pins point to you, crossed ones away. "
+        "Free forces over that of one throw, couples over that times the spacing of throws."
+    )
     return headed(drawn, result, "Crank stars", lines, legend[: min(len(stars), 2)])
 
 

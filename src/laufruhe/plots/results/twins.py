@@ -10,10 +10,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from laufruhe.machine import Engine
 from laufruhe.machine.crank_names import name_of_crank
 from laufruhe.plots.style import BLUE, VERMILION, entry, headed, page, point_name, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, UNSEEN
-from laufruhe.present.measures import hardest_point
+from laufruhe.present.measures import firing_words, hardest_point
 from laufruhe.present.numbers import figure as told
 from laufruhe.present.twins import KINDS, ORDERS, Parts, is_twin, parts_of
 from laufruhe.solvers.result import Result
@@ -46,9 +47,16 @@ def figure(result: Result) -> Figure:
         entry("turns against it", color=BACKWARD, linewidth=1.4, linestyle=(0, (4, 1.6))),
         entry("both together", color=INK, linewidth=2.0),
     ]
-    crank = name_of_crank([part.throw for part in engine.slider_cranks])
-    lines = f"At {point_name(result, k)}, seen from the front{f'; crank {crank}' if crank else ''}."
-    return headed(drawn, result, "Firings, and what turns forward and backward", lines, legend)
+    lines = f"At {point_name(result, k)}, seen from the front{_crank(engine)}."
+    title = f"{firing_words(result)[0].capitalize()}, and what turns forward and backward"
+    return headed(drawn, result, title, lines, legend)
+
+
+def _crank(engine: Engine) -> str:
+    """The name that the crank of a parallel twin has."""
+    parts = engine.slider_cranks
+    name = name_of_crank([part.throw for part in parts]) if len({part.bank for part in parts}) == 1 else ""
+    return f"; crank {name}" if name else ""
 
 
 def _sizes(parts: Parts, kind: str) -> float:
@@ -76,7 +84,7 @@ def _firings(axes: Axes, result: Result) -> None:
         axes.text(middle % whole, 0.5, f"{following - angle:.3g}°", ha="center", va="center", size=SMALL, color=FAINT)
     axes.set(xlim=(-0.06 * whole, 1.06 * whole), ylim=(0.0, 1.6), xlabel="crank angle [deg]", yticks=[])
     axes.set_xticks(np.linspace(0.0, whole, 5))
-    axes.set_title("firings", loc="left", size=9)
+    axes.set_title(firing_words(result)[0], loc="left", size=9)
 
 
 def _circles(axes: Axes, forward: complex, backward: complex, largest: float, unit: str) -> None:

@@ -29,6 +29,7 @@ from laufruhe.studies.swept_shown import MOST_ROWS, bars, by_point, claimed, ove
 from laufruhe.studies.text import NOTHING, Rows, Text, number
 from laufruhe.units import readable
 
+EQUAL = "equal cylinders"
 _SAME, _NOTHING, _FIGURES = 1e-9, 1e-7, 1e-5
 _LEAST_FLYWHEEL = "least flywheel"
 
@@ -102,7 +103,7 @@ class LayoutComparison(SweptPart):
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """As of every sweep, with the size that engines are compared at."""
         power = self.cases[0].equal_power_to
-        at = "equal cylinders" if power is None else f"the power of {power} cylinders"
+        at = EQUAL if power is None else f"the power of {power} cylinders"
         found = super().dataset(points, records).assign_attrs(at=at)
         names = list(dict.fromkeys(name for record in records for name in record["further"]))
         if not names:
@@ -128,16 +129,13 @@ class LayoutComparison(SweptPart):
     @staticmethod
     def picture(data: xr.Dataset) -> Picture:
         """Bars of every engine as given and at its optimum; lines where something is swept."""
-        at = data.attrs["at"]
-        words = f"Engines of {at}." if at == "equal cylinders" else f"At {at}."
-        if "further" in data and not swept_names(data):
-            return side_by_side(data, words)
-        if not swept_names(data):
-            return bars(data, data["case"].values, words)
-        if len(set(data["case"].values.tolist())) == 1:
+        at, alike = data.attrs["at"], data.attrs["at"] == EQUAL
+        if swept_names(data):
             decided = (data["proof"].values != "as given").any()
             words = f"Every point: {claimed(data)}." if decided else "As given."
-        return over_sweep(data, [], words)
+            return over_sweep(data, [], words if alike else f"At {at}. {words}")
+        words = f"Engines of {at}." if alike else f"At {at}."
+        return side_by_side(data, words) if "further" in data else bars(data, data["case"].values, words)
 
 
 def _value(measure: Measure | InputError, design: Evaluation) -> float:
