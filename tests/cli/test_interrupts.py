@@ -67,7 +67,8 @@ def test_a_signal_to_the_whole_group_is_an_interrupt(number: signal.Signals, tmp
     assert {entry.name for entry in tmp_path.rglob("*")} == {"scene.toml"}
 
 
-# before anything is told to be loaded, before the command is known, while pydantic makes something else of it
+# before anything is told to be loaded, while signals are held, before the command is known, while pydantic makes
+# something else of it
 EARLY = {
     "loading": """
 import builtins
@@ -77,6 +78,10 @@ def stop(name, *rest):
         raise KeyboardInterrupt
     return here(name, *rest)
 builtins.__import__ = stop
+""",
+    "held": """
+import os, signal, laufruhe.cli.supervised as own
+own.end_with_parent = lambda _: os.kill(os.getpid(), signal.SIGINT)
 """,
     "typed": """
 import os, signal, typer.main

@@ -31,7 +31,7 @@ from laufruhe.cli.screen import (
     progress,
     spoken,
 )
-from laufruhe.cli.supervised import is_interrupted, supervised
+from laufruhe.cli.supervised import is_interrupted, listen, supervised
 from laufruhe.errors import refused
 from laufruhe.numerics.cores import ONE_THREAD
 
@@ -315,6 +315,7 @@ def main() -> None:
 
 def _run() -> NoReturn:
     try:
+        listen()
         app()
     except SystemExit as end:
         _leave(end.code if isinstance(end.code, int) else DONE)

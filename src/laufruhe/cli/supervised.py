@@ -21,7 +21,10 @@ _HANDED_ON = (signal.SIGINT, signal.SIGTERM, *((signal.SIGHUP,) if hasattr(signa
 
 
 def supervised(work: Callable[[], NoReturn]) -> NoReturn:
-    """Do work that ends its process, where the system can in another one that is watched over."""
+    """Do work that ends its process, where the system can in another one that is watched over.
+
+    Signals are held there until the work says `listen`, where it minds what they raise.
+    """
     if not hasattr(os, "fork"):
         work()
     watching = os.getpid()
@@ -33,7 +36,6 @@ def supervised(work: Callable[[], NoReturn]) -> NoReturn:
         # a signal to the whole group comes here as well
         for number in _HANDED_ON:
             signal.signal(number, _interrupted)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _HANDED_ON)
         work()
     ended_here = False
 
@@ -52,11 +54,17 @@ def supervised(work: Callable[[], NoReturn]) -> NoReturn:
     for number in _HANDED_ON:
         signal.signal(number, interrupt)
     signal.signal(signal.SIGALRM, end)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, _HANDED_ON)
+    listen()
     _, status = os.waitpid(child, 0)
     if not os.WIFEXITED(status):
         sys.stderr.write("laufruhe: interrupted\n" if ended_here else _sudden(os.WTERMSIG(status)))
     os._exit(os.WEXITSTATUS(status) if os.WIFEXITED(status) else INTERRUPTED if ended_here else FAILED)
+
+
+def listen() -> None:
+    """Hear what asks this process to end, from here on and since it was begun."""
+    if hasattr(signal, "pthread_sigmask"):
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _HANDED_ON)
 
 
 def _sudden(number: int) -> str:
