@@ -19,10 +19,15 @@ if TYPE_CHECKING:
 
     from laufruhe.machine import Engine, OperatingPoint
     from laufruhe.problem.problem import Problem
+    from laufruhe.report.saved_result import SavedResult
     from laufruhe.solvers.result import Result
 
 # loaded when they are asked for: import laufruhe is quick
-_CLASSES = {"Problem": "laufruhe.problem.problem", "Result": "laufruhe.solvers.result"}
+_CLASSES = {
+    "Problem": "laufruhe.problem.problem",
+    "Result": "laufruhe.solvers.result",
+    "SavedResult": "laufruhe.report.saved_result",
+}
 
 __version__ = "0.3.0"
 __all__ = [
@@ -31,10 +36,12 @@ __all__ = [
     "ModelError",
     "Problem",
     "Result",
+    "SavedResult",
     "SolverError",
     "__version__",
     "evaluate",
     "load",
+    "read_result",
     "solve",
     "study",
 ]
@@ -147,6 +154,24 @@ def _of_engine(design: Engine, points: Sequence[OperatingPoint]) -> Problem:
     channel = channels.MOUNT_FORCE if design.mounts else channels.SHAKING_FORCE
     wanted = (Term(Measure(channel)),)
     return Problem(design.name, design.name, design, tuple(points), objective=wanted)
+
+
+def read_result(path: str | Path) -> SavedResult:
+    """Read the `result.json` of `laufruhe solve` or `evaluate` back.
+
+    Parameters
+    ----------
+    path
+        Of the file, or of the folder of results that holds it.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is no such file.
+    """
+    from laufruhe.report.saved_result import read_result as read
+
+    return read(path)
 
 
 def study(source: Source, jobs: int = 1) -> dict[str, xr.Dataset]:

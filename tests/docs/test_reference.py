@@ -13,6 +13,7 @@ import pytest
 import laufruhe
 from laufruhe.files.ready import copies
 from laufruhe.problem.problem import Problem
+from laufruhe.report.saved_result import SavedResult
 from laufruhe.solvers.result import Result
 
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "python.md"
@@ -28,7 +29,7 @@ def test_answers_are_those_of_the_page(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_classes_are_named_without_loading_them() -> None:
-    assert (laufruhe.Problem, laufruhe.Result) == (Problem, Result)
+    assert (laufruhe.Problem, laufruhe.Result, laufruhe.SavedResult) == (Problem, Result, SavedResult)
     assert dir(laufruhe) == sorted(laufruhe.__all__)
     with pytest.raises(AttributeError, match="no attribute 'Reslt'"):
         laufruhe.Reslt  # type: ignore[attr-defined]  # noqa: B018

@@ -22,7 +22,8 @@ from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import Shown, concluded, judged
 from laufruhe.solvers.cones.equal_designs import FREE, free_decisions
-from laufruhe.solvers.result import Result, Status, meaningful
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.values import meaningful
 from problem_files import PROBLEMS
 
 ENGINE = {

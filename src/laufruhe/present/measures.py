@@ -18,8 +18,9 @@ from laufruhe.problem.evaluation import Evaluation, samples_of
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import limit_values
-from laufruhe.solvers.result import LimitValue, Result
+from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import PhasingResult
+from laufruhe.solvers.values import LimitValue
 
 
 @dataclass(frozen=True)

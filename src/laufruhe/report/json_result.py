@@ -27,8 +27,9 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
 from laufruhe.report.wording import why_star
-from laufruhe.solvers.result import Nearest, ObjectiveValue, Reached, Result
+from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import RankedStar
+from laufruhe.solvers.values import Nearest, ObjectiveValue, Reached
 
 Record = dict[str, Any]
 

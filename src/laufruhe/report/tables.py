@@ -26,7 +26,8 @@ from laufruhe.report.grid import Grid
 from laufruhe.report.sections import tables_of as printed_tables
 from laufruhe.report.sheet import Sheet, Sheets
 from laufruhe.report.workbook import write_book
-from laufruhe.solvers.result import DecisionValue, LimitValue, Result
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.values import DecisionValue, LimitValue
 
 MOST_ROWS = 20 * STEPS
 MANY = 5_000

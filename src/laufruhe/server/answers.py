@@ -34,7 +34,8 @@ from laufruhe.server.scenes import Scene, key_of, scene_of
 from laufruhe.solvers import kinds_of, solve
 from laufruhe.solvers.conclusion import decision_values, limit_values
 from laufruhe.solvers.following import Followed
-from laufruhe.solvers.result import LimitValue, Result
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.values import LimitValue
 from laufruhe.units import readable
 
 P = ParamSpec("P")

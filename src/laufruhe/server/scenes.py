@@ -22,7 +22,8 @@ from laufruhe.server.front import partners
 from laufruhe.solvers import kinds_of
 from laufruhe.solvers.conclusion import decision_values, limit_values
 from laufruhe.solvers.following import Followed, Follower, can_follow
-from laufruhe.solvers.result import LimitValue, ObjectiveValue, Result, Status
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.values import LimitValue, ObjectiveValue
 
 _KEPT = 6
 

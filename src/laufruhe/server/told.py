@@ -11,7 +11,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.report.strict_json import finite
 from laufruhe.solvers.conclusion import decision_values
-from laufruhe.solvers.result import LimitValue
+from laufruhe.solvers.values import LimitValue
 
 
 def as_text(found: dict[str, Any]) -> str:

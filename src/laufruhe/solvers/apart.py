@@ -18,7 +18,8 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import STRENGTH, Certificate, Proof
 from laufruhe.solvers.accuracy import largest_error
 from laufruhe.solvers.conclusion import none_within
-from laufruhe.solvers.result import ObjectiveValue, Result, Status
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.values import ObjectiveValue
 
 Solve = Callable[[Problem], Result]
 Kinds = frozenset[Kind]

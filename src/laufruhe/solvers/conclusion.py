@@ -22,15 +22,9 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, Reach, certified
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.result import (
-    DecisionValue,
-    LimitValue,
-    Nearest,
-    ObjectiveValue,
-    Result,
-    Status,
-)
+from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import none_of_given
+from laufruhe.solvers.values import DecisionValue, LimitValue, Nearest, ObjectiveValue
 
 FEASIBLE = 1e-6
 """Relative excess over a limit that counts as none."""

@@ -23,7 +23,8 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import STRENGTH, Certificate, Proof, Reach, certified
 from laufruhe.solvers.accuracy import largest_error
 from laufruhe.solvers.cones.equal_designs import equal_designs
-from laufruhe.solvers.result import DecisionRange, ObjectiveValue, RankValue, Result, Status
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.values import DecisionRange, ObjectiveValue, RankValue
 
 Solve = Callable[[Problem], Result]
 CLOSE, SAMPLED = 1e-9, 1e-5

@@ -32,7 +32,8 @@ from laufruhe.solvers.conclusion import (
     quoted,
 )
 from laufruhe.solvers.conflicts import smallest_conflict
-from laufruhe.solvers.result import Nearest, ObjectiveValue, Reached, Result, Status
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.values import Nearest, ObjectiveValue, Reached
 
 Solve = Callable[[Problem], Result]
 LEAST_SECONDS = 10.0

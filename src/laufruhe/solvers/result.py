@@ -4,31 +4,37 @@ from __future__ import annotations
 
 import html
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from functools import cached_property
-from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from laufruhe.errors import ModelError
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
-from laufruhe.problem.evaluation import Evaluation, objective_value
+from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Side
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Certificate, Proof
+from laufruhe.prove.certificate import Certificate
 from laufruhe.solvers.stars.ranking import PhasingResult
 from laufruhe.solvers.tolerances.assembly_result import AssemblyResult
 from laufruhe.solvers.tolerances.result import RobustResult
+from laufruhe.solvers.values import (
+    DecisionRange,
+    DecisionValue,
+    LimitValue,
+    Nearest,
+    ObjectiveValue,
+    RankValue,
+    Reached,
+    meaningful,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
 AS_GIVEN, AS_DECIDED = "as given", "as decided"
-NEXT_TO_NOTHING = 1e-5
-APART = 0.05
-"""Share of the largest decision by which two designs differ."""
 
 
 class Status(StrEnum):
@@ -45,192 +51,50 @@ class Status(StrEnum):
         return self in (Status.OPTIMAL, Status.FEASIBLE)
 
 
-@dataclass(frozen=True)
-class DecisionValue:
-    """One open number and what was decided of it [SI].
+class Told:
+    """What a result says of its design, whether it was solved now or read back."""
 
-    Attributes
-    ----------
-    shadow_price
-        Fall of the objective per unit by which the bound it stands at is moved.
-    """
-
-    name: str
-    value: float
-    unit: str
-    lower: float
-    upper: float
-    initial: float
-    at_bound: bool
-    shadow_price: float = 0.0
-
-    @property
-    def is_nothing(self) -> bool:
-        """Whether its size is a rounding of what it may be."""
-        return abs(self.value) <= NEXT_TO_NOTHING * max(abs(self.lower), abs(self.upper))
-
-
-def meaningful(decisions: Sequence[DecisionValue]) -> list[DecisionValue]:
-    """Without angles of sizes that are none."""
-    pairs = pairwise([None, *decisions])
-    return [d for size, d in pairs if d is not None and not (d.name.endswith(".angle") and size and size.is_nothing)]
-
-
-@dataclass(frozen=True)
-class DecisionRange:
-    """Least and largest value of a decision among designs that an objective does not tell apart [SI]."""
-
-    name: str
-    unit: str
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class RankValue:
-    """One of several objectives in order [SI].
-
-    Attributes
-    ----------
-    least, lower_bound, gap, proof
-        What was found under the limits of those before it, and how good that is.
-    initial, final
-        Of the design as given, and of that of the last rank.
-    limit
-        What those after it may make of it; None of the last.
-    price
-        Fall of the last objective per unit by which this one may be exceeded.
-    designs
-        Ends of every decision among the designs that are best by this one and those before it.
-    """
-
-    name: str
-    unit: str
-    initial: float
-    least: float
-    lower_bound: float
-    gap: float
-    proof: Proof
-    final: float
-    limit: float | None
-    price: float
-    designs: tuple[DecisionRange, ...] = ()
-
-    @property
-    def equal(self) -> tuple[DecisionRange, ...]:
-        """Decisions whose ends are two designs, and not what the solver's tolerance leaves of one."""
-        most = {found.unit: max(abs(d.high) for d in self.designs if d.unit == found.unit) for found in self.designs}
-        return tuple(found for found in self.designs if found.high - found.low > APART * most[found.unit])
-
-
-@dataclass(frozen=True)
-class LimitValue:
-    """One limit and how the design stands to it [SI].
-
-    Attributes
-    ----------
-    shadow_price
-        Fall of the objective per unit by which the limit is relaxed; not a number where that is not known.
-    side
-        "at most" or "at least".
-    error_estimate
-        What samples over the cycle may have missed of the value, relative, not exceeded.
-    """
-
-    name: str
-    value: float
-    limit: float
-    unit: str
-    active: bool
-    shadow_price: float
-    side: str = "at most"
-    error_estimate: float = 0.0
-
-
-@dataclass(frozen=True)
-class Reached:
-    """What a limit that no design keeps could be met by while the other limits hold [SI].
-
-    Attributes
-    ----------
-    side, limit
-        "at most" or "at least", and what was asked for.
-    value
-        Of the design found that comes nearest, or of every one; not a number where none is told.
-    bound
-        What no design that keeps the other limits goes beyond; not a number where that is not known.
-    proof
-        Of the value.
-    decisions
-        Of that design.
-    why, ended
-        Why no design is told, and whether the search for one was ended for want of time.
-    """
-
-    name: str
-    side: str
-    limit: float
-    unit: str
-    value: float = math.nan
-    bound: float = math.nan
-    proof: Proof = Proof.NONE
-    decisions: tuple[DecisionValue, ...] = ()
-    why: str = ""
-    ended: bool = False
-
-
-@dataclass(frozen=True)
-class Nearest:
-    """The design found that breaks limits least, which is no answer: the limit that it breaks most, and how [SI].
-
-    Attributes
-    ----------
-    value, excess
-        Of the measure that is limited, and the share by which it is beyond the limit.
-    broken
-        Names of all limits that it breaks.
-    """
-
-    name: str
-    side: str
-    limit: float
-    unit: str
-    value: float
-    excess: float
-    broken: tuple[str, ...]
+    status: Status
+    objective: ObjectiveValue | None
+    certificate: Certificate | None
     decisions: tuple[DecisionValue, ...]
-
-
-@dataclass(frozen=True)
-class ObjectiveValue:
-    """The objective of the design and of the one given, which is infinite where that stands on a resonance."""
-
-    name: str
-    value: float
-    unit: str
-    initial: float
-
-    @classmethod
-    def of(cls, problem: Problem, value: float, initial: float) -> ObjectiveValue:
-        """What a problem minimises, of a design and of the one given [SI]."""
-        return cls(problem.objective_name, value, problem.objective_unit or "", initial)
-
-    @classmethod
-    def given(cls, problem: Problem, design: Evaluation) -> ObjectiveValue | None:
-        """Of a design that is the one given; None where nothing is minimised."""
-        value = objective_value(problem, design)
-        return cls.of(problem, value, value) if problem.objective else None
+    limits: tuple[LimitValue, ...]
+    message: str
+    conflict: tuple[str, ...]
 
     @property
-    def reduction(self) -> float:
-        """Share by which the initial value fell; not a number where that is infinite."""
-        if math.isinf(self.initial):
-            return math.nan
-        return 1.0 - self.value / self.initial if self.initial else 0.0
+    def name(self) -> str:
+        """Of the problem: that of its file without the ending."""
+        raise NotImplementedError
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """What was decided: a row a decision, in SI [pandas]."""
+        import pandas as pd
+
+        names = [field.name for field in fields(DecisionValue)]
+        rows = [[getattr(d, name) for name in names] for d in self.decisions]
+        return pd.DataFrame(rows, columns=names).set_index("name")
+
+    def __repr__(self) -> str:
+        lines = [f"<{type(self).__name__} {self.name}: {self.status}"]
+        if self.objective is not None:
+            o = self.objective
+            given = f"{o.initial:.6g} {o.unit}".rstrip() if math.isfinite(o.initial) else "on a resonance"
+            lines.append(f"  {o.name} {f'{o.value:.6g} {o.unit}'.rstrip()} (as given {given})")
+        if self.certificate is not None:
+            lines.append(f"  proof {self.certificate.kind}, gap {self.certificate.gap:.1e}")
+        lines += [f"  {d.name} = {d.value:.6g} {d.unit}".rstrip() for d in meaningful(self.decisions)]
+        if self.message:
+            lines.append(f"  {self.message}")
+        return "\n".join(lines) + ">"
+
+    def _repr_html_(self) -> str:
+        lines = [html.escape(line.strip()) for line in repr(self).strip("<>").splitlines()]
+        return f"<strong>{lines[0]}</strong><ul>" + "".join(f"<li>{line}</li>" for line in lines[1:]) + "</ul>"
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Told):
     """A design, what was proven of it, and everything a report shows.
 
     Attributes
@@ -287,6 +151,11 @@ class Result:
     nearest: Nearest | None = None
     free: tuple[DecisionRange, ...] | None = None
 
+    @property
+    def name(self) -> str:
+        """Of the problem."""
+        return self.problem.name
+
     @cached_property
     def error_estimate(self) -> float:
         """Relative error of the objective from sampling the cycle; studies keep none, and do not wait for it."""
@@ -310,14 +179,6 @@ class Result:
         """Natural frequencies, loss and energy of a block on elastic mounts [xarray]; `ModelError` on rigid ones."""
         return modes_of(self.designs).dataset()
 
-    def to_dataframe(self) -> pd.DataFrame:
-        """What was decided: a row a decision, in SI [pandas]."""
-        import pandas as pd
-
-        names = [field.name for field in fields(DecisionValue)]
-        rows = [[getattr(d, name) for name in names] for d in self.decisions]
-        return pd.DataFrame(rows, columns=names).set_index("name")
-
     @property
     def _with_loads(self) -> dict[str, Evaluation]:
         """Designs that have loads: one on an undamped resonance has none."""
@@ -331,20 +192,3 @@ class Result:
         """Shadow prices of the limits, at the sides that the design stands at."""
         pairs = zip(self.problem.limits, self.limits, strict=True)
         return {(limit, shown.side): shown.shadow_price for limit, shown in pairs}
-
-    def __repr__(self) -> str:
-        lines = [f"<Result {self.problem.name}: {self.status}"]
-        if self.objective is not None:
-            o = self.objective
-            given = f"{o.initial:.6g} {o.unit}" if math.isfinite(o.initial) else "on a resonance"
-            lines.append(f"  {o.name} {o.value:.6g} {o.unit} (as given {given})")
-        if self.certificate is not None:
-            lines.append(f"  proof {self.certificate.kind}, gap {self.certificate.gap:.1e}")
-        lines += [f"  {d.name} = {d.value:.6g} {d.unit}".rstrip() for d in meaningful(self.decisions)]
-        if self.message:
-            lines.append(f"  {self.message}")
-        return "\n".join(lines) + ">"
-
-    def _repr_html_(self) -> str:
-        lines = [html.escape(line.strip()) for line in repr(self).strip("<>").splitlines()]
-        return f"<strong>{lines[0]}</strong><ul>" + "".join(f"<li>{line}</li>" for line in lines[1:]) + "</ul>"

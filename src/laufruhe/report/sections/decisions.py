@@ -7,7 +7,8 @@ from itertools import pairwise
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import DASH, figure, in_grams, price_of, trimmed, with_unit
 from laufruhe.report.grid import Grid
-from laufruhe.solvers.result import DecisionValue, Result
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.values import DecisionValue
 from laufruhe.units import readable
 
 HEAD = ("open", "as given", "decided", "bounds", "at bound", "shadow price")

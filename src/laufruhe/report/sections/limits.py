@@ -5,7 +5,8 @@ from __future__ import annotations
 from laufruhe.present.measures import changed, is_met, limits_of, objective_unit
 from laufruhe.present.numbers import number, price_of, with_unit
 from laufruhe.report.grid import Grid
-from laufruhe.solvers.result import LimitValue, Result
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.values import LimitValue
 from laufruhe.units import readable
 
 PRICES = "Shadow price: by how much the objective falls for each unit by which the limit is relaxed."

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from laufruhe.present.numbers import DASH, figure, price_of, trimmed
 from laufruhe.report.grid import Grid
-from laufruhe.solvers.result import RankValue, Result
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.values import RankValue
 from laufruhe.units import readable
 
 HEAD = ("objective", "as given", "least", "proven not under", "proof", "in the design", "price")

@@ -7,7 +7,8 @@ import math
 from laufruhe.present.numbers import DASH, figure, trimmed, with_unit
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.grid import Grid
-from laufruhe.solvers.result import DecisionValue, Nearest, Reached, Result, meaningful
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.values import DecisionValue, Nearest, Reached, meaningful
 
 NOTE = "None of these designs is an answer: each breaks the limit that it is named by."
 

@@ -21,7 +21,8 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, angle_name, judged, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.lightest import distance
-from laufruhe.solvers.result import DecisionRange, Result
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.values import DecisionRange
 
 MOST_OPEN = 16
 """Decisions whose ranges are sought: each takes two programs, or some more where its angle is open."""

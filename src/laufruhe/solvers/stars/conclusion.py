@@ -12,8 +12,9 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Certificate, Proof
-from laufruhe.solvers.result import DecisionValue, ObjectiveValue, Result, Status
+from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import PhasingResult
+from laufruhe.solvers.values import DecisionValue, ObjectiveValue
 
 
 def with_star(

@@ -22,11 +22,12 @@ from laufruhe.prove.certificate import Reach, certified
 from laufruhe.prove.throws.swing import SwingBound
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import broken_limits, quoted, with_limits
-from laufruhe.solvers.result import ObjectiveValue, Result
+from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.conclusion import no_star, with_star
 from laufruhe.solvers.stars.design import solve_fixed
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import ranked_star, ranking_result
+from laufruhe.solvers.values import ObjectiveValue
 
 _AT_ONCE = 512
 

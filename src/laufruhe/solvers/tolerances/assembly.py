@@ -31,9 +31,10 @@ from laufruhe.prove.tolerances.error_parts import Terms
 from laufruhe.prove.tolerances.worst_case import value_at
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import KEPT, limit_values
-from laufruhe.solvers.result import ObjectiveValue, Result, Status
+from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.tolerances.assembly_result import AssemblyResult, Place
 from laufruhe.solvers.tolerances.result import SHARES
+from laufruhe.solvers.values import ObjectiveValue
 
 Chosen = tuple[tuple[int, ...], ...]
 """Of every lot the part in each cylinder."""

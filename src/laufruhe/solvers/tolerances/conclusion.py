@@ -19,9 +19,10 @@ from laufruhe.problem.tolerance import Over, Tolerance
 from laufruhe.prove.certificate import Proof, certified
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, decided, decision_values, limit_values
-from laufruhe.solvers.result import LimitValue, ObjectiveValue, Result, Status
+from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.tolerances.adversaries import Adversary, Found
 from laufruhe.solvers.tolerances.result import CONFIDENCE, SHARE, SHARES, BuiltDesign, PricedTolerance, RobustResult
+from laufruhe.solvers.values import LimitValue, ObjectiveValue
 
 CHECKED, CHECKED_CURVED = 20_000, 400
 """Engines of the second sample: where loads are affine in the errors, and where each is built anew."""

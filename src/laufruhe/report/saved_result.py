@@ -1,0 +1,149 @@
+"""`result.json` read back: what a script knows of a design that was decided before."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias
+
+from pydantic import BaseModel, BeforeValidator, ValidationError
+
+from laufruhe.errors import InputError, refused, wrong_call
+from laufruhe.files.complaints import complaints_of
+from laufruhe.prove.certificate import Certificate, Proof
+from laufruhe.solvers.result import Status, Told
+from laufruhe.solvers.values import DecisionValue, LimitValue, ObjectiveValue
+
+# where JSON has null there is no number
+Number: TypeAlias = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
+
+
+class _Objective(BaseModel):
+    name: str
+    value: Number
+    unit: str
+    initial: Number
+
+
+class _Certificate(BaseModel):
+    kind: Proof
+    lower_bound: Number
+    gap: Number
+    kkt_residual: Number
+    method: str
+
+
+class _Decision(BaseModel):
+    value: float
+    unit: str
+    lower: float
+    upper: float
+    initial: float
+    at_bound: bool
+    shadow_price: Number
+
+
+class _Limit(BaseModel):
+    name: str
+    value: Number
+    limit: float
+    unit: str
+    active: bool
+    shadow_price: Number
+    side: str
+    error_estimate: Number
+
+
+class _File(BaseModel):
+    """Keys of `result.json` that are read by name; those beside them are kept as they are."""
+
+    problem: str
+    title: str
+    status: Status
+    message: str
+    conflict: list[str]
+    objective: _Objective | None
+    certificate: _Certificate
+    decisions: dict[str, _Decision]
+    constraints: list[_Limit]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SavedResult(Told):
+    """A result as its `result.json` has it [SI].
+
+    Attributes
+    ----------
+    problem, title
+        Name of the problem file without its ending, and its title.
+    status, message, conflict, objective, certificate, decisions, limits
+        As of `Result`.
+    record
+        All that the file holds, as plain Python values: mounts, orders, points and more.
+    """
+
+    problem: str
+    title: str
+    status: Status
+    objective: ObjectiveValue | None
+    certificate: Certificate | None
+    decisions: tuple[DecisionValue, ...]
+    limits: tuple[LimitValue, ...]
+    message: str
+    conflict: tuple[str, ...]
+    record: Mapping[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Of the problem."""
+        return self.problem
+
+    @property
+    def values(self) -> dict[str, str]:
+        """What was decided, as a problem file has it; `problem.with_values` takes it."""
+        return {d.name: f"{d.value!r} {d.unit}".rstrip() for d in self.decisions}
+
+
+def read_result(path: str | Path) -> SavedResult:
+    """Read a `result.json`, or the one in a folder of results; `InputError` says what is wrong with it."""
+    if not isinstance(path, str | Path):
+        raise wrong_call("path", path, f"is of type {type(path).__name__}", "give the path of a result.json")
+    place = Path(path)
+    place = place / "result.json" if place.is_dir() else place
+    record = _content(place)
+    try:
+        file = _File.model_validate(record)
+    except ValidationError as error:
+        raise InputError(str(place), complaints_of(error, _File)) from None
+    proof, goal = file.certificate, file.objective
+    return SavedResult(
+        problem=file.problem,
+        title=file.title,
+        status=file.status,
+        # without a design there is no value of one
+        objective=ObjectiveValue(**dict(goal)) if goal is not None and file.status.has_design else None,
+        certificate=Certificate(**dict(proof)) if proof.method else None,
+        decisions=tuple(DecisionValue(name=name, **dict(each)) for name, each in file.decisions.items()),
+        limits=tuple(LimitValue(**dict(each)) for each in file.constraints) if file.status.has_design else (),
+        message=file.message,
+        conflict=tuple(file.conflict),
+        record=record,
+    )
+
+
+def _content(path: Path) -> dict[str, Any]:
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise refused("file", "", "does not exist", "check the path", path) from None
+    except OSError as error:
+        raise refused("file", "", f"cannot be read ({error.strerror})", "check its permissions", path) from None
+    except (ValueError, RecursionError):
+        raise refused("file", "", "is no JSON", "name a result.json of laufruhe solve or evaluate", path) from None
+    if not isinstance(record, dict) or not {"problem", "status"} <= record.keys():
+        rule = "is no result of laufruhe solve or evaluate"
+        raise refused("file", "", rule, "name their result.json, or a folder that holds it", path)
+    return record

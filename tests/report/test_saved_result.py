@@ -1,0 +1,120 @@
+"""`read_result`: what `result.json` was written from is what is read back."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import laufruhe
+from cli import scenes
+from laufruhe.present.measures import limits_of
+from laufruhe.report.json_result import as_json
+from laufruhe.solvers import Result
+from problem_files import PROBLEMS
+from ready import solved
+from report.test_json_result import RESULTS
+
+
+def saved(result: Result, folder: Path, series: bool = False) -> laufruhe.SavedResult:
+    place = folder / "result.json"
+    place.write_text(as_json(result, series), encoding="utf-8")
+    return laufruhe.read_result(place)
+
+
+def fields(thing: object) -> str:
+    """As text: what is no number equals itself there."""
+    return repr(thing)
+
+
+def is_read_back(result: Result, folder: Path) -> None:
+    """Everything that both have is the same, to the last bit."""
+    found = saved(result, folder, series=True)
+    assert (found.name, found.title) == (result.problem.name, result.problem.title)
+    assert (found.status, found.message, found.conflict) == (result.status, result.message, result.conflict)
+    assert fields(found.certificate) == fields(result.certificate)
+    assert fields(found.decisions) == fields(result.decisions)
+    assert fields(found.objective) == fields(result.objective)
+    assert found.to_dataframe().equals(result.to_dataframe())
+    assert repr(found).partition(" ")[2] == repr(result).partition(" ")[2]
+    if result.status.has_design:
+        assert fields(found.limits) == fields(limits_of(result))
+    assert found.record == json.loads(as_json(result, series=True))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", RESULTS)
+def test_a_result_is_read_back(name: str, tmp_path: Path) -> None:
+    is_read_back(RESULTS[name](), tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["vee-eight-open", "inline-five-torsion", "single-three-balances", "selective-assembly"]
+)
+def test_a_ready_problem_is_read_back(name: str, tmp_path: Path) -> None:
+    is_read_back(solved(name), tmp_path)
+
+
+@pytest.mark.slow
+def test_what_was_decided_goes_into_the_problem_again(tmp_path: Path) -> None:
+    result = laufruhe.solve(PROBLEMS / "tractor-single.toml")
+    again = result.problem.with_values(saved(result, tmp_path).values)
+    assert result.objective is not None
+    assert laufruhe.evaluate(again).objective.value == pytest.approx(result.objective.value, rel=1e-5)  # type: ignore[union-attr]
+    assert [d.start for d in again.decisions] == [d.value for d in result.decisions]
+
+
+def test_a_folder_of_results_is_enough(tmp_path: Path) -> None:
+    result = scenes.solved(scenes.TIGHT)
+    assert repr(saved(result, tmp_path)) == repr(laufruhe.read_result(str(tmp_path)))
+
+
+def _without(key: str) -> Callable[[dict[str, Any]], Any]:
+    return lambda record: {name: value for name, value in record.items() if name != key}
+
+
+@pytest.mark.parametrize(
+    ("damaged", "said"),
+    [
+        (lambda _: [1, 2], "file: is no result of laufruhe solve or evaluate; name their result.json"),
+        (lambda _: {"problem": "a", "rows": []}, "file: is no result of laufruhe solve or evaluate"),
+        (_without("certificate"), "certificate: is missing"),
+        (lambda r: r | {"status": "fine"}, "status"),
+        (lambda r: r | {"decisions": {"left.unbalance": {"value": "much"}}}, "left.unbalance"),
+        (lambda r: r | {"objective": {**r["objective"], "value": "much"}}, "objective.value"),
+    ],
+)
+def test_what_is_no_result_is_one_line_that_says_so(damaged: Any, said: str, tmp_path: Path) -> None:
+    place = tmp_path / "result.json"
+    place.write_text(json.dumps(damaged(json.loads(as_json(scenes.solved(scenes.TIGHT))))), encoding="utf-8")
+    with pytest.raises(laufruhe.InputError) as caught:
+        laufruhe.read_result(place)
+    assert str(caught.value).startswith(f"{place}: ")
+    assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["", "{", "\x00", "[" * 100_000])
+def test_what_is_no_json_is_told(text: str, tmp_path: Path) -> None:
+    (tmp_path / "result.json").write_text(text, encoding="utf-8")
+    with pytest.raises(laufruhe.InputError, match="file: is no JSON"):
+        laufruhe.read_result(tmp_path)
+
+
+def test_what_is_not_there_is_told(tmp_path: Path) -> None:
+    with pytest.raises(laufruhe.InputError, match=r"result\.json: file: does not exist"):
+        laufruhe.read_result(tmp_path)
+    with pytest.raises(laufruhe.InputError, match="path = 3: is of type int"):
+        laufruhe.read_result(3)  # type: ignore[arg-type]
+
+
+def test_null_is_no_number(tmp_path: Path) -> None:
+    found = saved(scenes.solved(scenes.IMPOSSIBLE), tmp_path)
+    assert found.objective is None
+    assert found.certificate is None
+    prices = [limit.shadow_price for limit in saved(scenes.stated(scenes.GIVEN), tmp_path).limits]
+    assert all(math.isnan(price) for price in prices)
