@@ -50,18 +50,18 @@ def runs_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run)
 
 @lru_cache(maxsize=32)
 def _found_runs(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run) -> tuple[RunUp, RunUp]:
-    mounting, (inertia, gas) = _elastic(engine), run_loads(engine, point, fidelity)
+    mounting, driven = _elastic(engine), replace(engine, block=None, mounts=())
 
     def through(first: float, last: float, seconds: float) -> RunUp:
         sweep = sweep_of(first, last, seconds)
         if sweep is not None:
-            (response,) = responses_to([time_model(mounting)], sweep, [_wrenches(sweep, inertia, gas)])
+            (response,) = responses_to([time_model(mounting)], sweep, [_wrenches(sweep, driven, point, fidelity)])
             if response is not None:
                 return _envelope(response, first, last)
         # a mode that swings a million times in a run is followed, not resolved
         stiff = seconds * mounting.modes.frequencies[-1] > MOST_SWINGS
         followed: tuple[Literal["DOP853", "Radau"], float] = ("Radau", FOLLOWED) if stiff else ("DOP853", RESOLVED)
-        return run_through(mounting, inertia, gas, first, last, seconds, STRETCHES, *followed)
+        return run_through(mounting, *_loads(driven, point, fidelity), first, last, seconds, STRETCHES, *followed)
 
     return through(0.0, run.speed, run.up), through(run.speed, 0.0, run.down)
 
@@ -95,8 +95,15 @@ def run_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> tupl
     return inertia.kept(HIGHEST), None if gas is None else gas.kept(HIGHEST)
 
 
-def _wrenches(sweep: Sweep, inertia: Spectrum, gas: Spectrum | None) -> Array:
-    return sweep.wrenches([(part.orders, part.coefficients) for part in (inertia, gas) if part is not None])
+# what stands on other mounts is driven by the same loads
+_loads = lru_cache(maxsize=8)(run_loads)
+
+
+@lru_cache(maxsize=8)
+def _wrenches(sweep: Sweep, engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Array:
+    """Of an engine without block and mounts."""
+    parts = [part for part in _loads(engine, point, fidelity) if part is not None]
+    return sweep.wrenches([(part.orders, part.coefficients) for part in parts])
 
 
 def _envelope(response: Response, first: float, last: float) -> RunUp:
