@@ -75,6 +75,8 @@ matrix: $(STAMP)
 	$(BIN)/python tests/matrix/whole.py $(MATRIX)
 
 # Scripts that write results/benchmarks/, one after the other, none for longer than a quarter of an hour.
+benchmarks: export OMP_NUM_THREADS = 1
+
 benchmarks: $(STAMP)
 	$(BIN)/python tests/benchmarks/every.py $(BENCHMARKS)
 

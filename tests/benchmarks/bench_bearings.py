@@ -137,7 +137,7 @@ def front() -> str:
         subprocess.run(words, env=own, check=True, capture_output=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
     took = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return f"{took:.0f} s on one core"
+    return f"{took:.0f} s of a processor"
 
 
 def orders() -> str:
@@ -145,7 +145,7 @@ def orders() -> str:
     started = time.process_time()
     result = laufruhe.solve(laufruhe.load(PROBLEMS / "tractor-six-bearings.toml"))
     took = time.process_time() - started
-    return f"{took:.0f} s; {result.certificate.kind}, {result.phasing.method}"
+    return f"{took:.0f} s of a processor; {result.certificate.kind}, {result.phasing.method}"
 
 
 def main() -> None:
@@ -154,8 +154,8 @@ def main() -> None:
     lines = [
         "# Bearing forces beside mount forces and beside a multibody simulation",
         "",
-        "`problems/tractor-four-bearings.toml`: four cylinders, five main bearings, gas, eight webs. Medians of",
-        f"{REPEATS} runs on one core, processor time.",
+        "`problems/tractor-four-bearings.toml`: four cylinders, five main bearings, gas, eight webs. Processor",
+        f"time, medians of {REPEATS} runs on one core.",
         "",
         "One more design, its webs at random, and the mean of a channel over its cycle of 1440 steps, less what the",
         "design costs by itself:",

@@ -29,6 +29,7 @@ from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.workers import HERE, each
 from laufruhe.plots.picture import save_picture
 from laufruhe.studies import picture as p
+from laufruhe.studies.sampled import MOST_TABLED
 from studies import clusters
 
 OUT = PAGES / "cluster.md"
@@ -279,7 +280,7 @@ def asked() -> argparse.Namespace:
     """How much of it."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--kills", type=int, default=8)
-    parser.add_argument("--evaluations", type=at_least(100_000), default=1_000_000)
+    parser.add_argument("--evaluations", type=at_least(2 * MOST_TABLED), default=1_000_000)
     parser.add_argument("--solves", type=at_least(100), default=1000)
     parser.add_argument("--long", type=int, default=5000)
     return parser.parse_args()
@@ -311,7 +312,7 @@ def main() -> None:
         sizes = grown(folder / "grown", given.evaluations, given.solves)
         long = [LONG, "", COSTS, BAR, at_once(folder / "long", given.long).row(), ""] if given.long else []
     each_one = [f"One more takes {1e6 * each_of(costs):,.1f} µs of one core." for costs in sizes]
-    lines += ["## Growth with size", "", "Evaluations:", "", COSTS, BAR, *(cost.row() for cost in sizes[0]), ""]
+    lines += ["## Growth with size", "", TABLED.format(MOST_TABLED), COSTS, BAR, *(cost.row() for cost in sizes[0]), ""]
     lines += [each_one[0], "", "Proven solves (least mean mount force, 144 samples of a cycle):", ""]
     lines += [COSTS, BAR, *(cost.row() for cost in sizes[1]), "", each_one[1]]
     lines += ["", *long, "![Growth with size and workers](cluster.png)", "", "## A thousand million, on paper", ""]
@@ -332,6 +333,8 @@ IMPORTS = """Each worker imports the package once, which takes one to two second
 
 SIGKILL at random moments, one to three times a run; a worker or a scheduler that is killed is started again, a client
 that is killed is the same command again. Every file and number is compared with those of one process.
+"""
+TABLED = """Evaluations; up to {:,} are written as a table and a workbook too, of more the dataset alone:
 """
 LONG = """As many as this by one command on all processors, in pieces of 500. Every one is a proven optimum."""
 PAPER = """The scheduler of this run handed out a piece each {:.1f} ms, so a piece must take longer

@@ -62,10 +62,12 @@ def told(status: int | None, said: str, seconds: float, limit: float) -> str:
 def main() -> int:
     """Run, and count what failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("only", nargs="*", choices=[[], *SCRIPTS], metavar="name", help=", ".join(SCRIPTS))
+    parser.add_argument("only", nargs="*", metavar="name", help=", ".join(SCRIPTS))
     parser.add_argument("--without", nargs="+", choices=SCRIPTS, default=[], metavar="name")
     parser.add_argument("--limit", type=float, default=LIMIT, help=f"seconds for each script, {LIMIT:.0f} by itself")
     given = parser.parse_args()
+    if unknown := set(given.only) - SCRIPTS.keys():
+        parser.error(f"there is no {', '.join(sorted(unknown))}; there are {', '.join(SCRIPTS)}")
     names = [name for name in given.only or SCRIPTS if name not in given.without]
     began, failed = time.perf_counter(), 0
     for k, name in enumerate(names, 1):

@@ -402,7 +402,7 @@ def page() -> str:
     lines = [
         "# Numbers at the extremes",
         "",
-        "Made by `python tests/benchmarks/bench_extremes.py`; the tests hold every line to its guarantee.",
+        "The tests hold every line to its guarantee.",
         "",
         "| extreme | beside | guaranteed | measured, worst | limit |",
         "| --- | --- | --- | ---: | ---: |",
