@@ -211,7 +211,7 @@ class BoxBounds(Protocol):
         """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
 
 
-class _Bounded(Halving):
+class Bounded(Halving):
     """Boxes with bounds found by someone else."""
 
     def __init__(self, search: BoxBounds, value: float, room: float) -> None:
@@ -239,7 +239,7 @@ def divided_on(
     search: BoxBounds, lower: Array, upper: Array, value: float, room: float, most: Sequence[int]
 ) -> Iterator[Divided]:  # fmt: skip
     """The same up to each of these numbers of boxes, one after the other."""
-    division = _Bounded(search, value, room)
+    division = Bounded(search, value, room)
     for k, count in enumerate(most):
         yield (
             division.found(division.further(count)) if k else division.run(division.bounded([(lower, upper)])[0], count)

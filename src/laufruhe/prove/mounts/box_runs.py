@@ -11,7 +11,7 @@ import numpy as np
 from laufruhe.load_models.run_look import run_measures
 from laufruhe.load_models.run_moments import RunMoments
 from laufruhe.load_models.run_peaks import RunPeaks, parabola_tops
-from laufruhe.numerics.arrays import Array, Indices
+from laufruhe.numerics.arrays import Array, Indices, Mask
 from laufruhe.physics.stopped_run import QUICKEST, quickest
 from laufruhe.physics.time_model import time_model
 from laufruhe.problem.channels import mounting_in
@@ -67,11 +67,12 @@ class RunBoxes:
             runs.append(RunMoments(sweep, wrenches, self._matrices.base.load, max(int(most), 1)))
         return tuple(runs)
 
-    def under(self, measure: Measure, lower: Array, upper: Array) -> Under:
-        """Of boxes, shapes (boxes, open numbers); with an infinite rest where nothing is known."""
+    def under(self, measure: Measure, lower: Array, upper: Array, asked: Mask | None = None) -> Under:
+        """Of boxes, shapes (boxes, open numbers), or of those asked for; an infinite rest where nothing is known."""
         of = self._equations(lower, upper)
         step = max(run.step for run in self._runs)
-        which = np.flatnonzero(of.known & (np.linalg.norm(of.matrix, 2, axis=(-2, -1)) * step <= FARTHEST))
+        known = of.known & (np.linalg.norm(of.matrix, 2, axis=(-2, -1)) * step <= FARTHEST)
+        which = np.flatnonzero(known if asked is None else known & asked)
         out = Under(np.zeros(len(lower)), np.zeros_like(lower), np.full(len(lower), np.inf), np.ones_like(lower))
         if len(which):
             of = of if len(which) == len(lower) else self._equations(lower[which], upper[which])

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import NEARLY, Divided, divided_on
+from laufruhe.prove.mounts.box_lines import BoxLines
 from laufruhe.prove.mounts.box_norms import Under, root_under, under
 from laufruhe.prove.mounts.box_numbers import RANGES, UNDER, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, Lines
@@ -35,8 +36,6 @@ MOST_BOXES = 60_000
 # numbers held at once
 HELD = 3e6
 HALVINGS = 45
-# times that prices of several limits are sought in turn
-ROUNDS = 2
 # numbers of a motion in time that cost as much as one of an order
 RUN_SHARE = 18
 # of the gap that counts as proven, what small orders may take of it
@@ -149,38 +148,43 @@ class StiffnessBoxes:
             return self._bounds(lower, upper)
 
     def _bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        boxes, pull, size = _Boxes.of(lower), np.zeros_like(lower), np.full(len(lower), self.constant)
+        boxes, pull, size = BoxLines.of(lower), np.zeros_like(lower), np.full(len(lower), self.constant)
         for weight, quantity, lines, left_out in self._terms:
             at = self.model.expanded(lines, lower, upper)
             least = under(self.model, quantity, lines, at)
             boxes.add(weight, least, left_out)
             pull, size = pull + weight * least.bends, size + weight * least.value
-        for maximum, quantity, lines, left_out in self._limits:
-            least = under(self.model, quantity, lines, self.model.expanded(lines, lower, upper))
-            boxes.hold(least, left_out, maximum)
-        for limit in self._priced:
-            least = UNDER[limit.measure.channel](self.model, limit.measure, lower, upper)
-            boxes.hold(least, 0.0, limit.maximum * (1.0 + SLACK))
+        self.hold(boxes, lower, upper)
         numbers, pulled = self._numbers(lower, upper)
-        broken = self._breaks(lower, upper)
+        broken = self.breaks(lower, upper)
         found = self.constant + numbers + boxes.least
         pull = (pull + pulled) / np.where(size + numbers > 0.0, size + numbers, 1.0)[:, None]
         # run-ups cost most, and tell nothing of boxes that are ruled out
         left = np.flatnonzero(~broken & (found < self.enough))
         if self.runs is not None and len(left):
             own = boxes.kept(left)
-            pull[left] = np.maximum(pull[left], self._run(own, lower[left], upper[left]))
+            pull[left] = np.maximum(pull[left], self.add_runs(own, lower[left], upper[left]))
             found[left] = self.constant + numbers[left] + own.least
         found = np.where(broken, np.inf, found)
         return found, np.argmax(np.nan_to_num(pull) + 1e-12 * (upper - lower) / upper.max(), axis=1)
 
-    def _run(self, boxes: _Boxes, lower: Array, upper: Array) -> Array:
+    def hold(self, boxes: BoxLines, lower: Array, upper: Array) -> None:
+        """Add limits that have linear functions under them, those of run-ups left out."""
+        for maximum, quantity, lines, left_out in self._limits:
+            least = under(self.model, quantity, lines, self.model.expanded(lines, lower, upper))
+            boxes.hold(least, left_out, maximum)
+        for limit in self._priced:
+            least = UNDER[limit.measure.channel](self.model, limit.measure, lower, upper)
+            boxes.hold(least, 0.0, limit.maximum * (1.0 + SLACK))
+
+    def add_runs(self, boxes: BoxLines, lower: Array, upper: Array) -> Array:
         """Add what run-ups tell of boxes (E65); the pull of sides."""
         assert self.runs is not None
         pull, problem = np.zeros_like(lower), self.problem
         weights = {term.measure: term.weight for term in problem.objective}
         for measure in self.runs.measures:
-            found = self.runs.under(measure, lower, upper)
+            # one limit that is broken is enough
+            found = self.runs.under(measure, lower, upper, boxes.excess <= 0.0)
             boxes.add(weights.get(measure, 0.0), found)
             for limit in problem.limits:
                 if limit.measure == measure:
@@ -199,7 +203,7 @@ class StiffnessBoxes:
                 found = np.asarray(found + weight * RANGES[asked.channel](self.model, asked, lower, upper)[0])
         return found, pull
 
-    def _breaks(self, lower: Array, upper: Array) -> Mask:
+    def breaks(self, lower: Array, upper: Array) -> Mask:
         """Boxes on which a limit of a number of the mounts is broken everywhere."""
         out = np.zeros(len(lower), dtype=bool)
         for limit in self.problem.mount_limits:
@@ -277,63 +281,3 @@ def _felt(model: BoxModel, quantity: Measure, budget: float) -> tuple[Lines, flo
     kept[out] = False
     # a peak to peak is twice a largest length at most
     return lines.kept(kept), (1.0 if quantity.norm.of_row_lengths else 2.0) * float(felt[out].sum())
-
-
-@dataclass(eq=False)
-class _Boxes:
-    """What linear functions tell of boxes, half a box being one: objective, and limits on which it stands.
-
-    Attributes
-    ----------
-    value, slopes
-        Under the objective, shapes (boxes,) and (boxes, open numbers).
-    limits
-        Under what is limited, less its limit, in the same shapes.
-    """
-
-    value: Array
-    slopes: Array
-    limits: list[tuple[Array, Array]] = field(default_factory=list)
-
-    @classmethod
-    def of(cls, lower: Array) -> _Boxes:
-        """Of which nothing is known."""
-        return cls(np.zeros(len(lower)), np.zeros_like(lower))
-
-    def kept(self, which: NDArray[np.intp]) -> _Boxes:
-        """Some of them."""
-        return _Boxes(self.value[which], self.slopes[which], [(v[which], s[which]) for v, s in self.limits])
-
-    def add(self, weight: float, least: Under, left_out: float = 0.0) -> None:
-        """To the objective, where anything is known of it: no norm goes under zero."""
-        value = least.value - least.rest - left_out
-        tells = np.isfinite(value) & (value > 0.0)
-        self.value = self.value + weight * np.where(tells, value, 0.0)
-        self.slopes = self.slopes + weight * np.where(tells[:, None], least.slopes, 0.0)
-
-    def hold(self, least: Under, left_out: float, maximum: float) -> None:
-        """A limit."""
-        over = least.value - least.rest - left_out - maximum
-        known = np.isfinite(over) & np.all(np.isfinite(least.slopes), axis=1)
-        self.limits.append((np.where(known, over, -1.0), np.where(known[:, None], least.slopes, 0.0)))
-
-    @property
-    def least(self) -> Array:
-        """Least objective where limits are kept; infinite where one is not.
-
-        By prices of the limits (P4), of one after the other, each at which a side of the box changes its end: the least
-        over the box is linear in a price between these.
-        """
-        value, slopes = self.value, self.slopes
-        found, broken = value - np.abs(slopes).sum(axis=1), np.zeros(len(value), dtype=bool)
-        for over, by in self.limits * (ROUNDS if len(self.limits) > 1 else 1):
-            broken |= over > np.abs(by).sum(axis=1)
-            prices = np.where(slopes * by < 0.0, -slopes / np.where(by != 0.0, by, 1.0), 0.0)
-            leaning = np.abs(slopes[:, None] + prices[:, :, None] * by[:, None]).sum(axis=2)
-            held = value[:, None] + prices * over[:, None] - leaning
-            best = held.argmax(axis=1)[:, None]
-            gain = np.take_along_axis(held, best, axis=1)[:, 0]
-            price = np.where(gain > found, np.take_along_axis(prices, best, axis=1)[:, 0], 0.0)
-            value, slopes, found = value + price * over, slopes + price[:, None] * by, np.maximum(found, gain)
-        found = np.where(broken, np.inf, found)
-        return np.asarray(np.maximum(found, 0.0))

@@ -16,7 +16,7 @@ from laufruhe.numerics.budget import passed
 from laufruhe.numerics.workers import at_hand
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
-from laufruhe.problem.measure import Limit, Measure, Term
+from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate
@@ -24,14 +24,14 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach, gap_of, room_of
-from laufruhe.prove.mounts.subdivision import divided_bound
 from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, decided, nearest_of, none_within, unbalances_of
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_unbalances
-from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.mounts.bounds import divided_by
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
-from laufruhe.solvers.mounts.search import Found, MountSearch, Place, judged_at
+from laufruhe.solvers.mounts.limits_kept import ruled_out
+from laufruhe.solvers.mounts.places import Place, judged_at
+from laufruhe.solvers.mounts.search import Found, MountSearch
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.ipopt import run
@@ -245,20 +245,6 @@ def _none(
     design = search.best.design if search.best else None
     near = nearest_of(problem, design.evaluation, decided(design)) if design else None
     return replace(result, status=Status.FAILED, message=message, nearest=near)
-
-
-def ruled_out(problem: Problem) -> tuple[str, ...]:
-    """Limits that no box keeps together, each needed for that."""
-    sides = [[getattr(d, side) for d in problem.mount_decisions] for side in ("start_number", "lower", "upper")]
-    designs = [design for design in (judged_at(problem, values) for values in sides) if design is not None]
-
-    def excluded(kept: Sequence[Limit]) -> bool:
-        # what one design keeps no box excludes, however small
-        if any(design.evaluation.excess(kept) <= 0.0 for design in designs):
-            return False
-        return bool(kept) and divided_bound(replace(problem, limits=tuple(kept)), math.inf, math.inf).bound == math.inf
-
-    return smallest_conflict(problem.limits, excluded)
 
 
 def _broken(joint: SmoothProgram, optimum: LocalOptimum) -> str:

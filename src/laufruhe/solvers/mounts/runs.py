@@ -9,6 +9,8 @@ from dataclasses import replace
 
 from laufruhe.load_models.run_look import COARSER
 from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
@@ -17,8 +19,8 @@ from laufruhe.prove.certificate import Reach
 from laufruhe.prove.mounts.box_runs import bounds_runs
 from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, none_within
-from laufruhe.solvers.mounts.bounds import divided_by
-from laufruhe.solvers.mounts.nonlinear import ruled_out
+from laufruhe.solvers.mounts.bounds import EARLY, divided_by
+from laufruhe.solvers.mounts.limits_kept import LimitsKept, ruled_out
 from laufruhe.solvers.mounts.search import NEAR, Found, MountSearch
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
@@ -45,17 +47,31 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     alone = starts == 1
     first = None if relaxed is None or alone else place_of(problem, relaxed)
     search = MountSearch(few, initial, first=first, beside=True, coarser=1 if alone else COARSER)
+    bounded = divides(problem) and bounds_runs(problem)
+    met, conflict = _looked(problem, search) if bounded else (None, ())
+    if conflict:
+        return none_within(problem, initial, conflict, {"solve": time.perf_counter() - started})
     search.run()
     searched = bool(search.optima) and not stopped and not alone
     if searched and search.best is not None and search.best.design.excess <= NEAR:
         search.refined()
-    divided = divided_by(problem, search, False) if divides(problem) and bounds_runs(problem) else Divided(0.0, 0)
+    if met is not None and (search.best is None or search.best.design.excess > KEPT):
+        search.again([met])
+    divided = divided_by(problem, search, False) if bounded else Divided(0.0, 0)
     timing = {"solve": time.perf_counter() - started}
     found = search.chosen
     if found is None or found.design.excess > KEPT:
         conflict = ruled_out(problem) if divided.bound == math.inf else ()
         result = none_within(problem, initial, conflict, timing)
         return result if conflict else _none(problem, search, found, result)
+    return _concluded(problem, search, found, initial, relaxed, divided, timing)
+
+
+def _concluded(
+    problem: Problem, search: MountSearch, found: Found, initial: Evaluation, relaxed: Result | None, divided: Divided,
+    timing: dict[str, float],
+) -> Result:  # fmt: skip
+    """Of the best design found, with the better of both bounds."""
     own = None if relaxed is None else relaxed.certificate
     bare = 0.0 if own is None else own.lower_bound
     optimum = found.optimum
@@ -68,6 +84,15 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     )
     design = replace(found.design, problem=problem)
     return concluded(design, initial, shown, timing)
+
+
+def _looked(problem: Problem, search: MountSearch) -> tuple[Array | None, tuple[str, ...]]:
+    """A design that keeps all limits, where no start does; or a conflict, for what boxes exclude none need search."""
+    if not problem.limits or not problem.search.proves or search.starts_kept:
+        return None, ()
+    kept = LimitsKept(problem)
+    told = kept.together(problem.limits, EARLY)
+    return told.design, kept.conflict() if told.is_proven else ()
 
 
 def _method(optima: Sequence[LocalOptimum], scale: float, bare: float, divided: Divided) -> str:

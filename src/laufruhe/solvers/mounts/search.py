@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
 
 import numpy as np
 
@@ -14,13 +13,14 @@ from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed, rounds
 from laufruhe.numerics.progress import tell
-from laufruhe.problem.decision import domains_of, sides_of
+from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.solvers.conclusion import FEASIBLE, Design, given_design, judged
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Design, given_design
+from laufruhe.solvers.mounts.places import Place, judged_at, started_at
 from laufruhe.solvers.mounts.starts import start_points
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, is_explored
 from laufruhe.solvers.smooth.nonlinear import Enough, solve_nonlinear, try_all
@@ -47,9 +47,6 @@ LOOKED = 6
 ROOM, FELT = 0.5, 0.05
 # of the throws that a search starts from, about their star [rad]
 NUDGE = 0.02
-
-Place: TypeAlias = tuple[list[float], Array | None]
-"""Mounts, and columns of the unbalances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +121,7 @@ class MountSearch:
 
         Where time is over already, the first start is the design if it is one.
         """
-        start = self._started(*self._points[0]) if passed() and self.moves is None else None
+        start = started_at(self.problem, self._points[0]) if passed() and self.moves is None else None
         if start is not None and start.excess <= SLACK:
             self._keep(Found(start, self.joint))
             return
@@ -219,15 +216,15 @@ class MountSearch:
             return set()
         limits = [x for x in self.problem.load_limits if not x.measure.is_mass and not x.measure.channel.is_checked]
         for place in self._points[:LOOKED] if limits else ():
-            design = self._started(*place)
+            design = started_at(self.problem, place)
             limits = [x for x in limits if design is not None and design.evaluation.standing(x).excess < -ROOM]
         return set(limits)
 
-    def _started(self, mounts: Sequence[float], columns: Array) -> Design | None:
-        """The design that a start is."""
-        own, sizes = iter(mounts), iter(d.complex_value(columns) for d in domains_of(self.problem.unbalances))
-        values: list[Value] = [next(sizes) if d.is_affine else next(own) for d in self.problem.decisions]
-        return judged_at(self.problem, values)
+    @property
+    def starts_kept(self) -> bool:
+        """Whether any of the first starts keeps all limits."""
+        designs = (started_at(self.problem, place) for place in self._points[:LOOKED])
+        return any(design is not None and design.excess <= KEPT for design in designs)
 
     def _under_what_is_felt(self, search: Callable[[], None]) -> None:
         """A search, and again under the limits that were left out where its best ends come near them."""
@@ -339,11 +336,3 @@ def _point(found: Found) -> tuple[list[float], Array]:
     """Mounts and columns that an end of a search stands at."""
     assert found.optimum is not None
     return _parted(found.joint, found.optimum.x)
-
-
-def judged_at(problem: Problem, values: Sequence[Value]) -> Design | None:
-    """A design by the exact model; none on a resonance that nothing damps."""
-    try:
-        return judged(problem, values)
-    except ModelError:
-        return None
