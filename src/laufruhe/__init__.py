@@ -19,15 +19,16 @@ if TYPE_CHECKING:
 
     from laufruhe.machine import Engine, OperatingPoint
     from laufruhe.problem.problem import Problem
-    from laufruhe.report.saved_result import SavedResult
+    from laufruhe.report.saved_result import SavedResult, read_result, write_result
     from laufruhe.solvers.result import Result
 
 # loaded when they are asked for: import laufruhe is quick
-_CLASSES = {
+_ELSEWHERE = {
     "Problem": "laufruhe.problem.problem",
     "Result": "laufruhe.solvers.result",
-    "SavedResult": "laufruhe.report.saved_result",
+    **dict.fromkeys(("SavedResult", "read_result", "write_result"), "laufruhe.report.saved_result"),
 }
+_ROOMS = ("machine", "plots")
 
 __version__ = "0.3.0"
 __all__ = [
@@ -44,6 +45,7 @@ __all__ = [
     "read_result",
     "solve",
     "study",
+    "write_result",
 ]
 
 Source: TypeAlias = Union[str, Path, Mapping[str, Any]]  # noqa: UP007
@@ -53,9 +55,11 @@ Source: TypeAlias = Union[str, Path, Mapping[str, Any]]  # noqa: UP007
 if not TYPE_CHECKING:
     # to a type checker a misspelt name stays one
     def __getattr__(name: str) -> Any:
-        if name not in _CLASSES:
+        if name in _ROOMS:
+            return import_module(f"laufruhe.{name}")
+        if name not in _ELSEWHERE:
             raise AttributeError(f"module 'laufruhe' has no attribute '{name}'")
-        return getattr(import_module(_CLASSES[name]), name)
+        return getattr(import_module(_ELSEWHERE[name]), name)
 
 
 def __dir__() -> list[str]:
@@ -154,24 +158,6 @@ def _of_engine(design: Engine, points: Sequence[OperatingPoint]) -> Problem:
     channel = channels.MOUNT_FORCE if design.mounts else channels.SHAKING_FORCE
     wanted = (Term(Measure(channel)),)
     return Problem(design.name, design.name, design, tuple(points), objective=wanted)
-
-
-def read_result(path: str | Path) -> SavedResult:
-    """Read the `result.json` of `laufruhe solve` or `evaluate` back.
-
-    Parameters
-    ----------
-    path
-        Of the file, or of the folder of results that holds it.
-
-    Raises
-    ------
-    InputError
-        If there is none, or it is no such file.
-    """
-    from laufruhe.report.saved_result import read_result as read
-
-    return read(path)
 
 
 def study(source: Source, jobs: int = 1) -> dict[str, xr.Dataset]:

@@ -136,7 +136,12 @@ def example(unit: str) -> str:
 
 def advice(unit: str) -> str:
     """How to write a value of this dimension."""
-    return f'write for example "{example(unit)}"'
+    return f"write for example {_written(example(unit), unit)}"
+
+
+def _written(text: str, unit: str) -> str:
+    """As a file has it: text with a unit in quotes, a plain number without."""
+    return f'"{text}"' if unit else text
 
 
 def usual(unit: str) -> str:
@@ -153,10 +158,11 @@ def parse(text: str, unit: str) -> float:
     match = _QUANTITY.match(text) if len(text) <= LONGEST else None
     if match is None and DECIMAL_COMMA.match(text[:LONGEST]):
         point, whole = (text.replace(",", mark, 1).strip() for mark in (".", ""))
-        either = f'write "{whole}" or "{point}"' if THOUSANDS.match(text) else f'write "{point}"'
+        point, whole = _written(point, unit), _written(whole, unit)
+        either = f"write {whole} or {point}" if THOUSANDS.match(text) else f"write {point}"
         raise UnitError(f"has a comma, and decimals follow a point; {either}")
     if match is None:
-        raise UnitError(f"is not a number with a unit; {advice(unit)}")
+        raise UnitError(f"is not a number{' with a unit' * bool(unit)}; {advice(unit)}")
     number, divisor, name = match.groups()
     below = float(divisor or 1)
     if below == 0.0:

@@ -37,6 +37,12 @@ def test_classes_are_named_without_loading_them() -> None:
     assert subprocess.check_output([sys.executable, "-c", code], text=True).split() == ["False", "False"]
 
 
+@pytest.mark.slow
+def test_rooms_that_pages_name_are_there_at_once() -> None:
+    code = "import laufruhe; print(laufruhe.plots.draw.__name__, laufruhe.machine.OperatingPoint.__name__)"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True).split() == ["draw", "OperatingPoint"]
+
+
 def test_everything_public_is_on_the_page() -> None:
     text = PAGE.read_text(encoding="utf-8")
     for name in set(laufruhe.__all__) - {"__version__"}:

@@ -78,6 +78,7 @@ class TestParse:
             ("20 degC", "m", "'degC' is not a unit of a length"),
             ("20 kg", "kg m", "'kg' is not a unit of an unbalance"),
             ("5 N m", "Pa", "'N m' is not a unit of a pressure"),
+            ("x", "", "is not a number"),
             ("20 degC", "K", "unit 'degC' is not known"),
             pytest.param("1/" + "9" * 400 + " mm", "m", "is", id="a divisor beyond floats"),
             pytest.param("1/" + "9" * 5000 + " mm", "m", "is", id="a divisor beyond integers"),
@@ -88,7 +89,14 @@ class TestParse:
             parse(text, unit)
         said, _, remedy = str(caught.value).partition("; ")
         assert said.startswith(rule)
-        assert remedy.startswith(f'write for example "{example(unit)}"')
+        assert remedy.startswith(f'write for example "{example(unit)}"' if unit else "write for example 0.26")
+
+    def test_plain_numbers_are_shown_as_a_file_has_them(self) -> None:
+        """Without quotes, and without a unit that they have not."""
+        for text, said in (("x", "is not a number; write for example 0.26"), ("0,1", "write 0.1")):
+            with pytest.raises(UnitError) as caught:
+                parse(text, "")
+            assert str(caught.value).endswith(said)
 
     def test_units_that_are_used_mostly_are_told(self) -> None:
         with pytest.raises(UnitError, match=r'"120 mm", in m, mm, cm \.\.\.$'):

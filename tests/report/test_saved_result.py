@@ -22,7 +22,8 @@ from report.test_json_result import RESULTS
 
 def saved(result: Result, folder: Path, series: bool = False) -> laufruhe.SavedResult:
     place = folder / "result.json"
-    place.write_text(as_json(result, series), encoding="utf-8")
+    laufruhe.write_result(result, place, series)
+    assert place.read_text(encoding="utf-8") == as_json(result, series)
     return laufruhe.read_result(place)
 
 

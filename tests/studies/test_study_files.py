@@ -136,7 +136,7 @@ BAD = [
     (study(sweep=swept("stroke", 'values = ["100 mm", "110 mm"]')), "write the whole path, engine.stroke"),
     (study(sweep=swept("operating_points.mean_piston_speed", 'from = "6 m/s"\nto = "8 m/s"\npoints = 3')),
      "is no number of a problem file; write its whole path, such as operating_points.1.speed"),
-    (study(sweep=swept(FRACTION, 'from = "0,1"\nto = 1\npoints = 3')), 'decimals follow a point; write "0.1"'),
+    (study(sweep=swept(FRACTION, 'from = "0,1"\nto = 1\npoints = 3')), 'decimals follow a point; write 0.1'),
     (study(sweep=swept(SPEED, 'values = ["6 m/s", "8 m/s"]\nunit = "x"')), "a unit stands beside its number"),
     (study("layout comparison", problem="tractor-study"), "makes this a study file"),
     (study("layout comparison") + case("one", "x.toml"), "two cases of one name"),

@@ -147,7 +147,7 @@ def limit_name(entry: Mapping[str, Any]) -> str | None:
     return Measure(channel, norm, as_tuple(at), points, None, as_tuple(table.orders), None, motions).name
 
 
-def _side(text: str | None, measure: Measure, where: str) -> float | None:
+def _side(text: str | float | None, measure: Measure, where: str) -> float | None:
     if text is None:
         return None
     value = measured(text, measure.unit, where)

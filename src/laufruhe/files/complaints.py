@@ -182,10 +182,10 @@ def in_file(source: object) -> Iterator[None]:
         raise InputError(str(source), (refused.complaint,)) from None
 
 
-def measured(text: str, unit: str, where: str, given: str | None = None) -> float:
-    """SI value of a text such as '120 mm'; `given` is what stands at the key, where the text is only made of it."""
+def measured(text: str | float, unit: str, where: str, given: str | None = None) -> float:
+    """SI value of a text such as '120 mm', or of a plain number; `given` stands at the key that the text is made of."""
     try:
-        return units.parse(text, unit)
+        return units.parse(str(text), unit)
     except units.UnitError as error:
         found = Complaint.of(error, where)
         # where the unit has a key of its own, it stands there without a number

@@ -10,11 +10,11 @@ from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 from pydantic import (
     AfterValidator,
     BaseModel,
-    BeforeValidator,
     ConfigDict,
     Field,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
+    PlainValidator,
     WithJsonSchema,
     create_model,
 )
@@ -158,13 +158,21 @@ class Number:
         pair = given.get("between")
         if not isinstance(pair, list) or len(pair) != 2:
             raise refusal("needs two bounds; write { between = [low, high] }")
-        low, high = (self._bounded(self._number(bound)) for bound in pair)
+        low, high = (self._within(bound, "bound") for bound in pair)
         if low > high:
             raise refusal("has its bounds reversed; write the smaller one first")
-        start = self._bounded(self._number(given["start"])) if "start" in given else min(max(0.0, low), high)
+        start = self._within(given["start"], "start") if "start" in given else min(max(0.0, low), high)
         if not low <= start <= high:
             raise refusal("starts outside its bounds; move start or the bounds")
         return Open(low, high, start)
+
+    def _within(self, given: Any, what: str) -> float:
+        """A number of an open one; a complaint says which it is of."""
+        try:
+            return self._bounded(self._number(given))
+        except PydanticCustomError as error:
+            shown = f'"{given}"' if isinstance(given, str) else given
+            raise refusal(f"{what} {shown}: {error.message()}") from None
 
 
 @dataclass(frozen=True)
@@ -230,9 +238,11 @@ def _turning(ratio: float) -> float:
     return ratio
 
 
-def _side(given: Any) -> Any:
-    """A bare number as text: which unit is missing, if any, is known with the quantity."""
-    return repr(given) if isinstance(given, int | float) and not isinstance(given, bool) else given
+def _side(given: Any) -> str | float:
+    """A text or a bare number: which unit is missing, if any, is known with the quantity."""
+    if isinstance(given, bool) or not isinstance(given, int | float | str):
+        raise refusal("must be text in quotes")
+    return given
 
 
 _DEG = math.radians(1.0)
@@ -285,7 +295,7 @@ Delay: TypeAlias = Annotated[float, Number("s", least=0.0)]
 OpenDelay: TypeAlias = Annotated[float | Open, Number("s", least=0.0, openable=True)]
 OpenDamping: TypeAlias = Annotated[float | Open, Number("N s/m", least=0.0, openable=True)]
 Side: TypeAlias = Annotated[
-    str, BeforeValidator(_side), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})
+    str | float, PlainValidator(_side), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})
 ]
 Throws: TypeAlias = Annotated[
     list[float | Open] | Literal["open"], OrOpen(list[OpenAngle], "[0, 180, 180, 0]", tuple(CRANKS.items()))

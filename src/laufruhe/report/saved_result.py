@@ -1,4 +1,4 @@
-"""`result.json` read back: what a script knows of a design that was decided before."""
+"""`result.json` written, and read back: what a script knows of a design that was decided before."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from pydantic import BaseModel, BeforeValidator, ValidationError
 from laufruhe.errors import InputError, refused, wrong_call
 from laufruhe.files.complaints import complaints_of
 from laufruhe.prove.certificate import Certificate, Proof
-from laufruhe.solvers.result import Status, Told
+from laufruhe.report.files import RESULT, write
+from laufruhe.report.json_result import as_json
+from laufruhe.solvers.result import Result, Status, Told
 from laufruhe.solvers.values import DecisionValue, LimitValue, ObjectiveValue
 
 # where JSON has null there is no number
@@ -107,12 +109,36 @@ class SavedResult(Told):
         return {d.name: f"{d.value!r} {d.unit}".rstrip() for d in self.decisions}
 
 
+def write_result(result: Result, path: str | Path, series: bool = False) -> None:
+    """Write a result as the commands write their `result.json`.
+
+    Parameters
+    ----------
+    path
+        Of the file; what stands there is overwritten.
+    series
+        Whether the loads over the cycle are written too.
+    """
+    write(Path(path), as_json(result, series))
+
+
 def read_result(path: str | Path) -> SavedResult:
-    """Read a `result.json`, or the one in a folder of results; `InputError` says what is wrong with it."""
+    """Read the `result.json` of `laufruhe solve` or `evaluate` back.
+
+    Parameters
+    ----------
+    path
+        Of the file, or of the folder of results that holds it.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it is no such file.
+    """
     if not isinstance(path, str | Path):
         raise wrong_call("path", path, f"is of type {type(path).__name__}", "give the path of a result.json")
     place = Path(path)
-    place = place / "result.json" if place.is_dir() else place
+    place = place / RESULT if place.is_dir() else place
     record = _content(place)
     try:
         file = _File.model_validate(record)
