@@ -169,18 +169,23 @@ class StarModel:
         still: tuple[tuple[float, AffineNorm], ...],
         moved: dict[tuple[int, int], tuple[tuple[float, AffineNorm], ...]],
     ) -> tuple[tuple[float, StarNorm], ...]:
-        shape = (self.space.throws, self.space.phases)
         out = []
         for number, ((weight, all_of), (_, rest)) in enumerate(zip(whole, still, strict=True)):
-            moves = np.zeros((*shape, *rest.constant.shape))
-            turns = np.zeros((*shape, *rest.slope.shape))
-            for (k, p), norms in moved.items():
-                moves[k, p] = norms[number][1].constant - rest.constant
-                turns[k, p] = norms[number][1].slope - rest.slope
-            alike = np.abs(turns).max(initial=0.0) <= _SAME_SLOPE * np.abs(rest.slope).max(initial=0.0)
-            turned = None if alike else turns
+            own = {place: norms[number][1] for place, norms in moved.items()}
+            moves = self._apart({place: norm.constant for place, norm in own.items()}, rest.constant)
+            # most turn alike, which is seen before room is made for all of them
+            least = _SAME_SLOPE * np.abs(rest.slope).max(initial=0.0)
+            alike = all(np.abs(norm.slope - rest.slope).max(initial=0.0) <= least for norm in own.values())
+            turned = None if alike else self._apart({place: norm.slope for place, norm in own.items()}, rest.slope)
             out.append((weight, StarNorm(all_of.norm, all_of.constant, moves, all_of.slope, turned, all_of.grid)))
         return tuple(out)
+
+    def _apart(self, rows: dict[tuple[int, int], Array], still: Array) -> Array:
+        """What every throw changes at every step, shape (throws, phases, ...); zero at those of the origin."""
+        out = np.zeros((self.space.throws, self.space.phases, *still.shape))
+        for place, own in rows.items():
+            np.subtract(own, still, out=out[place])
+        return out
 
 
 def normalised(problem: Problem) -> Problem:
