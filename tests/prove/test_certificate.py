@@ -16,7 +16,7 @@ from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.norms import NORMS, Grid, Norm
 from laufruhe.problem.decision import Decision, Domain, domains_of
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.nothing import ROUNDING, nothing_of
+from laufruhe.problem.nothing import OF_ORDERS, ROUNDING, nothing_of
 from laufruhe.problem.sets import Interval, Sector
 from laufruhe.prove.certificate import Multipliers, Proof, Reach, best_bound, certified, kkt_residual, lower_bound
 from mounts.files import problem_of
@@ -38,6 +38,7 @@ speed = "3000 rpm"
 minimise = "rms shaking force"
 orders = [1, 2]
 """
+TORQUE = "crank torque"
 SEEDS = st.integers(0, 2**32 - 1)
 EVERY = tuple(NORMS.values())
 
@@ -114,7 +115,18 @@ class TestGap:
         assert objective_value(six, evaluate(six)) < nothing_of(six)
         single = problem_of(tmp_path, SIX.replace("[0, 120, 240, 240, 120, 0]", "[0]"))
         parts = objective_value(single, evaluate(single))
-        assert nothing_of(six) == pytest.approx(6.0 * ROUNDING * parts, rel=1e-9)
+        all_orders = problem_of(tmp_path, SIX.replace("[0, 120, 240, 240, 120, 0]", "[0]").replace("orders", "#"))
+        whole = objective_value(all_orders, evaluate(all_orders))
+        assert nothing_of(six) == pytest.approx(6.0 * (ROUNDING * parts + OF_ORDERS * whole), rel=1e-9)
+
+    @pytest.mark.parametrize(("order", "none"), [(1, True), (2, False)])
+    def test_an_order_that_a_part_does_not_have_is_nothing(self, order: int, none: bool, tmp_path: Path) -> None:
+        """A scotch yoke turns its crank by the second order alone: of the first there is a rounding of that."""
+        yoke = SIX.replace("0.27", "0.0").replace("orders = [1, 2]", f"orders = [{order}]")
+        problem = problem_of(
+            tmp_path, yoke.replace("[0, 120, 240, 240, 120, 0]", "[0]").replace("shaking force", TORQUE)
+        )
+        assert (0.0 < objective_value(problem, evaluate(problem)) <= nothing_of(problem)) is none
 
 
 class TestBound:

@@ -14,6 +14,8 @@ from laufruhe.problem.problem import Problem
 
 ROUNDING = 1e-9
 """Share of what cancels that a sum of loads is taken for zero below."""
+OF_ORDERS = 1e-12
+"""Share of all orders of a part that one of them is taken for zero below: they are told from one signal."""
 SAMPLES = 96
 """Steps over the cycle at which a size is taken."""
 
@@ -21,7 +23,8 @@ SAMPLES = 96
 def nothing_of(problem: Problem, engine: Engine | None = None) -> float:
     """Objective that counts as zero [SI]: a rounding of the parts of an engine, each alone, added up.
 
-    A balanced engine has an objective of its own size no more; its parts still have theirs.
+    A balanced engine has an objective of its own size no more; its parts still have theirs. A part that has nothing of
+    an order has its other orders, which cancel there over the cycle.
 
     Parameters
     ----------
@@ -36,9 +39,19 @@ def nothing_of(problem: Problem, engine: Engine | None = None) -> float:
     engine = replace(engine, mounts=mounts)
     # the crank turns evenly: what one part alone does to its speed is not asked
     even = replace(problem, engine=engine, fidelity=replace(problem.fidelity, crank_inertia=math.inf))
+    whole = replace(
+        even, objective=tuple(replace(term, measure=_of_all_orders(term.measure)) for term in even.objective)
+    )
     total = sum(_alone(even, part) for part in _parts(engine))
+    if whole.objective != even.objective:
+        total += OF_ORDERS / ROUNDING * sum(_alone(whole, part) for part in _parts(engine))
     total += sum(term.weight * _own(term.measure, engine) for term in problem.objective)
     return ROUNDING * total
+
+
+def _of_all_orders(measure: Measure) -> Measure:
+    """What is measured of some orders, of all."""
+    return measure if not measure.is_load else replace(measure, orders=None)
 
 
 def _lossy(spring: Mount) -> Mount:
