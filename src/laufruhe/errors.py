@@ -73,6 +73,10 @@ class InputError(LaufruheError, ValueError):
         return InputError, (self.source, self.complaints)
 
 
+class LaufruheWarning(UserWarning):
+    """What a user should know of an answer that stands all the same."""
+
+
 class UncarriedLoadError(ModelError):
     """The engine excites a direction that no mount carries."""
 

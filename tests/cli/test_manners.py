@@ -13,12 +13,13 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from cli import scenes
 from laufruhe.cli import app
 from laufruhe.cli.screen import Watched, spoken
 from laufruhe.files import reader
 from laufruhe.numerics.progress import Step, listening, tell, within
 from laufruhe.solvers import solve
-from problem_files import PROBLEMS, loaded
+from problem_files import PROBLEMS, loaded, written
 
 run = CliRunner()
 COMMANDS = ("init", "examples", "engines", "solve", "evaluate", "study", "check", "explain", "trade")
@@ -225,3 +226,14 @@ def test_pictures_come_in_the_format_asked_for(here: Path, kind: str, ends: set[
     assert (folder / "bars.svg").read_text(encoding="utf-8").count("<svg") == 1
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert page.count("data:image/svg+xml;base64,") == len(list(folder.glob("*.svg")))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("more", "lines"), [([], 1), (["-q"], 0)])
+def test_letters_that_cannot_be_drawn_are_told_in_one_line(more: list[str], lines: int, tmp_path: Path) -> None:
+    """By a process that draws, once for all pictures; next to no font has Linear A."""
+    path = written(tmp_path, scenes.SHAKING_ONLY.replace('title = "', 'title = "\U00010600 '))
+    words = [sys.executable, "-m", "laufruhe", "evaluate", str(path), "--out", str(tmp_path / "out"), *more]
+    found = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120)
+    told = "laufruhe: no installed font has '\U00010600', so pictures show boxes in its place"
+    assert [line[: len(told)] for line in found.stderr.splitlines()] == lines * [told]

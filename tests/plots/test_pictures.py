@@ -256,6 +256,7 @@ def renamed(result: Result, names: tuple[str, ...]) -> Result:
     return replace(result, problem=problem, initial=with_name(result.initial), final=with_name(result.final))
 
 
+@pytest.mark.filterwarnings("ignore:no installed font has")
 @pytest.mark.parametrize(
     "called", [("$a$ and $b", "\\frac{", "{x}"), ("发动机", "a" * 60, "%d")], ids=["signs", "letters"]
 )

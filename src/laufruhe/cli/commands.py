@@ -30,6 +30,7 @@ from laufruhe.cli.screen import (
     in_time,
     progress,
     spoken,
+    warn_plainly,
 )
 from laufruhe.cli.supervised import is_interrupted, listen, supervised
 from laufruhe.errors import refused
@@ -310,6 +311,7 @@ def main() -> None:
         if hasattr(stream, "reconfigure"):
             # a terminal that knows no Greek gets an escape in place of a traceback
             stream.reconfigure(errors="backslashreplace")
+    warn_plainly()
     supervised(_run)
 
 

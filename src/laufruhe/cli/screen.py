@@ -6,6 +6,7 @@ import errno
 import math
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
@@ -14,7 +15,7 @@ from typing import TextIO, TypeAlias
 
 import typer
 
-from laufruhe.errors import Complaint, InputError, ModelError, SolverError, printed, refused
+from laufruhe.errors import Complaint, InputError, LaufruheWarning, ModelError, SolverError, printed, refused
 from laufruhe.numerics.progress import Step
 
 QUIET, PLAIN, VERBOSE = -1, 0, 1
@@ -143,6 +144,20 @@ def spoken(quiet: bool, verbose: bool) -> Iterator[None]:
 def is_quiet() -> bool:
     """Whether nothing but errors is wanted, and data where they are asked for."""
     return _loudness.get() == QUIET
+
+
+def warn_plainly() -> None:
+    """Warnings of this package as lines of the command, in the processes that it makes too; none with -q."""
+    usual = warnings.formatwarning
+
+    def format_of(
+        message: Warning | str, category: type[Warning], filename: str, lineno: int, line: str | None = None
+    ) -> str:
+        if not issubclass(category, LaufruheWarning):
+            return usual(message, category, filename, lineno, line)
+        return "" if is_quiet() else f"laufruhe: {printed(str(message))}\n"
+
+    warnings.formatwarning = format_of
 
 
 @contextmanager

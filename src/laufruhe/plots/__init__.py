@@ -8,6 +8,7 @@ from contextlib import chdir
 from functools import partial
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 # a matplotlibrc in the working folder, which may be broken, is none of ours
 with chdir(Path(__file__).parent):
@@ -17,6 +18,8 @@ from matplotlib.figure import Figure
 
 from laufruhe.errors import refused
 from laufruhe.numerics.processes import in_twins
+from laufruhe.physics.torsion import chain_of
+from laufruhe.plots.letters import prepare
 from laufruhe.plots.style import as_svg, save
 from laufruhe.present.pictures import PICTURES
 from laufruhe.solvers.result import Result
@@ -39,8 +42,21 @@ def figure(result: Result, name: str) -> Figure:
     if picture is None or not picture.applies(result):
         known = ", ".join(names(result))
         raise refused("name", f'"{name}"', "is no picture of this result", f"one of {known}", "figure")
+    prepare(_words(result))
     drawn: Figure = picture.figure(result)
     return drawn
+
+
+def _words(result: Result) -> Iterator[str]:
+    """All that the user has named, and pictures may show."""
+    problem, engine = result.problem, result.final.engine
+    yield from (problem.title, problem.source)
+    named: list[Any] = [*problem.points, *problem.limits, *problem.decisions]
+    named += [*engine.cylinders, *engine.mounts, *engine.rotors, *engine.bearings]
+    if engine.torsion is not None:
+        chain = chain_of(engine)
+        named += [*chain.discs, *chain.sections]
+    yield from (one.name for one in named)
 
 
 def draw(result: Result, folder: Path, kinds: Sequence[str] = ("png",)) -> tuple[str, ...]:
@@ -61,6 +77,8 @@ def get_ready() -> None:
 
 def draw_in_shares(result: Result, folder: Path, kinds: Sequence[str], count: int) -> dict[str, str]:
     """All pictures of a result as `draw_and_show` makes them, by so many processes."""
+    # what letters need is found once, for all processes
+    prepare(_words(result))
     wanted, (left, put) = names(result), os.pipe()
     os.write(put, bytes(range(len(wanted))))
     os.close(put)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,6 +17,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from laufruhe.plots import style
+from laufruhe.plots.letters import prepare
 from laufruhe.plots.style import as_svg, heading, page, save, styled
 from laufruhe.plots.words import SMALL, apart, ink_on, legible, typeset
 from laufruhe.studies.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
@@ -24,9 +25,25 @@ from laufruhe.studies.picture import Area, Axis, Bars, Colour, Line, Mark, Panel
 MOST_ENTRIES, FEW_ENTRIES = 8, 5
 
 
-@styled()
 def draw(picture: Picture) -> Figure:
     """The figure of a description."""
+    prepare(_texts(picture))
+    return _drawn(picture)
+
+
+def _texts(picture: Picture) -> Iterator[str]:
+    """All words of a picture."""
+    yield from (picture.title, picture.words, picture.credit)
+    for panel in picture.panels:
+        yield panel.title
+        for axis in (panel.x, panel.y):
+            yield from (axis.label, *(text for _, text in axis.ticks or ()))
+    for mark in (*(mark for panel in picture.panels for mark in panel.marks), *picture.legend):
+        yield mark.text if isinstance(mark, Words) else mark.label
+
+
+@styled()
+def _drawn(picture: Picture) -> Figure:
     rows = -(-len(picture.panels) // picture.columns)
     lead = 0.2 if any(panel.title for panel in picture.panels) else 0.0
     size = (picture.width, picture.size[1])

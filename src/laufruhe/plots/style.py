@@ -26,7 +26,8 @@ from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 from PIL import Image
 
-from laufruhe.plots.words import FAINT, FONT, INK, SMALL, fitted, round_ticks, typeset, width_of, wrapped
+from laufruhe.plots.letters import families
+from laufruhe.plots.words import FAINT, INK, SMALL, fitted, round_ticks, typeset, width_of, wrapped
 from laufruhe.present.measures import changed, load_designs
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result
@@ -52,7 +53,7 @@ _PER_TICK = 0.6
 
 # names and titles are the user's: a dollar sign in them starts no formula
 _SETTINGS: Any = {
-    "font.family": "sans-serif", "font.sans-serif": [FONT], "font.size": SMALL, "axes.titlesize": 10.0,
+    "font.size": SMALL, "axes.titlesize": 10.0,
     "axes.edgecolor": FAINT, "axes.labelcolor": INK, "axes.linewidth": 0.8, "axes.spines.top": False,
     "axes.spines.right": False, "axes.axisbelow": True, "axes.grid": True, "grid.color": "#e4e4e4",
     "grid.linewidth": 0.7, "text.color": INK, "xtick.color": FAINT, "ytick.color": FAINT, "path.simplify": True,
@@ -65,8 +66,8 @@ _SETTINGS: Any = {
 @contextmanager
 def styled() -> Iterator[None]:
     """Fonts and colours of all that is drawn meanwhile; a decorator of what makes a figure."""
-    with mpl.rc_context(_SETTINGS), warnings.catch_warnings():
-        # a name in a script that the font lacks shows boxes; the tables have it right
+    with mpl.rc_context({**_SETTINGS, "font.family": families()}), warnings.catch_warnings():
+        # letters that no font has are told once; the tables have them right
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         yield
 

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from laufruhe.numerics.arrays import Array
+from laufruhe.plots.letters import prepare
 from laufruhe.plots.style import Page, heading, page, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, spread, typeset
 from laufruhe.studies.trade import Row, Trade
@@ -38,9 +39,14 @@ def has_picture(found: Trade) -> bool:
     return any(row.error > 0.0 for row in found.rows)
 
 
-@styled()
 def figure(found: Trade) -> Figure:
     """One panel: evaluation time of another design against error, the front joined."""
+    prepare([found.problem.title])
+    return _drawn(found)
+
+
+@styled()
+def _drawn(found: Trade) -> Figure:
     drawn = page(1, 1, PANEL)
     axes, rows = drawn.panels[0], found.rows
     times = np.array([1e6 * row.evaluation for row in rows])

@@ -19,10 +19,10 @@ from matplotlib.ticker import MaxNLocator, ScalarFormatter
 from matplotlib.transforms import Affine2D
 
 from laufruhe.numerics.arrays import Array
+from laufruhe.plots.letters import FONT, families
 from laufruhe.present.numbers import NOTHING, number
 
 INK, FAINT = "#222222", "#5c5c5c"
-FONT = "DejaVu Sans"
 SMALL = 9.0
 """No letter of a picture is smaller [points]."""
 READ = 4.5
@@ -36,10 +36,14 @@ LARGE = 1e4
 """Numbers from here on are given in thousands of their unit."""
 
 
-@lru_cache(maxsize=4096)
 def width_of(text: str, size: float = SMALL, weight: str = "normal") -> float:
     """Of one line of text [inch]."""
-    font = FontProperties(family=FONT, size=size, weight=weight)
+    return _width_in(tuple(families()) if not text.isascii() else (FONT,), text, size, weight)
+
+
+@lru_cache(maxsize=4096)
+def _width_in(fonts: tuple[str, ...], text: str, size: float, weight: str) -> float:
+    font = FontProperties(family=list(fonts), size=size, weight=weight)
     return float(text_to_path.get_text_width_height_descent(text, font, ismath=False)[0]) / _POINTS
 
 

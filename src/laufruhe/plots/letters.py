@@ -1,0 +1,66 @@
+"""Fonts of pictures: one for all words, and for letters that it lacks the installed ones that have them."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+from functools import cache
+
+from matplotlib.font_manager import fontManager
+from matplotlib.ft2font import FT2Font
+
+from laufruhe.errors import LaufruheWarning
+
+FONT = "DejaVu Sans"
+_STAND_IN = "Last Resort"
+"""Fonts of this name draw boxes."""
+_REGULAR = (400, "normal", "regular", "book")
+_found: dict[str, str] = {}
+"""The font that stands in for a letter, empty where none is installed: of every letter that was asked for."""
+
+
+def prepare(texts: Iterable[str]) -> None:
+    """Find fonts for all letters of these texts; a warning names those that no installed font has."""
+    letters = {letter for text in texts if not text.isascii() for letter in text if letter.isprintable()}
+    new = sorted(letter for letter in letters - _found.keys() if ord(letter) not in _own())
+    _found.update((letter, next((name for name, has in _others() if ord(letter) in has), "")) for letter in new)
+    if lacking := "".join(letter for letter in new if not _found[letter]):
+        warnings.warn(
+            f"no installed font has {lacking[:20]!r}, so pictures show boxes in its place; install one that has it, "
+            "such as Noto Sans",
+            LaufruheWarning,
+            stacklevel=2,
+        )
+
+
+def families() -> list[str]:
+    """Fonts in the order in which a letter is looked for in them; the same letter is always found in the same one."""
+    used = set(_found.values())
+    return [FONT, *(name for name, _ in (_others() if used - {""} else ()) if name in used)]
+
+
+@cache
+def _own() -> frozenset[int]:
+    """Letters of the font of all words."""
+    return _letters_in(fontManager.findfont(FONT))
+
+
+@cache
+def _others() -> tuple[tuple[str, frozenset[int]], ...]:
+    """Installed fonts and their letters: those without serifs first, then by how many letters they have."""
+    paths = {
+        entry.name: entry.fname
+        for entry in reversed(fontManager.ttflist)
+        if entry.weight in _REGULAR and entry.style == "normal" and not entry.name.startswith((FONT, _STAND_IN))
+    }
+    found = [(name, _letters_in(path)) for name, path in paths.items()]
+    return tuple(sorted(found, key=lambda font: ("sans" not in font[0].lower(), -len(font[1]), font[0])))
+
+
+def _letters_in(path: str) -> frozenset[int]:
+    """None of a font of pictures, which cannot be drawn at every size, and of a file that is no font any more."""
+    try:
+        font = FT2Font(path)
+        return frozenset(font.get_charmap()) if font.scalable else frozenset()
+    except (OSError, RuntimeError):
+        return frozenset()
