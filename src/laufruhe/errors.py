@@ -13,6 +13,16 @@ def printed(text: str, most: int = 2000) -> str:
     return shown if len(text) <= most and len(shown) <= most else shown[: most - 3] + "..."
 
 
+def plural(name: str, count: int) -> str:
+    """A noun as it stands behind a number."""
+    return name if count == 1 else f"{name}s"
+
+
+def counted(count: int, name: str) -> str:
+    """So many of them: 1 cylinder, 4 cylinders."""
+    return f"{count} {plural(name, count)}"
+
+
 class LaufruheError(Exception):
     """Base of every error this package raises on purpose."""
 

@@ -57,7 +57,7 @@ def test_the_layout_is_its_list_of_parts(tmp_path: Path) -> None:
     assert np.abs(loads[0][:, 3]).max() > 100.0
     np.testing.assert_allclose(loads[0], loads[1], atol=1e-9 * np.abs(loads[0]).max())
     for problem in problems:
-        assert "2 cylinder(s)" in problem.summary
+        assert "2 cylinders" in problem.summary
         assert np.degrees(problem.engine.firing_intervals) == pytest.approx([180.0, 180.0])
 
 

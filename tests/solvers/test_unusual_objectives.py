@@ -108,7 +108,6 @@ def test_nothing_open_on_elastic_mounts_is_evaluated(closed: Problem) -> None:
 
 def test_a_problem_shows_itself_in_a_line(closed: Problem) -> None:
     assert repr(closed) == (
-        "<Problem problem, 1 cylinder(s), four-stroke, 4 mount(s), 1 operating point(s), "
-        "0 constraint(s); open: nothing>"
+        "<Problem problem, 1 cylinder, four-stroke, 4 mounts, 1 operating point, 0 limits; open: nothing>"
     )
-    assert closed._repr_html_().startswith("<strong>test</strong><br>problem, 1 cylinder(s)")
+    assert closed._repr_html_().startswith("<strong>test</strong><br>problem, 1 cylinder")

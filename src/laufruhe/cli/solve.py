@@ -14,7 +14,7 @@ from laufruhe.cli.check import doubt
 from laufruhe.cli.drawing import drawing
 from laufruhe.cli.request import Request, timed
 from laufruhe.cli.screen import DONE, FAILED, Watched, above_zero, json_file, progress
-from laufruhe.errors import SolverError
+from laufruhe.errors import SolverError, counted
 from laufruhe.files.reader import load
 from laufruhe.numerics.progress import Listener
 from laufruhe.problem.problem import Problem
@@ -68,7 +68,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         stage = places.enter_context(files.staged(files.Set(folder, option, request.verb)))
         copy = json_file(request.json, [request.problem], places)
         open_numbers = len(problem.decisions)
-        what = "stars and firing orders" if problem.phasing is not None else f"{open_numbers} open number(s)"
+        what = "stars and firing orders" if problem.phasing is not None else counted(open_numbers, "open number")
         what = "which parts go where" if problem.assembly else what
         say(f"deciding {what}" if open_numbers or problem.phasing is not None or problem.assembly else "evaluating")
         result = answer(problem, Watched(say, problem.objective_unit or ""))

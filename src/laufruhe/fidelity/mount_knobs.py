@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from laufruhe.errors import UncarriedLoadError
+from laufruhe.errors import UncarriedLoadError, plural
 from laufruhe.fidelity.error_bounds import Scale
 from laufruhe.fidelity.knob import PART_SHARE, Knob, LeftOut, Rungs, part_left_out
 from laufruhe.physics.elastic_mounts import ElasticMounting
@@ -97,17 +97,17 @@ class _Modes(_OfElasticMounts):
             return []
         modes = scale.excited_modes if fidelity.modes is None else fidelity.modes
         rest = "; modes are of the stiffness at rest, loads of that at each frequency" if scale.mounting.dynamic else ""
-        return [f"mode(s) {mode_names(scale.mounting, modes)} of the block on its mounts{rest}"]
+        return [f"{mode_names(scale.mounting, modes)} of the block on its mounts{rest}"]
 
     def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
         if scale.mounting is None:
             return []
         found, still = [], [mode for mode in range(1, 7) if mode not in scale.excited_modes]
         if still:
-            found.append(LeftOut(f"mode(s) {mode_names(scale.mounting, still)} of the block", "nothing excites them"))
+            found.append(LeftOut(f"{mode_names(scale.mounting, still)} of the block", "nothing excites them"))
         if fidelity.modes is not None:
             silent = [mode for mode in scale.excited_modes if mode not in fidelity.modes]
-            what, every = f"mode(s) {mode_names(scale.mounting, silent)} of the block", replace(fidelity, modes=None)
+            what, every = f"{mode_names(scale.mounting, silent)} of the block", replace(fidelity, modes=None)
             found.append(part_left_out(scale, fidelity, every, what, "what they answer is small"))
         return found
 
@@ -117,7 +117,10 @@ class _Modes(_OfElasticMounts):
             return []
         by_strength = sorted(scale.strengths, key=lambda mode: -scale.strengths[mode])
         most = [tuple(sorted(by_strength[:count])) for count in (1, 3) if count < len(by_strength)]
-        return [(f"mode(s) {', '.join(map(str, m))}, 720 steps", Fidelity(samples=720, modes=m)) for m in most]
+        return [
+            (f"{plural('mode', len(m))} {', '.join(map(str, m))}, 720 steps", Fidelity(samples=720, modes=m))
+            for m in most
+        ]
 
 
 MOUNT_KNOBS: tuple[Knob, ...] = (_Mounts(), _Modes())
@@ -126,4 +129,5 @@ MOUNT_KNOBS: tuple[Knob, ...] = (_Mounts(), _Modes())
 def mode_names(mounting: ElasticMounting, modes: Iterable[int]) -> str:
     """Modes in words, 1 the lowest: number, motion and natural frequency."""
     own = mounting.modes
-    return ", ".join(f"{k} ({own.names[k - 1]}, {own.frequencies[k - 1]:.3g} Hz)" for k in modes)
+    named = [f"{k} ({own.names[k - 1]}, {own.frequencies[k - 1]:.3g} Hz)" for k in modes]
+    return f"{plural('mode', len(named))} {', '.join(named)}"

@@ -104,5 +104,5 @@ def _modes_of_the_sag(problem: Problem) -> list[LeftOut]:
     mounting = mounting_in(problem.engine)
     drive = np.abs(mounting.modes.shapes.T @ weight_wrench(mounting.block))
     still = [k + 1 for k in range(len(drive)) if drive[k] <= SAME * drive.max()]
-    what = f"mode(s) {mode_names(mounting, still)} of the block"
+    what = f"{mode_names(mounting, still)} of the block"
     return [LeftOut(what, "weight does not move them")] if still else []

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, TypeAlias
 from pydantic import Field
 
 from laufruhe import units
+from laufruhe.errors import counted
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, blamed_on, nearest, none_of, one_of
 from laufruhe.files.engine_keys import BigEndTable, RodTable, ShaftTable, SliderCrankTable, with_owned_keys
@@ -177,7 +178,7 @@ def _cylinders(table: EngineTable) -> int:
     first, count = given[0]
     for key, other in given:
         if other != count:
-            rule = f"makes {other} cylinder(s), but engine.{first} makes {count}"
+            rule = f"makes {counted(other, 'cylinder')}, but engine.{first} makes {count}"
             raise Refused(f"engine.{key}", None, rule, "let them agree")
     check_order(table.given_order, count)
     return count

@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
+from laufruhe.errors import counted
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, all_different, blamed_on, measured
 from laufruhe.files.csv_rows import rows_of
@@ -175,7 +176,7 @@ def _chamber(table: ChamberTable, k: int, folder: Path, parts: Sequence[SliderCr
     numbers = table.cylinders if table.cylinders is not None else range(1, len(parts) + 1)
     for number in numbers:
         if number > len(parts):
-            rule = f"is none of {len(parts)} cylinder(s)"
+            rule = f"is none of {counted(len(parts), 'cylinder')}"
             raise Refused(f"{where}.cylinders", str(number), rule, "count them from 1")
     with blamed_on(f"{where}.{key}"):
         made = (

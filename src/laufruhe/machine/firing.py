@@ -16,7 +16,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, counted
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.turns import SAME_TURN, angle_of
@@ -106,7 +106,7 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
     found = tuple(_patterns(lattice, pins[0], len(layout.throw_positions)))
     if not found:
         raise NoEvenStarError(
-            f"no star of {len(layout.throw_positions)} throw(s) fires evenly with cylinders of one throw "
+            f"no star of {counted(len(layout.throw_positions), 'throw')} fires evenly with cylinders of one throw "
             f"{' and '.join(f'{360.0 * s / lattice.steps:g}' for s in pins[0])} deg apart"
         )
     return found

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any, Generic, TypeVar
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, counted
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import even_orders, firing_lattice, slot_order, slot_steps, star_throws
 from laufruhe.machine.layouts import Layout, even_throws
@@ -235,7 +235,7 @@ class PhasingOf(Generic[P]):
             ("firing order", self.firing_order is None),
             ("bank angle", self.opened[0]),
             ("split pin angle", self.opened[1]),
-            (f"which of {sum(map(len, self.shafts.optional))} shaft(s) are built", bool(self.shafts.optional)),
+            (f"which of {counted(sum(map(len, self.shafts.optional)), 'shaft')} are built", bool(self.shafts.optional)),
         )
         return tuple(name for name, is_open in found if is_open)
 

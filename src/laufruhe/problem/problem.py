@@ -11,7 +11,7 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.errors import Complaint, ModelError, wrong_call
+from laufruhe.errors import Complaint, ModelError, counted, wrong_call
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.willans import FrictionTest
@@ -159,10 +159,9 @@ class Problem:
     def summary(self) -> str:
         """What the problem is about and what of it is open, in one line."""
         engine = self.engine
-        parts = [
-            self.name, f"{len(engine.cylinders)} cylinder(s), {engine.cycle}", f"{len(engine.mounts)} mount(s)",
-            f"{len(self.points)} operating point(s)", f"{len(self.limits)} constraint(s)",
-        ]  # fmt: skip
+        numbers = {"mount": engine.mounts, "operating point": self.points, "limit": self.limits}
+        parts = [self.name, counted(len(engine.cylinders), "cylinder"), str(engine.cycle)]
+        parts += [counted(len(each), name) for name, each in numbers.items()]
         names = list(self.phasing.open_names) if self.phasing is not None else []
         names += [decision.name + (" and angle" if decision.set.width > 1 else "") for decision in self.decisions]
         names += [f"the {lot.kind} of every cylinder" for lot in self.assembly.lots] if self.assembly else []

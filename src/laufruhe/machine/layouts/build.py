@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 from fractions import Fraction
 from typing import Any
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, counted
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
@@ -115,7 +115,7 @@ def firing_angles(
         if centre >= start + cycle.turns - SAME_TURN:
             raise ModelError(
                 f"throws {[round(math.degrees(t), 3) for t in throws]} deg cannot fire in the order "
-                f"{list(firing_order)} within {cycle.turns} turn(s): cylinder {number} would come after "
+                f"{list(firing_order)} within {counted(cycle.turns, 'turn')}: cylinder {number} would come after "
                 f"{math.degrees(angle_of(centre)):.6g} deg"
             )
         angles[k] = angle_of(centre)
@@ -201,7 +201,7 @@ def build(
         If the order cannot be met by the throws.
     """
     if len(angles) != len(layout.throw_positions):
-        raise ModelError(f"{len(angles)} throw(s) given where the layout has {len(layout.throw_positions)}")
+        raise ModelError(f"{counted(len(angles), 'throw')} given where the layout has {len(layout.throw_positions)}")
     cylinders = range(len(layout.positions))
     fires = (
         firing_angles(cycle, layout, angles, firing_order)

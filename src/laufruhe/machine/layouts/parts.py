@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, counted
 from laufruhe.machine.layouts.base import Asked, LayoutKind
 from laufruhe.machine.layouts.places import Layout
 
@@ -17,4 +17,4 @@ class Parts(LayoutKind):
 
     def place(self, asked: Asked) -> Layout:
         """Nothing is placed: the list says where everything is."""
-        raise ModelError(f"a list of {asked.cylinders} slider-crank(s) has no layout; fix the throws")
+        raise ModelError(f"a list of {counted(asked.cylinders, 'slider-crank')} has no layout; fix the throws")

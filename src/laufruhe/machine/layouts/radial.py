@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
-from laufruhe.errors import KeyedError, ModelError
+from laufruhe.errors import KeyedError, ModelError, counted
 from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
 from laufruhe.machine.layouts.base import Asked, Key, LayoutKind, rod_of
 from laufruhe.machine.layouts.build import Mechanism, Throw, build, numbers_of
@@ -152,8 +152,8 @@ def _master_rod(asked: Asked) -> MasterRod:
         raise KeyedError("articulated_rod", "is missing beside [engine.rod]; add it, or leave both out")
     banks = _banks(count)
     if given is not None and len(given) != count - 1:
-        rule = f"has {len(given)} angle(s) for {count - 1} articulated rod(s); give one each, by cylinder"
-        raise KeyedError("knuckle_angles", rule)
+        rule = f"has {counted(len(given), 'angle')} for {counted(count - 1, 'articulated rod')}"
+        raise KeyedError("knuckle_angles", f"{rule}; give one each, by cylinder")
     even = [bank - banks[master - 1] for bank in banks]
     angles = even if given is None else [*given[: master - 1], 0.0, *given[master - 1 :]]
     return MasterRod(

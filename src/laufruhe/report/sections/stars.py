@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Container
 
+from laufruhe.errors import counted
 from laufruhe.machine.crank_names import name_of_crank
 from laufruhe.present.measures import objective_unit, ranking_of
 from laufruhe.present.numbers import DASH, number, percent, trimmed
@@ -46,7 +47,7 @@ def _stars(result: Result, phasing: PhasingResult) -> Grid:
     head = ("rank", "throws [deg]", *(("shafts",) if built else ()), objective, *orders, "intervals [deg]")
     note = (
         "Free force / couple of the star alone by order, in forces of one throw and that times the throw spacing. "
-        f"{phasing.designs} star(s) to choose from; {phasing.method}."
+        f"{counted(phasing.designs, 'star')} to choose from; {phasing.method}."
     )
     return Grid("Crank stars", head, tuple(rows), left=3 if built else 2, note=note)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from laufruhe.errors import counted
 from laufruhe.physics.torsion import chain_of
 from laufruhe.present.measures import changed
 from laufruhe.present.numbers import DASH, RPM, number
@@ -28,7 +29,7 @@ def _modes(result: Result, facts: TorsionFacts) -> Grid:
     swings = [[f"{swing:+.3f}" for swing in shape] for shape in facts.modes.shapes.T]
     rows = tuple((f"{m + 1}", number(float(facts.modes.frequencies[m])), *swings[m]) for m in shown)
     rest = len(facts.modes.frequencies) - len(shown)
-    more = f" {rest} higher one(s) are in result.json." if rest else ""
+    more = f" {counted(rest, 'higher mode')} in result.json." if rest else ""
     note = f"Undamped. Angle of every disc, the largest of each mode one.{more}"
     return Grid("Natural modes of the crankshaft", ("mode", "Hz", *names), rows, note=note, sheet="crankshaft-modes")
 

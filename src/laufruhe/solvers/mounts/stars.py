@@ -16,7 +16,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TypeAlias
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, counted
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.norms import RMS
@@ -156,7 +156,7 @@ def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star]) -> li
     results = list[Result]()
     with limited(phasing.time_limit):
         for first in problems[:1]:
-            with within(f"first of {len(stars)} star(s)"):
+            with within(f"first of {counted(len(stars), 'star')}"):
                 results.append(solve_mounts(first, among=True))
         known = [result for result in results if result.decisions and starts > BESIDE]
         near = place_of(known[0].problem, known[0])[0] if known else None
@@ -259,10 +259,14 @@ def _certificate(
 def _method(found: list[StarDesign], designs: int) -> str:
     moved = sum(each.moved for each in found)
     even = len(found) - moved
-    text = f"mounts and balance decided for each of {even} star(s)" if even else "mounts, balance and throws decided"
+    text = (
+        f"mounts and balance decided for each of {counted(even, 'star')}"
+        if even
+        else "mounts, balance and throws decided"
+    )
     if even and designs > even:
         text += f", the best of {designs} on the mounts as given"
-    return f"{text}; throws moved from {moved} start(s)" if moved else text
+    return f"{text}; throws moved from {counted(moved, 'start')}" if moved else text
 
 
 def _entry(phasing: Phasing, found: StarDesign, proven: bool) -> RankedStar:
@@ -287,7 +291,9 @@ def _none(problem: Problem, found: list[StarDesign], given: Evaluation, designs:
     # what one star breaks another may keep
     told = {name for each in found for name in each.result.conflict} if proven else ()
     conflict = tuple(limit.name for limit in problem.limits if limit.name in told)
-    message = f"{contradiction(conflict) if proven else first.message} (best of {len(found)} of {designs} star(s))"
+    message = (
+        f"{contradiction(conflict) if proven else first.message} (best of {len(found)} of {counted(designs, 'star')})"
+    )
     return replace(
         first, problem=problem, status=status, objective=None, certificate=None, initial=given, final=given,
         message=message, conflict=conflict,

@@ -10,7 +10,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from laufruhe.errors import ModelError, SolverError
+from laufruhe.errors import ModelError, SolverError, counted
 from laufruhe.load_models.lone_parts import gas_tells_apart
 from laufruhe.machine.firing import MOST_ORDERS
 from laufruhe.numerics.budget import limited, passed
@@ -172,7 +172,7 @@ def by_each_order(
     bound = min([least, *(design.bound for design in every)]) if complete else 0.0
     count = sum(map(len, orders.values()))
     of_stars = f" of {len(stars)} stars" if len(stars) > 1 else ""
-    method = f"{len(told)} of {count} firing order(s){of_stars}, {len(sets)} set(s) of shafts examined"
+    method = f"{len(told)} of {counted(count, 'firing order')}{of_stars} seen at {counted(len(sets), 'set')} of shafts"
     if len(every) < len(designs) and complete:
         method += f", {len(designs) - len(every)} of these by one order of the torque alone"
     proof = best.result.certificate
@@ -243,7 +243,7 @@ def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
         if StarDesign(candidate, result).is_met:
             break
     else:
-        why = f"each of the {len(fired)} best star(s) breaks a limit between the angles that the search looks at"
+        why = f"each of the best {counted(len(fired), 'star')} breaks a limit between angles that the search looks at"
         return no_star(problem, f"{why}; raise phasing.best or fidelity.samples", Status.FAILED)
     value = result.objective.value if result.objective else best.value
     shared = firing_bound(problem, result.final) if result.objective and not any(phasing.opened) else 0.0
@@ -277,7 +277,7 @@ def _none(problem: Problem, tried: int) -> Result:
     """Stars exist, but none keeps all limits: one may break some of them, and another the others."""
     names = tuple(limit.name for limit in problem.limits)
     shown = (quoted(names) or "the bounds") + " together" * (len(names) > 1)
-    why = f"no star keeps {shown}, whatever else is decided ({tried} design(s) tried)"
+    why = f"no star keeps {shown}, whatever else is decided ({counted(tried, 'design')} tried)"
     return no_star(problem, why, conflict=names)
 
 

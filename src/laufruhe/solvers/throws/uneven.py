@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from laufruhe.errors import ModelError
+from laufruhe.errors import ModelError, counted
 from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
@@ -284,7 +284,7 @@ def _result(
     trade: tuple[TradePoint, ...], bound: float, source: str,
 ) -> Result:  # fmt: skip
     best = found[0]
-    method = f"IPOPT from {len(found)} start(s), firing orders kept; bound from {source}"
+    method = f"IPOPT from {counted(len(found), 'start')}, firing orders kept; bound from {source}"
     # no norm lies under zero: who reaches it is done
     certificate = certified(
         best.value, bound, nothing_of(problem), problem.tolerance, Reach.NEAR, best.kkt_residual, method

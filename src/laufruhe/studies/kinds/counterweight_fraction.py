@@ -92,7 +92,7 @@ class CounterweightFraction(SweptPart):
             ]
             legend.append(p.Line(colour=colour, marker="o", label=label))
         panel = p.Panel(marks, p.Axis("balance factor"), metric_axis(data))
-        words = f"Dot: {claimed(data)}, the fraction left open."
+        words = f"Dot: {claimed(data)}, the balance factor left open."
         return p.Picture(data.attrs["title"], words, [panel], p.credit(data), legend=legend)
 
 
