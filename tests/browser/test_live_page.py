@@ -52,6 +52,17 @@ def shown(every: Page):
     return every
 
 
+@pytest.mark.parametrize("width", [420, 500, 700, 1280])
+def test_paths_of_all_mounts_are_of_one_size(shown, width):
+    """The last row too, which may have fewer."""
+    usual = shown.viewport_size
+    shown.set_viewport_size({"width": width, "height": 900})
+    widths = shown.evaluate("[...document.querySelectorAll('.live-polar svg')].map(svg => svg.clientWidth)")
+    shown.set_viewport_size(usual)
+    assert len(widths) > 2
+    assert max(widths) - min(widths) <= 1
+
+
 def test_a_broken_limit_is_said(shown):
     shown.evaluate("laufruheLive.page.then(page => page.setDesign({'web.mass': 2}))")
     row = shown.locator('tr[data-measure="counterweight mass"]')

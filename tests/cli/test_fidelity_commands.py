@@ -25,6 +25,7 @@ def test_explain_says_what_is_left_out(tmp_path: Path) -> None:
     assert answer.exit_code == 0, answer.output
     for text in ("Computed:", "Left out:", "Cost:", "gas: the problem describes none", "loads Fx"):
         assert text in answer.output
+    assert re.search(r"samples of force components, one in \d+\n", answer.output)
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -53,6 +54,7 @@ def test_trade_measures_every_fidelity(tmp_path: Path) -> None:
     # tables as every command draws them, not as Markdown has them
     assert "|" not in answer.output
     assert "auto 0.001 " in answer.output
+    assert answer.output.endswith("(begin with scene.html)\n")
     assert max(map(len, answer.output.splitlines())) <= PIPE_WIDTH
     (data,) = json.loads((tmp_path / "trade.json").read_text(encoding="utf-8"))
     assert len(data["rows"]) >= 10

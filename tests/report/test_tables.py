@@ -59,6 +59,10 @@ def test_the_angle_of_nothing_is_a_dash() -> None:
     assert rows["left.angle"][2].endswith(" deg")
 
 
+def test_what_to_open_first_is_told() -> None:
+    assert screen(scenes.solved(scenes.TIGHT)).endswith("Results: results/scene (begin with report.html)\n")
+
+
 def test_a_bound_is_marked() -> None:
     result = scenes.solved(scenes.PARTS)
     rows = {row[0]: row for row in tables_of(result)[0].rows}
@@ -132,7 +136,7 @@ def test_why_a_star_wins_is_told_by_its_free_couples() -> None:
 def test_weights_are_in_grams_and_throws_have_their_balance_factor() -> None:
     tables = {grid.title: grid for grid in tables_of(scenes.solved(scenes.PARTS))}
     made = dict(zip(tables["Weights as decided"].head, tables["Weights as decided"].rows[0], strict=True))
-    assert float(made["g mm after"]) == pytest.approx(1e6 * float(made["kg m"]), rel=1e-3)
+    assert float(made["unbalance after [g mm]"]) == pytest.approx(1e6 * float(made["in kg m"]), rel=1e-3)
     assert [row[-1] for row in tables["Balance factors"].rows] == ["100.0 %"]
     # a factor of nothing on a throw without rotating mass is a weight of nothing, and still a factor
     plain = {grid.title: grid for grid in tables_of(laufruhe.solve(_OPEN_FACTOR))}
@@ -154,7 +158,7 @@ def document_on(width: int, *blocks: Bullets | Grid | Paragraph) -> list[str]:
     stream = io.StringIO()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("laufruhe.report.screen.PIPE_WIDTH", width)
-        show_document(Document("Title", blocks), stream, Path("out"))
+        show_document(Document("Title", blocks), stream, Path("out"), "report.html")
     return stream.getvalue().splitlines()
 
 

@@ -97,9 +97,10 @@ def test_limits_of_a_run_up_are_decided_by_from_a_good_start_too() -> None:
 @pytest.mark.slow
 def test_an_index_lists_what_nothing_is_traded_for(tmp_path: Path) -> None:
     paths = [PROBLEMS / f"{name}.toml" for name in ("waterworks-steam-pump", "boxer-four")]
-    found, _ = traded(paths, tmp_path / "trade", lambda _: None)
+    found, page, _ = traded(paths, tmp_path / "trade", lambda _: None)
     lines = found.as_markdown("").splitlines()
     assert (tmp_path / "trade/README.md").read_text(encoding="utf-8") == found.as_markdown("")
+    assert page == "README.md"
     pump, boxer = (next(line for line in lines if path.stem in line) for path in paths)
     assert "nothing is open" in boxer
     assert "the flywheel is open" in pump

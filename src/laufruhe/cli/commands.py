@@ -278,8 +278,8 @@ def trade(
         folder = out or Path("results") / "trade"
         with handing_out(json, *problems) as hand_out:
             with progress() as say:
-                document, data = traded(problems, folder, say)
-            hand_out(lambda stream: show_document(document, stream, folder), data)
+                document, page, data = traded(problems, folder, say)
+            hand_out(lambda stream: show_document(document, stream, folder, page), data)
 
 
 def _show_version(wanted: bool) -> None:

@@ -62,8 +62,8 @@ def _mount_times(problem: Problem, choice: Choice) -> tuple[float, float]:
     return times[0], times[1]
 
 
-def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[Document, Callable[[], str]]:
-    """Pages and pictures of every problem, an index of several; what is to be shown of them, and what makes JSON."""
+def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[Document, str, Callable[[], str]]:
+    """Pages and pictures of every problem, an index of several; what is to be shown, the page of it, and JSON."""
     read = [(path, _with_objective(path)) for path in paths]
     of_wheels = [(path, problem.name) for path, problem in read if problem.flywheel_decisions]
     if len(of_wheels) == len(read):
@@ -82,11 +82,11 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
         raise SolverError(f"the time limit is over: {what}; raise it")
     trades = [found[k] for k in range(len(problems))]
     if len(read) == 1:
-        return _page(paths[0], trades[0]), lambda: _together(trades)
+        return _page(paths[0], trades[0]), f"{problems[0].name}.html", lambda: _together(trades)
     index = report.index(trades, [name for _, name in of_wheels])
     with files.staged(files.Set(folder, "--out", "trade", ["README.md"], adds=True)) as stage:
         files.write(stage / "README.md", index.as_markdown(""))
-    return index, lambda: _together(trades)
+    return index, "README.md", lambda: _together(trades)
 
 
 def _together(trades: Sequence[Trade]) -> str:

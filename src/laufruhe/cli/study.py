@@ -42,7 +42,7 @@ def studied(
         write_study(study, datasets, seconds, stage, command, say, draw, f".{kinds[0]}")
     kept.unlink(missing_ok=True)
     spent = "".join(f"{duration:8.1f} s on one core  {name}\n" for name, duration in seconds.items())
-    text = f"{spent}done in {time.perf_counter() - started:.1f} s\nResults: {folder}\n"
+    text = f"{spent}done in {time.perf_counter() - started:.1f} s\n{files.placed(folder, files.PAGE)}\n"
     return text, lambda: as_json(study, datasets, seconds)
 
 

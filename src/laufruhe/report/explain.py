@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from laufruhe.fidelity.automatic import Choice
+from laufruhe.present.numbers import trimmed
 from laufruhe.problem.problem import Problem
 from laufruhe.report.strict_json import strict
 
@@ -18,7 +19,7 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
         Of one evaluation of a further design: as chosen, and exact over the whole cycle.
     """
     pruned, whole = choice.numbers
-    fewer = f", 1/{whole / pruned:.2g}" if 0 < pruned < whole else ""
+    fewer = f", one in {trimmed(whole / pruned, 2)}" if 0 < pruned < whole else ""
     met = "" if choice.error_estimate <= tolerance else "; even the reference is no better: give a smoother gas trace"
     lines = [
         f"{problem.title}",

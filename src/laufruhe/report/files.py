@@ -174,6 +174,11 @@ def staged_file(path: Path, option: str) -> Iterator[Path]:
             os.replace(stage / path.name, path)
 
 
+def placed(folder: Path, page: str) -> str:
+    """Where the files are, and which of them to open first."""
+    return f"Results: {folder} (begin with {page})"
+
+
 def write(path: Path, text: str) -> None:
     """Text as UTF-8, the same on every system."""
     # a file name that is no text leaves lone surrogates behind; JSON writes them as \udcxx

@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from laufruhe.report.document import Bullets, Document, Heading, Paragraph
+from laufruhe.report.files import PAGE, placed
 from laufruhe.report.grid import Grid, unmarked
 from laufruhe.report.sections import tables_of
 from laufruhe.report.wording import explained, fidelity_of, headline, told
@@ -38,10 +39,10 @@ def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
     console.print()
     console.print(Text(fidelity_of(result), style="dim"))
     if folder is not None:
-        _print_place(console, folder)
+        _print_place(console, folder, PAGE)
 
 
-def show_document(document: Document, stream: TextIO, folder: Path) -> None:
+def show_document(document: Document, stream: TextIO, folder: Path, page: str) -> None:
     """Print words and tables of a page, and where its files are; pictures and lines to type stand there."""
     console = _console(stream)
     console.print(Text(document.title, style="bold"))
@@ -59,7 +60,7 @@ def show_document(document: Document, stream: TextIO, folder: Path) -> None:
             case Grid():
                 _print_grid(console, block)
                 console.print()
-    _print_place(console, folder)
+    _print_place(console, folder, page)
 
 
 def _console(stream: TextIO) -> Console:
@@ -70,8 +71,8 @@ def _console(stream: TextIO) -> Console:
     return console
 
 
-def _print_place(console: Console, folder: Path) -> None:
-    console.print(Text(f"Results: {folder}", overflow="fold"))
+def _print_place(console: Console, folder: Path, page: str) -> None:
+    console.print(Text(placed(folder, page), overflow="fold"))
 
 
 def _print_item(console: Console, text: str) -> None:

@@ -44,8 +44,8 @@ def _weights(result: Result) -> Grid:
         rows.append((rotor.name, trimmed(1e3 * rotor.x), *lead, *_in_grams(rotor, scale),
                      number(abs(rotor.unbalance), scale=scale), mass, radius))  # fmt: skip
     sides = (" before", " after") if two else ("",)
-    sizes = [f"{what}{side}" for side in sides for what in ("g mm", "deg")]
-    head = ("weight", "x [mm]", *sizes, "kg m", "mass [g]", "at radius [mm]")
+    sizes = [f"{what}{side} [{unit}]" for side in sides for what, unit in (("unbalance", "g mm"), ("angle", "deg"))]
+    head = ("weight", "x [mm]", *sizes, "in kg m", "mass [g]", "at radius [mm]")
     return Grid("Weights" + (" as decided" if two else ""), head, tuple(rows), note=_ANGLES, sheet="weights")
 
 
