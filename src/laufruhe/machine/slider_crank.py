@@ -218,10 +218,12 @@ class SliderCrank:
 
     def faces(self, other: SliderCrank) -> bool:
         """Whether two pistons work against each other in one cylinder: on one axis, each towards the other (C5)."""
+        if self.x != other.x:
+            return False
         axis, opposite = cis(as_turn(self.bank)), cis(as_turn(other.bank))
         apart = complex(other.shaft.z - self.shaft.z, other.shaft.y - self.shaft.y) * axis.conjugate()
         reach = _ON_ONE_AXIS * abs(apart)
-        return self.x == other.x and abs(axis + opposite) < _ON_ONE_AXIS and abs(apart.imag) <= reach < apart.real
+        return abs(axis + opposite) < _ON_ONE_AXIS and abs(apart.imag) <= reach < apart.real
 
     @property
     def swept(self) -> Swept:

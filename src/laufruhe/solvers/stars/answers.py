@@ -13,11 +13,16 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.amplitudes import AmplitudeObjective, amplitude_objective
 from laufruhe.load_models.pair_tables import PairObjective
 from laufruhe.load_models.star_model import StarModel
+from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.star_space import StarSpace
+from laufruhe.problem.channels import ROCKING_COUPLE
+from laufruhe.problem.evaluation import Evaluation, evaluate, finely, objective_value
+from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
+from laufruhe.prove.throws.firing_share import firing_bound
 from laufruhe.solvers.stars.cuts import CutsFound, search_designs
 from laufruhe.solvers.stars.exchange import improved
 from laufruhe.solvers.stars.families import Family, FiringFamily
@@ -128,7 +133,8 @@ def _stars_answer(phasing: Phasing, family: Family, found: StarsFound, method: s
 def _by_designs(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
     """Everything else is decided by cone programs: cuts where the stars can be listed, else the program."""
     if phasing.method is Method.PROGRAM or sum(family.size for family in families) > MOST_LISTED:
-        return _by_program(problem, phasing, families)
+        shared = None if phasing.method is Method.PROGRAM else _with_what_all_have(problem, phasing, families)
+        return _by_program(problem, phasing, families) if shared is None else shared
     nothing = nothing_of(problem)
     count = 10**9 if phasing.method is Method.ENUMERATION else phasing.best
     answers = []
@@ -152,6 +158,51 @@ def _by_designs(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         closed = found.complete or _is_closed(found, problem.tolerance, nothing)
         answers.append(Answer(designs, found.lower_bound, closed, len(found.solved), method, found.infeasible))
     return _joined(answers, phasing.best)
+
+
+def _with_what_all_have(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer | None:
+    """Stars that leave no more than every even star has (S40), sought among those without couples (S46).
+
+    None where those that are drawn leave more, which proves nothing.
+    """
+    if len(families) > 1 or problem.decisions:
+        return None
+    (family,) = families
+    found = _with_least_couples(phasing, family)
+    designs, bound = [], 0.0
+    for steps in found:
+        value, design = _evaluated(phasing, family, steps)
+        bound, fine = firing_bound(problem, design), finely(design)
+        # a search at more angles closes what these leave open of a mean (P7)
+        left = gap_of(objective_value(problem, fine), firing_bound(problem, fine), nothing_of(problem, design.engine))
+        if left <= problem.tolerance:
+            designs.append(_decided(phasing, family, steps, (), value, bound, True))
+    if not designs:
+        return None
+    designs.sort(key=lambda design: design.value)
+    return Answer(tuple(designs), bound, True, len(found), "star without couples, which leaves what every even one has")
+
+
+def _with_least_couples(phasing: Phasing, family: Family) -> list[tuple[int, ...]]:
+    """Stars with little couple, none where more than that tells stars apart: no swap of two throws lessens it."""
+    of_couples = replace(phasing, realise=lambda candidate: _couples(phasing.realise(candidate)))
+    own = _amplitudes(of_couples, family)
+    if own is None:
+        return []
+    # in no time it looks at those that it starts from
+    found = search_stars(replace(family.space, mirror=True, reflect=True), own, phasing.best, 0.0)
+    return [tuple(map(int, star)) for star in found.stars]
+
+
+def _evaluated(phasing: Phasing, family: Family, steps: tuple[int, ...]) -> tuple[float, Evaluation]:
+    problem = phasing.realise(family.candidate(phasing, steps))
+    design = evaluate(problem)
+    return objective_value(problem, design), design
+
+
+def _couples(problem: Problem) -> Problem:
+    """With the couple alone: all that even stars may have of their own."""
+    return problem.changed(objective=(Term(Measure(ROCKING_COUPLE, NORMS["rms"])),))
 
 
 def _is_closed(found: CutsFound, tolerance: float, nothing: float) -> bool:
@@ -187,7 +238,7 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
             answers.append(Answer((), math.inf, True, 0, "SCIP"))
             continue
         # a program that has none yet leaves the first star, whose bound is worth as much
-        star = family.first if program.star is None else program.star
+        star = _first_of(phasing, family, program.star)
         # what few angles and the solver's own tolerance do not tell apart, exchanges do
         star = improved(model, star, program.built, owners, program.bound * (1.0 + problem.tolerance))
         found, cut = solve_design(model, star, program.built, owners, problem.tolerance, nothing)
@@ -200,6 +251,15 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
         design = _decided(phasing, family, found.star, found.built, found.value, found.bound, done)
         answers.append(Answer((design,), bound, done, 1, method))
     return _joined(answers, phasing.best)
+
+
+def _first_of(phasing: Phasing, family: Family, told: tuple[int, ...] | None) -> tuple[int, ...]:
+    """The star of a program, or one with less couple where that is worth less; the first where there are none."""
+    known = [] if told is None else [told]
+    stars = [*known, *_with_least_couples(phasing, family)]
+    if len(stars) < 2:
+        return stars[0] if stars else family.first
+    return min(stars, key=lambda star: _evaluated(phasing, family, star)[0])
 
 
 def _joined(answers: Sequence[Answer], count: int) -> Answer:

@@ -1,0 +1,61 @@
+"""Cranks of so many throws that no list holds their stars, and no norm by order ranks them (S46)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import solve
+from laufruhe.solvers.stars.answers import MOST_LISTED
+from laufruhe.solvers.stars.families import families_of
+from phasing import engines
+
+# three mounts, none alike
+MOUNTS = (
+    '[mounts]\npositions = [["900 mm", "200 mm", "0 mm"], ["800 mm", "-250 mm", "0 mm"], ["-700 mm", "0 mm", "0 mm"]]\n'
+)
+
+
+def long(folder: Path, cylinders: int, cycle: str, norm: str, seconds: float = 30.0):
+    phasing = f'time_limit = "{seconds} s"'
+    asked = MOUNTS + engines.MOUNT_FORCE.replace("mean", norm)
+    problem = engines.problem(folder, cylinders, cycle, phasing=phasing, rest=asked)
+    (family,) = families_of(problem.phasing)[0]
+    assert family.size > MOST_LISTED
+    return problem, family
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("cylinders", "norm"), [(16, "mean"), (24, "maximum"), (48, "mean"), (32, "peak to peak")])
+def test_pairs_of_throws_leave_what_every_even_star_has(cylinders: int, norm: str, tmp_path: Path) -> None:
+    """Front and back alike: proven without a program; of 100 other stars none is under the bound."""
+    problem, family = long(tmp_path, cylinders, "four-stroke", norm)
+    result = solve(problem)
+    assert result.certificate.kind is Proof.GLOBAL
+    assert "star without couples" in result.certificate.method
+    r = np.random.default_rng(cylinders)
+    steps = np.array(family.first)
+    values = []
+    for _ in range(100):
+        own = problem.phasing.realise(family.candidate(problem.phasing, (0, *r.permutation(steps[1:]).tolist())))
+        values.append(objective_value(own, evaluate(own)))
+    assert min(values) >= result.certificate.lower_bound
+    assert min(values) > 10.0 * result.objective.value
+
+
+@pytest.mark.slow
+def test_a_long_crank_is_good_where_a_program_has_no_time(tmp_path: Path) -> None:
+    """Every throw on a step of its own: some couple stays, and what is found is far better than stars at random."""
+    problem, family = long(tmp_path, 20, "two-stroke", "mean", 0.5)
+    result = solve(problem)
+    assert result.certificate.kind is Proof.WITHIN_GAP
+    r = np.random.default_rng(20)
+    values = []
+    for _ in range(300):
+        own = problem.phasing.realise(family.candidate(problem.phasing, (0, *(1 + r.permutation(19)).tolist())))
+        values.append(objective_value(own, evaluate(own)))
+    assert result.certificate.lower_bound <= result.objective.value < 0.1 * min(values)
