@@ -72,7 +72,8 @@ def _console(stream: TextIO) -> Console:
 
 
 def _print_place(console: Console, folder: Path, page: str) -> None:
-    console.print(Text(placed(folder, page), overflow="fold"))
+    # a path is copied in one piece, however long it is
+    console.print(Text(placed(folder, page)), soft_wrap=True)
 
 
 def _print_item(console: Console, text: str) -> None:
