@@ -35,6 +35,7 @@ SEEDS = {
 MORE = {
     ("inline", 4), ("points", 3), ("stars", 4), ("open-vees", 9), ("open-vees", 11), ("elastic-balance", 2),
     ("uneven", 2), ("leads", 25), ("bank angle", 3), ("gas", 0), ("crankcase", 0), ("boxer", 0), ("rotary", 8),
+    ("open-vees", 1), ("sizes", 100013), ("uneven crankcase", 1101),
 }  # fmt: skip
 """Costly ones, of families that keep another."""
 DRAWN = [(family, seed) for family, seeds in SEEDS.items() for seed in seeds]

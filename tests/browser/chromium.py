@@ -46,7 +46,7 @@ def executable() -> str | None:
 def launched() -> Iterator[Browser]:
     """A headless Chromium. Playwright downloads none of its own."""
     # a sandbox needs a user other than root
-    words = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+    words = ["--disable-gpu", *(["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else [])]
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=executable(), args=words)
         yield browser

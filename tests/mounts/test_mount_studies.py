@@ -31,6 +31,7 @@ x = "0 mm"
 unbalance = { between = ["0 kg m", "0.05 kg m"] }
 [search]
 starts = 1
+boxes = 50
 """
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,9 +81,14 @@ class TimeModel:
 
     def mount_travels(self, y: Array) -> Array:
         """Travel of the mounts in the axes of C2, shape (times, mounts, 3) of y (n, times)."""
+        return np.asarray((self._travels_in_c2 @ y).T.reshape(y.shape[1], -1, 3))
+
+    @cached_property
+    def _travels_in_c2(self) -> Array:
+        """From y to the travel of every mount, shape (3 mounts, n)."""
         first = np.unique(self.places, return_index=True)[1]
-        own = (self.travels @ y).T.reshape(y.shape[1], -1, 3)[:, first]
-        return np.asarray(np.einsum("nma,mab->nmb", own, self.turns[first]))
+        own = self.travels.reshape(len(self.turns), 3, -1)[first]
+        return np.asarray(np.einsum("mab,maj->mbj", self.turns[first], own).reshape(-1, self.size))
 
     def accelerations(self, y: Array, rate: Array, load: Array) -> Array:
         """y'' of columns (n, times)."""
