@@ -296,7 +296,8 @@ def test_no_design_of_a_grid_is_under_the_bound(
     seed: int, objective: str, limit: tuple[str, str, float] | None
 ) -> None:
     """Minimised and limited: what is proven holds for 100 designs, and is near to the best of them."""
-    bare = random_problem(seed, objective={"minimise": objective})
+    asked: dict[str, Any] = {"objective": {"minimise": objective}, "search": {"starts": 1}}
+    bare = random_problem(seed, **asked)
     given = evaluate(bare)
     r = np.random.default_rng(seed)
     low, high = (np.array([getattr(d, side) for d in bare.mount_decisions]) for side in ("lower", "upper"))
@@ -306,9 +307,7 @@ def test_no_design_of_a_grid_is_under_the_bound(
         name, unit, scale = limit
         measure = next(m for m in OF_RUNS if m.name == name)
         most = float(np.quantile([design.value(measure) for design in designs], 0.2))
-        problem = random_problem(
-            seed, objective={"minimise": objective}, constraints=[{"limit": name, "max": f"{most * scale} {unit}"}]
-        )
+        problem = random_problem(seed, **asked, constraints=[{"limit": name, "max": f"{most * scale} {unit}"}])
     values = [objective_value(problem, d) for d in designs if d.excess(problem.limits) <= 0.0]
     value = min(values)
     bound = divided_bound(problem, value, 0.05 * value).bound
@@ -325,6 +324,7 @@ def test_what_no_stiffness_keeps_is_named() -> None:
     run = {
         "operating_points": [{"speed": "800 rpm"}],
         "run_up": {"up_to": "800 rpm", "time": "0.2 s", "shut_down_time": "0.2 s"},
+        "search": {"starts": 1},
     }
     best = laufruhe.solve(random_problem(13, **run))
     assert best.certificate.kind is Proof.GLOBAL
