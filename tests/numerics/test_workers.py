@@ -216,18 +216,20 @@ def test_at_the_time_limit_patience_waits_for_what_was_begun() -> None:
 
 @pytest.mark.slow
 def test_processes_at_hand_end_with_the_searches(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also in the middle of a call."""
-    monkeypatch.setattr("laufruhe.numerics.workers.processors", lambda: 2)
+    """Also in the middle of a call, which nobody waits for."""
+    for room in ("workers", "processes"):
+        monkeypatch.setattr(f"laufruhe.numerics.{room}.processors", lambda: 2)
     with at_hand(abs):
         own = given()
         assert isinstance(own, Processes)
-        own.submit(time.sleep, 60)
+        begun = own.submit(time.sleep, 60)
         assert own.submit(abs, -1).result() == 1
         pids = own.pids
         assert pids
         with at_hand(abs):
             assert given() is own
     assert given() is None
+    assert isinstance(begun.exception(), WorkerDied)
     for pid in pids:
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
