@@ -103,7 +103,7 @@ def test_masses_in_place_of_sizes_make_the_same_loads(problem: Problem) -> None:
 
 @pytest.mark.slow
 def test_mounts_beside_sizes_are_never_worse_than_mounts_as_given(solved: Result) -> None:
-    text = changed(MOUNTED, f"[\"300 N/mm\", {SOFT}, {SOFT}]", '["300 N/mm", "300 N/mm", "300 N/mm"]')
+    text = changed(MOUNTED, f'["300 N/mm", {SOFT}, {SOFT}]', '["300 N/mm", "300 N/mm", "300 N/mm"]')
     given = laufruhe.solve(laufruhe.load(text).changed(tolerance=5e-3))
     assert given.certificate.kind is Proof.GLOBAL
     assert solved.objective.value <= given.objective.value
