@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from matplotlib.text import Annotation, Text
 from scipy.optimize import isotonic_regression
 
 import ready
@@ -15,7 +16,8 @@ from cli import scenes
 from lanes import first_fast
 from laufruhe.plots import figure, names, style
 from laufruhe.plots.results import firings, torque, twist_modes
-from laufruhe.plots.words import FAINT, INK, READ, contrast, grouped, ink_on, legible, spread, typeset, wrapped
+from laufruhe.plots.style import page
+from laufruhe.plots.words import FAINT, INK, READ, beside, contrast, grouped, ink_on, legible, spread, typeset, wrapped
 from laufruhe.present.pictures import PICTURES, rows_of
 from laufruhe.solvers import Result
 from laufruhe.studies import picture
@@ -136,3 +138,17 @@ def test_words_are_set_as_print_sets_them() -> None:
     assert [rows_of(count, 6)[1] for count in (0, 1, 6, 7, 8, 13)] == [1, 1, 6, 4, 4, 5]
     assert " ".join(wrapped("one two three four", 0.6)) == "one two three four"
     assert len(wrapped("one two three four", 0.6)) > 1
+
+
+def test_leaders_of_crowded_names_run_under_no_word() -> None:
+    axes = page(1, 1, (4.0, 3.0)).panels[0]
+    axes.set_ylim(0.0, 20.0)
+    beside(axes, [6.0, 6.18, 6.38, 6.58, 14.0], ["lateral", "bounce", "bounce-fore-aft", "yaw", "roll"])
+    axes.figure.draw_without_rendering()
+    notes = [text for text in axes.texts if isinstance(text, Annotation)]
+    assert len(notes) == 5
+    for note in notes:
+        assert note.arrow_patch is not None
+        path = note.arrow_patch.get_transform().transform_path(note.arrow_patch.get_path())
+        words = Text.get_window_extent(note)
+        assert path.vertices[:, 0].max() <= words.x0 + 1.0

@@ -128,7 +128,8 @@ def beside(axes: Axes, heights: Sequence[float], texts: Sequence[str]) -> None:
     least = 1.3 * SMALL / _POINTS / (axes.bbox.height / axes.figure.dpi)
     places = spread((np.asarray(heights, dtype=float) - low) / (high - low), least)
     for height, place, text in zip(heights, places, texts, strict=True):
-        leader = {"arrowstyle": "-", "color": FAINT, "lw": 0.6, "shrinkA": 0.0, "shrinkB": 0.0}
+        # to the middle of the end of the words, under none of them
+        leader = {"arrowstyle": "-", "color": FAINT, "lw": 0.6, "shrinkA": 0.0, "shrinkB": 0.0, "relpos": (0.0, 0.5)}
         axes.annotate(
             text, (1.0, height), (1.035, place), axes.get_yaxis_transform(), "axes fraction", size=SMALL, color=INK,
             va="center", ha="left", annotation_clip=False, arrowprops=leader,
