@@ -19,7 +19,7 @@ from laufruhe.numerics.workers import HERE, working_on
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.report.trade import choices, index, trade_document
+from laufruhe.report.trade import INDEX, choices, index, trade_document
 from laufruhe.solvers.conclusion import values_of
 from laufruhe.solvers.nearby import first_of, next_to
 from laufruhe.solvers.result import Status
@@ -49,6 +49,8 @@ def test_a_design_beyond_a_limit_is_no_decision() -> None:
     page = str(trade_document(_trade(quick, sound), None, "trade"))
     assert "12 % beyond a limit" in page
     assert "-2.0e-01" not in page
+    # a head says all, wherever a narrow screen puts its column
+    assert {"error without gas", "error of auto 0.001", "regret of auto 0.001"} < set(INDEX)
     assert "no fidelity decides as well" in index([_trade(quick)]).as_markdown("")
 
 

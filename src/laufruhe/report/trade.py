@@ -37,7 +37,8 @@ COLUMNS = (
 )
 INDEX = (
     "problem", "value within 0.1 %", "per design", "decision within 0.1 %", "per solve", "error of two-order",
-    "of no gas", "of auto 0.001", "regret of two-order", "of auto 0.001", "uneven speed", "why a dash",
+    "error without gas", "error of auto 0.001", "regret of two-order", "regret of auto 0.001", "uneven speed",
+    "why a dash",
 )  # fmt: skip
 INDEX_COLUMNS = (
     "*Per design, per solve*: time of the objective of one more design, and of an optimum, at the fidelity named. "
