@@ -19,6 +19,7 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import tables_of
 from laufruhe.numerics.budget import left, limited
 from laufruhe.numerics.cluster import cluster
+from laufruhe.numerics.cores import ONE_THREAD
 from laufruhe.numerics.processes import Processes, WorkerDied, in_twins
 from laufruhe.numerics.workers import (
     HERE,
@@ -73,7 +74,7 @@ from laufruhe.numerics.processes import Copy, Processes, WorkerDied
 
 tomllib.known = "of this process alone"
 signal.signal(signal.SIGINT, lambda *_: None)
-with Processes(1, Copy()) as pool:
+with Processes(1, [Copy()]) as pool:
     (copy,) = pool.pids
     assert pool.submit(os.getpid).result() == copy == pool.submit(os.getsid, 0).result() != os.getpid()
     assert pool.submit(eval, "__import__('tomllib').known").result() == tomllib.known
@@ -87,13 +88,36 @@ with Processes(1, Copy()) as pool:
         pool.submit(abs, -1).result()
     except WorkerDied:
         assert pool.submit(os.getpid).result() not in (copy, os.getpid())
-with Processes(1, Copy()) as pool:
+with Processes(1, [Copy()]) as pool:
     (copy,) = pool.pids
     pool.submit(abs, -1)
 assert Copy.can_be()
 try:
     os.kill(copy, 0)
 except ProcessLookupError:
+    print("done")
+"""
+THREADS = Path("/proc/self/task")
+SEVERAL = """
+import os, sys
+from laufruhe.numerics import workers
+from laufruhe.numerics.processes import Copy
+from laufruhe.numerics.progress import listening, tell
+
+workers.processors = lambda: 3
+sys.known = os.getpid()
+with workers.Processes(3, Copy.several(3)) as unasked:
+    assert len(unasked.pids) == 3
+with listening(lambda step: print(step, file=sys.stderr)), workers.at_hand(abs):
+    own = workers.given()
+    pids = own.pids
+    assert len(pids) == 3
+    assert own.submit(eval, "__import__('sys').known").result() == os.getpid() != own.submit(os.getpid).result()
+    own.submit(tell, "nobody hears it").result()
+    assert not Copy.several(2)
+try:
+    os.wait()
+except ChildProcessError:
     print("done")
 """
 MEANWHILE = """
@@ -123,9 +147,16 @@ except ChildProcessError:
 
 @pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system copies no process")
-@pytest.mark.parametrize("program", [COPIED, MEANWHILE], ids=["served", "once"])
+@pytest.mark.parametrize(
+    "program",
+    [COPIED, MEANWHILE, pytest.param(SEVERAL, marks=pytest.mark.skipif(not THREADS.is_dir(), reason="told by Linux"))],
+    ids=["served", "once", "several"],
+)
 def test_copies_of_a_process_have_all_that_it_has_and_end_with_it(program: str) -> None:
-    told = subprocess.run([sys.executable, "-W", "error", "-c", program], capture_output=True, text=True, check=False)
+    told = subprocess.run(
+        [sys.executable, "-W", "error", "-c", program],
+        capture_output=True, text=True, check=False, env={**os.environ, **ONE_THREAD},
+    )  # fmt: skip
     assert (told.stdout, told.stderr) == ("done\n", "")
 
 

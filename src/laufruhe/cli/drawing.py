@@ -34,19 +34,19 @@ Ask: TypeAlias = Callable[..., Callable[[], Any]]
 def artist(kinds: Sequence[str]) -> Iterator[Ask]:
     """Who draws pictures as files of these kinds: another process, or this one where that can have no other."""
     is_other = bool(kinds) and processors() > 1
-    with Processes(1, _copy() if is_other else None) as workers:
+    with Processes(1, _copy() if is_other else ()) as workers:
         if is_other:
             workers.submit(gc.set_threshold, SELDOM)
             workers.submit(called, "laufruhe.plots:get_ready")
         yield partial(_asked, workers if is_other else None)
 
 
-def _copy() -> Copy | None:
-    """A process that has imported what deciding and drawing both need."""
+def _copy() -> tuple[Copy, ...]:
+    """A process that has imported what deciding and drawing both need; none where this one cannot be copied."""
     if not Copy.can_be():
-        return None
+        return ()
     import_module("laufruhe.solvers.conclusion")
-    return Copy()
+    return (Copy(),)
 
 
 def _asked(workers: Processes | None, name: str, *args: Any) -> Callable[[], Any]:

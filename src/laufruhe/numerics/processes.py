@@ -13,9 +13,10 @@ import subprocess
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import ExitStack, contextmanager, suppress
+from contextvars import Context
 from functools import partial
 from pkgutil import resolve_name
 from queue import Empty, SimpleQueue
@@ -127,7 +128,8 @@ class Copy:
                 signal.pthread_sigmask(signal.SIG_SETMASK, heard)
                 os.close(asking)
                 os.close(answering)
-                _serve(parent, os.fdopen(there, "rb"), os.fdopen(back, "wb"))
+                # nobody listens to it, and it works for nobody else
+                Context().run(_serve, parent, os.fdopen(there, "rb"), os.fdopen(back, "wb"))
             finally:
                 os._exit(1)
         signal.pthread_sigmask(signal.SIG_SETMASK, heard)
@@ -141,6 +143,15 @@ class Copy:
     def can_be() -> bool:
         """Whether this process can be copied."""
         return hasattr(os, "fork") and threading.active_count() == 1
+
+    @classmethod
+    def several(cls, count: int) -> tuple[Copy, ...]:
+        """So many, to share work that this process has begun; none where a library has threads, or may have some."""
+        try:
+            threads = len(os.listdir("/proc/self/task"))
+        except OSError:
+            return ()
+        return tuple(cls() for _ in range(count if threads == 1 and cls.can_be() else 0))
 
     def kill(self) -> None:
         """End it at once."""
@@ -165,16 +176,16 @@ class Processes(Executor):
     Parameters
     ----------
     first
-        One that is there already.
+        Those that are there already, no more than `count`.
     """
 
-    def __init__(self, count: int | None = None, first: Copy | None = None) -> None:
+    def __init__(self, count: int | None = None, first: Sequence[Copy] = ()) -> None:
         self.count = count if count is not None else processors()
-        self._first = first
+        self._first = list(first)
         self._calls: SimpleQueue[_Call | None] = SimpleQueue()
         self._lock = threading.Lock()
         self._tenders: list[threading.Thread] = []
-        self._children: set[_Child] = {first} if first else set()
+        self._children: set[_Child] = set(first)
         self._open = 0
         self._closed = False
 
@@ -211,6 +222,10 @@ class Processes(Executor):
             self._calls.put(None)
         for tender in tenders if wait else ():
             tender.join()
+        with self._lock:
+            idle, self._first = self._first, []
+        for child in idle:
+            self._ended(child)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -246,9 +261,8 @@ class Processes(Executor):
 
     def _started(self) -> _Child:
         with self._lock:
-            first, self._first = self._first, None
-        if first is not None:
-            return first
+            if self._first:
+                return self._first.pop()
         path = os.pathsep.join(p for p in sys.path if p)
         child = subprocess.Popen(
             [sys.executable, "-c", _PROGRAM.format(os.getpid())],

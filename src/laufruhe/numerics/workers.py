@@ -17,7 +17,7 @@ from typing import Generic, ParamSpec, TypeVar
 from laufruhe.errors import SolverError
 from laufruhe.numerics.budget import in_time, left, limited, passed
 from laufruhe.numerics.cores import processors
-from laufruhe.numerics.processes import Processes
+from laufruhe.numerics.processes import Copy, Processes
 from laufruhe.numerics.progress import tell
 
 P = ParamSpec("P")
@@ -105,7 +105,8 @@ def at_hand(*works: Callable[..., object]) -> Iterator[None]:
     if _given.get() is not None or processors() == 1:
         yield
         return
-    own = Processes()
+    # what has imported all that the search needs begins at once
+    own = Processes(first=Copy.several(processors()))
     try:
         for _ in range(own.count):
             own.submit(imported, *works)
