@@ -165,6 +165,26 @@ def test_peaks_are_those_of_the_last_word_and_slope_as_they_differ() -> None:
                 assert slopes[at, k] == pytest.approx(differences[at], rel=1e-3, abs=1e-6 * np.abs(slopes[at]).max())
 
 
+@pytest.mark.parametrize("stop", [None, STOP])
+def test_a_peak_at_the_end_of_a_run_counts(stop: dict[str, str] | None) -> None:
+    """A start that ends on the way to a resonance has its largest motion there, for the search as for the last word."""
+    given = mounts(stop)
+    given["places"][0] |= {"damping_per_stiffness": {"between": ["0 ms", "5 ms"], "start": "1 ms"}}
+    at_ends = 0
+    for speed in range(360, 480, 10):
+        run = {"up_to": f"{speed} rpm", "time": "0.3 s", "shut_down_time": "0.3 s"}
+        problem = limited(mounts=given, run_up=run)
+        told = runs_of(problem.engine, problem.points[0], problem.fidelity, problem.engine.run)
+        peaks = RunPeaks(problem, OF_RUNS[:1])
+        for values, own in zip(np.split(peaks.values(np.array([1e-3])), 2), told, strict=True):
+            assert values.max() == pytest.approx(own.worst_force, rel=1e-9)
+        rows = peaks.rows([np.array([1e-3])])
+        if rows is not None:
+            sizes = np.linalg.norm(rows[0][OF_RUNS[0]], axis=-1).max(axis=1)
+            at_ends += sizes[: len(sizes) // 2].argmax() == len(sizes) // 2 - 1
+    assert at_ends > 0 or stop is not None
+
+
 @pytest.mark.slow
 def test_runs_on_bump_stops_are_those_of_scipy() -> None:
     problem = limited(mounts=mounts(STOP))

@@ -217,8 +217,8 @@ def _peaks(parts: Sequence[Array], between: bool) -> Array:
 
 
 def _squares(vectors: Array) -> Array:
-    """Squared lengths at every step and place, the end of a run left out, shape (steps, places)."""
-    return np.asarray(np.einsum("sma,sma->sm", vectors[:-1], vectors[:-1]))
+    """Squared lengths at the start, and at the end of every step, at every place, shape (steps + 1, places)."""
+    return np.asarray(np.einsum("sma,sma->sm", vectors, vectors))
 
 
 def _tops(parts: Sequence[Array]) -> list[tuple[Array, NDArray[np.intp]]]:
@@ -226,9 +226,12 @@ def _tops(parts: Sequence[Array]) -> list[tuple[Array, NDArray[np.intp]]]:
     found = []
     for vectors in parts:
         squares = _squares(vectors)
-        count = len(squares) // STRETCHES
-        inside = squares.reshape(STRETCHES, count, -1).argmax(axis=1)
-        found.append((squares, inside + count * np.arange(STRETCHES)[:, None]))
+        count, places = len(squares) // STRETCHES, np.arange(squares.shape[1])
+        inside = squares[:-1].reshape(STRETCHES, count, -1).argmax(axis=1)
+        tops = inside + count * np.arange(STRETCHES)[:, None]
+        # the end of a run stands in its last stretch
+        tops[-1] = np.where(squares[-1] > squares[tops[-1], places], len(squares) - 1, tops[-1])
+        found.append((squares, tops))
     return found
 
 
@@ -238,7 +241,9 @@ def _lengths(squares: Array, tops: NDArray[np.intp], between: bool) -> Array:
     middle = squares[tops, places]
     if between:
         before, after = (squares[np.clip(tops + k, 0, len(squares) - 1), places] for k in (-1, 1))
-        middle = parabola_tops(before, middle, after)
+        # at both ends of a run there is nothing to be between
+        inside = (tops > 0) & (tops < len(squares) - 1)
+        middle = np.where(inside, parabola_tops(before, middle, after), middle)
     return np.sqrt(np.maximum(middle, 0.0)).reshape(-1)
 
 
