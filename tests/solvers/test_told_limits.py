@@ -151,3 +151,23 @@ def test_a_gap_is_not_left_open_for_what_few_angles_read_too_much() -> None:
     assert result.status is Status.OPTIMAL
     assert result.objective.value == pytest.approx(evaluate(result.problem, result.final.engine, 5760).value(
         result.problem.objective[0].measure), rel=1e-4)  # fmt: skip
+
+
+@pytest.mark.parametrize(("throw", "share", "told"), [(0, 0.998, Status.INFEASIBLE), (3, 1.0005, Status.OPTIMAL)])
+def test_limits_of_built_engines_are_what_the_cycle_has_in_the_worst_of_them(
+    throw: float, share: float, told: Status
+) -> None:
+    """No weight moves the second order. The drawing is far from the limit, and tells nothing of how few angles read."""
+    engine = {**ENGINE, "reciprocating_mass": "1 kg ± 5 %", "throws": [throw]}
+    weight = {"name": "w", "x": "0 mm", "angle": 180, "radius": "1 m", "unbalance": {"between": ["0 kg m", "0.1 kg m"]}}
+    limit = {"limit": "mean shaking force", "orders": [2], "name": "second"}
+    asked = {
+        "engine": engine, "counterweights": [weight], "robust": {"over": "worst case"},
+        "objective": {"minimise": "rms shaking force"},
+    }  # fmt: skip
+    free = problem(asked, constraints=[{**limit, "max": "1e6 N"}])
+    heaviest = evaluate(free.built(np.ones(1)), samples=5760).value(free.limits[0].measure)
+    result = solve(problem(asked, constraints=[{**limit, "max": f"{share * heaviest!r} N"}]))
+    assert result.status is told
+    if told is Status.OPTIMAL:
+        assert result.limits[0].value == pytest.approx(heaviest, rel=1e-6)

@@ -134,7 +134,22 @@ class Standing:
 
 def finely(evaluation: Evaluation) -> Evaluation:
     """At so many angles that a mean is what it is: at few it may be more (P7)."""
-    return replace(evaluation, samples=evaluation.samples * max(2, math.ceil(FINE / evaluation.samples)))
+    return replace(evaluation, samples=_fine(evaluation.samples))
+
+
+def _fine(samples: int) -> int:
+    """So many times as many angles that there are `FINE`, and twice as many at least."""
+    return samples * max(2, math.ceil(FINE / samples))
+
+
+def is_of_few(measure: Measure, samples: int) -> bool:
+    """Whether a load read at so many angles is read at few; peaks are sought among more of them anyway (M6)."""
+    return measure.norm.refinement * samples < FINE
+
+
+def told_at(measure: Measure, samples: int) -> int:
+    """Angles at which a limit of a load is told: so many, or as many as it takes where these are few (P7)."""
+    return _fine(samples) if is_of_few(measure, samples) else samples
 
 
 def over(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from laufruhe.numerics.budget import rounds
-from laufruhe.problem.evaluation import FINE, Evaluation, finely, objective_value
+from laufruhe.problem.evaluation import FINE, Evaluation, finely, is_of_few, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import KEPT
@@ -43,9 +43,9 @@ def told_excess(problem: Problem, evaluation: Evaluation) -> float:
 
 
 def _told_by_few(problem: Problem, evaluation: Evaluation) -> list[Limit]:
-    """Limits on loads that are read at few angles; peaks are sought among more of them anyway (M6)."""
+    """Limits on loads that are read at few angles."""
     loads = [limit for limit in problem.load_limits if limit.measure.is_load]
-    return [limit for limit in loads if limit.measure.norm.refinement * evaluation.samples < FINE]
+    return [limit for limit in loads if is_of_few(limit.measure, evaluation.samples)]
 
 
 def _untold(result: Result) -> float:
@@ -62,7 +62,7 @@ def _untold(result: Result) -> float:
 
 def over_read(problem: Problem, evaluation: Evaluation) -> float:
     """By how much few angles read an objective of loads too large, where that is more than the tolerance; else zero."""
-    terms = [term for term in problem.load_terms if term.measure.norm.refinement * evaluation.samples < FINE]
+    terms = [term for term in problem.load_terms if is_of_few(term.measure, evaluation.samples)]
     if not terms or evaluation.resonance:
         return 0.0
     told, value = replace(problem, objective=tuple(terms)), objective_value(problem, evaluation)

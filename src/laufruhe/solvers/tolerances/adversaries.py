@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.load_models.built_engines import BuiltEngines, evaluated, values_of
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.evaluation import objective_value
+from laufruhe.problem.evaluation import objective_value, told_at
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -66,7 +66,7 @@ def excess_of(limits: Sequence[tuple[Limit, float]]) -> float:
 
 @dataclass(frozen=True, eq=False)
 class EveryError:
-    """All errors within the tolerances, every load affine in them (R4)."""
+    """All errors within the tolerances, every load affine in them (R4); limits are read at many angles (P7)."""
 
     problem: Problem
     samples: int
@@ -78,8 +78,11 @@ class EveryError:
         columns, most = self.problem.tolerances.columns, MOST_NODES if proven else QUICK
         found = worst_case(built.terms, columns, self.tolerance, most=most)
         errors, limits, divisions = [found.errors], [], found.nodes
+        finely = {self.samples: built}
         for limit in moved_limits(self.problem):
-            terms: Terms = ((1.0, built.norm(limit.measure)),)
+            angles = told_at(limit.measure, self.samples)
+            finely[angles] = finely.get(angles) or BuiltEngines(self.problem, values, angles)
+            terms: Terms = ((1.0, finely[angles].norm(limit.measure)),)
             own = worst_case(terms, columns, self.tolerance, most=most)
             limits.append((limit, own.bound if proven else own.value))
             divisions += own.nodes
@@ -125,15 +128,16 @@ class DrawnEngines:
         return Found(value, value, tuple(errors), tuple(limits), excess_of(limits), len(self.errors), True)
 
     def _measured(self, values: Sequence[Value], limit: Limit | None) -> Array:
+        samples = self.samples if limit is None else told_at(limit.measure, self.samples)
         if self.problem.tolerances.is_affine:
-            built = BuiltEngines(self.problem, values, self.samples)
+            built = BuiltEngines(self.problem, values, samples)
             terms: Sequence[tuple[float, AffineNorm]] = (
                 built.terms if limit is None else ((1.0, built.norm(limit.measure)),)
             )
             return values_of(terms, self.errors)
         if not self.models:
             self.models.extend(AffineModel(self.problem.built(z)) for z in self.errors)
-        found = (evaluated(model.problem, values, self.samples) for model in self.models)
+        found = (evaluated(model.problem, values, samples) for model in self.models)
         return np.array([
             objective_value(self.problem, each) if limit is None else each.value(limit.measure) for each in found
         ])  # fmt: skip
