@@ -11,6 +11,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from contextlib import closing, contextmanager
 from contextvars import ContextVar
+from importlib import import_module
 from itertools import count, takewhile
 from typing import Generic, ParamSpec, TypeVar
 
@@ -87,12 +88,14 @@ def executor_for(most: int | None = None) -> Iterator[Executor]:
         yield own
 
 
-def imported(*_: Callable[..., object]) -> None:
-    """Do nothing: a process that is asked for this has imported what the works come from."""
+def imported(*_: Callable[..., object], libraries: Sequence[str] = ()) -> None:
+    """Import libraries; a process that is asked for this has imported what the works come from, too."""
+    for name in libraries:
+        import_module(name)
 
 
 @contextmanager
-def at_hand(*works: Callable[..., object]) -> Iterator[None]:
+def at_hand(*works: Callable[..., object], libraries: Sequence[str] = ()) -> Iterator[None]:
     """For searches that follow one another: processes of this machine that start at once and end with the last search.
 
     Where an executor was given, or there is one processor, nothing is started.
@@ -101,6 +104,8 @@ def at_hand(*works: Callable[..., object]) -> Iterator[None]:
     ----------
     works
         What they will be asked for.
+    libraries
+        Names of what the works import late.
     """
     if _given.get() is not None or processors() == 1:
         yield
@@ -109,7 +114,7 @@ def at_hand(*works: Callable[..., object]) -> Iterator[None]:
     own = Processes(first=Copy.several(processors()))
     try:
         for _ in range(own.count):
-            own.submit(imported, *works)
+            own.submit(imported, *works, libraries=libraries)
         with working_on(own):
             yield
     finally:

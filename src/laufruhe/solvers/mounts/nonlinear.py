@@ -32,15 +32,15 @@ from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mount
 from laufruhe.solvers.mounts.limits_kept import ruled_out
 from laufruhe.solvers.mounts.places import Place, judged_at
 from laufruhe.solvers.mounts.search import Found, MountSearch
-from laufruhe.solvers.mounts.starts import place_of
+from laufruhe.solvers.mounts.starts import looks, place_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.ipopt import run
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, ends_in_words
 from laufruhe.solvers.smooth.program import SmoothProgram
 
 WORTH_SAYING = 1.01
-# processor seconds of points to start from, where the search and its bounds take several times as long
-WORTH_WORKERS = 0.4
+# points of operation looked at for starts from which on a search and its bounds take longer than workers to begin
+MANY_LOOKS = 256
 
 
 def solve_mounts(
@@ -100,12 +100,12 @@ def _solved(
     among: bool,
 ) -> tuple[Result, Array]:
     """Result, and deviations of the throws."""
-    started, began = time.perf_counter(), time.process_time()
+    started = time.perf_counter()
     initial = evaluate_start(problem)
-    search = MountSearch(problem, initial, workers, moves, first, beside=moves is None)
-    modelled = time.perf_counter()
-    worth = time.process_time() - began > WORTH_WORKERS and workers != 1 and not among
-    with at_hand(run, spring_bound) if worth else nullcontext():
+    worth = looks(problem) >= MANY_LOOKS and workers != 1 and not among
+    with at_hand(run, spring_bound, libraries=["scipy.sparse"]) if worth else nullcontext():
+        search = MountSearch(problem, initial, workers, moves, first, beside=moves is None)
+        modelled = time.perf_counter()
         search.run()
         divided = divided_by(problem, search, among)
     timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}

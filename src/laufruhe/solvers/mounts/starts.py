@@ -33,6 +33,20 @@ RUN_WEIGHT = 10.0
 POOL_SAMPLES, POOL_ORDERS = 72, 18
 
 
+def looks(problem: Problem) -> int:
+    """Points of operation that are looked at for starts: their number tells how long a search will take."""
+    return _candidates(problem) * len(problem.points)
+
+
+def _candidates(problem: Problem) -> int:
+    return POOL * (_most_starts(problem) + 1) * (RUN_POOL if asks_runs(problem) else 1)
+
+
+def _most_starts(problem: Problem) -> int:
+    width = len(problem.mount_decisions) + sum(domain.width for domain in domains_of(problem.unbalances))
+    return min(problem.search.starts, STARTS * width)
+
+
 def spread_starts(lower: Array, upper: Array, count: int, seed: int = 0) -> Array:
     """Starts that divide the range of every variable evenly (a Latin hypercube), shape (count, n)."""
     generator = np.random.default_rng(seed)
@@ -65,7 +79,7 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     """
     domains, balanced, search = domains_of(problem.unbalances), _balanced(problem), problem.search
     decisions = problem.mount_decisions
-    starts = min(search.starts, STARTS * (len(decisions) + sum(domain.width for domain in domains)))
+    starts = _most_starts(problem)
     ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
     low, high = sides_of(decisions)
     given = np.array([d.start_number for d in decisions])
@@ -81,7 +95,7 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     spread = spread_starts(
         np.concatenate([low_log, -wide]),
         np.concatenate([high_log, wide]),
-        POOL * (starts + 1) * (RUN_POOL if asks_runs(problem) else 1),
+        _candidates(problem),
         search.seed,
     )
     spread[:, : len(low)] = np.where(ratio, np.exp(np.where(ratio, spread[:, : len(low)], 0.0)), spread[:, : len(low)])

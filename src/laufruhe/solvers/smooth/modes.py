@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from itertools import permutations
 from typing import Any
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.elastic_mounts import ElasticMounting
@@ -18,6 +18,7 @@ from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.smooth.gathered import Gathered
 
+_ORDERS = np.array(list(permutations(range(6))))
 OF_MODES = (channels.FREQUENCIES, channels.DECOUPLING, channels.DECOUPLING_SHORTFALL)
 
 
@@ -119,7 +120,7 @@ class ModeVariables:
         if not self.asked:
             return []
         modes = mounting.modes
-        motions, columns = linear_sum_assignment(-modes.energy)
-        order = columns[np.argsort(motions)]
+        # of all ways to give each motion a mode of its own, that of most energy
+        order = _ORDERS[modes.energy[np.arange(6), _ORDERS].sum(axis=1).argmax()]
         vectors = np.linalg.solve(self._root.T, modes.shapes)[:, order]
         return [np.asarray(vectors.T.reshape(-1), dtype=np.float64), modes.squares[order] / self._unit]
