@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import heapq
+import math
+import os
 import random
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from functools import partial
 from itertools import count
 
 import pytest
 
 from laufruhe.numerics.budget import left, limited
 from laufruhe.numerics.foresight import foresight
+from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.progress import listening
 from laufruhe.numerics.workers import HERE, in_turn, working_on
 
@@ -49,6 +53,25 @@ def test_order_and_answers_are_those_of_one_process() -> None:
     assert shared == alone
     assert none == 0
     assert foreseen > len(alone) // 2
+
+
+def test_what_cannot_be_told_to_others_is_done_here() -> None:
+    """Neither a step that no other process can read, nor work that only this one knows."""
+    here = os.getpid()
+    with Processes(1) as pool, working_on(pool):
+        with foresight(lambda step: 2 * step, worth=math.inf) as ahead:
+            ahead.likely([(0, 21)])
+            assert ahead.wanted(0, 21) == 42
+        with foresight(partial(only_in, here), worth=math.inf) as ahead:
+            ahead.likely([(0, 21)])
+            assert ahead.wanted(0, 21) == 42
+            assert ahead.foreseen == 0
+
+
+def only_in(process: int, step: int) -> int:
+    if os.getpid() != process:
+        raise AttributeError("a class of somebody's own")
+    return 2 * step
 
 
 def test_a_step_that_is_lost_is_done_here() -> None:

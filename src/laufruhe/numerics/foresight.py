@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from concurrent.futures import Executor, Future
 from contextlib import ExitStack, contextmanager, suppress
 from itertools import islice
+from pickle import PicklingError
 from typing import Any, Generic, TypeVar
 
 from laufruhe.numerics.budget import left
@@ -39,8 +40,8 @@ class Foresight(Generic[T, A]):
         if executor is None:
             return
         unasked = ((key, step) for key, step in steps if key not in self._asked)
-        # where nobody works any more, all is worked out when it is wanted
-        with suppress(RuntimeError, OSError):
+        # where nobody works any more, or steps cannot be told to others, all is worked out when it is wanted
+        with suppress(RuntimeError, OSError, PicklingError, AttributeError, TypeError):
             begun: list[Future[Any]] = [*self._starting, *self._asked.values()]
             room = count_of(executor) - sum(not future.done() for future in begun)
             for key, step in islice(unasked, max(room, 0)):
@@ -64,8 +65,8 @@ class Foresight(Generic[T, A]):
             return self._work(step)
         try:
             found = future.result()
-        except (CancelledError, BrokenExecutor, *getattr(self._executor, "losses", ())):
-            # lost with its worker
+        except Exception:
+            # lost with its worker, or not understood by it; what fails here too is told by this process
             return self._work(step)
         self.foreseen += 1
         return found

@@ -91,6 +91,8 @@ UNDER: Mapping[Channel, Callable[[BoxModel, Measure, Array, Array], Under]] = {
     channels.STATIC_FORCE: held_loads,
 }
 """Linear functions nowhere over a number of the mounts, whose limits so have prices on a box (E38)."""
+SAID = frozenset({channels.STATIC_TRAVEL, channels.STATIC_FORCE})
+"""Of those, numbers whose range says no more than the linear function."""
 
 
 def breaks(model: BoxModel, limit: Limit, lower: Array, upper: Array) -> Mask:

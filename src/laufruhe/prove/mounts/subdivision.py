@@ -24,7 +24,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import NEARLY, Divided, divided_on
 from laufruhe.prove.mounts.box_lines import BoxLines
 from laufruhe.prove.mounts.box_norms import Under, root_under, under
-from laufruhe.prove.mounts.box_numbers import RANGES, UNDER, breaks
+from laufruhe.prove.mounts.box_numbers import RANGES, SAID, UNDER, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, Lines
 from laufruhe.prove.mounts.box_runs import run_boxes
 from laufruhe.prove.mounts.ranges import SLACK
@@ -204,12 +204,12 @@ class StiffnessBoxes:
         return found, pull
 
     def breaks(self, lower: Array, upper: Array) -> Mask:
-        """Boxes on which a limit of a number of the mounts is broken everywhere."""
+        """Boxes on which a limit of a number of the mounts is broken everywhere, beside what `hold` says."""
         out = np.zeros(len(lower), dtype=bool)
         for limit in self.problem.mount_limits:
             if _is_ratio(limit.measure):
                 out |= self._ratio(limit.measure, lower, upper)[0] > limit.maximum * (1.0 + SLACK)
-            else:
+            elif limit.measure.channel not in SAID:
                 out |= breaks(self.model, limit, lower, upper)
         return out
 

@@ -13,6 +13,7 @@ import numpy as np
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
+from laufruhe.numerics.foresight import foresight
 from laufruhe.numerics.workers import at_hand
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
@@ -107,12 +108,16 @@ def _solved(
         search = MountSearch(problem, initial, workers, moves, first, beside=moves is None)
         modelled = time.perf_counter()
         search.run()
-        divided = divided_by(problem, search, among)
-    timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
-    found = search.chosen
-    if found is None or found.design.excess > KEPT:
-        return _none(problem, search, initial, divided, timing), search.turns
-    proven = _rebalanced(found.design)
+        with foresight(_balance, math.inf) as ahead:
+            # beside the bounds, which may still find a better design
+            ahead.likely((each.design.values, _share(each.design)) for each in [search.chosen] if each is not None)
+            divided = divided_by(problem, search, among)
+            found = search.chosen
+            timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
+            if found is None or found.design.excess > KEPT:
+                return _none(problem, search, initial, divided, timing), search.turns
+            balance = ahead.wanted(found.design.values, _share(found.design))
+    proven = None if balance is None else _rebalanced(found.design, *balance)
     design = found.design if proven is None or proven[0].value >= found.design.value else proven[0]
     return _result(search, initial, replace(found, design=design), proven, divided, timing, among), search.turns
 
@@ -122,22 +127,31 @@ def _mounts(design: Design) -> list[float]:
     return [value.real for decision, value in pairs if not decision.is_affine]
 
 
-def _rebalanced(design: Design) -> tuple[Design, float] | None:
-    """Unbalances decided anew on the mounts found, with proof; None where that is not convex."""
-    problem = design.problem
+def _share(design: Design) -> tuple[Problem, Sequence[float]]:
+    """What `_balance` needs of a design."""
+    return design.problem, _mounts(design)
+
+
+def _balance(share: tuple[Problem, Sequence[float]]) -> tuple[list[complex], float] | None:
+    """Unbalances decided anew on mounts found, and the gap that is proven; None where that is not convex."""
+    problem, mounts = share
     if not problem.unbalances or not problem.load_terms or problem.mount_terms or passed():
         return None
     if any(limit.measure.unit == "" for limit in problem.mount_limits):
         # transmissibility depends on what excites
         return None
-    held = problem.design(_mounts(design), problem.mount_decisions)
+    held = problem.design(mounts, problem.mount_decisions)
     result = solve_unbalances(replace(problem, engine=held).balance)
     if result.certificate is None or result.status is not Status.OPTIMAL:
         return None
-    values = unbalances_of(problem, result)
-    given, own = iter(_mounts(design)), iter(values)
-    again = judged_at(problem, [next(own) if d.is_affine else next(given) for d in problem.decisions])
-    return None if again is None or again.excess > KEPT else (again, result.certificate.gap)
+    return unbalances_of(problem, result), result.certificate.gap
+
+
+def _rebalanced(design: Design, unbalances: Sequence[complex], gap: float) -> tuple[Design, float] | None:
+    """A design with other unbalances; None where these break a limit."""
+    given, own = iter(_mounts(design)), iter(unbalances)
+    again = judged_at(design.problem, [next(own) if d.is_affine else next(given) for d in design.problem.decisions])
+    return None if again is None or again.excess > KEPT else (again, gap)
 
 
 def _convex_part(problem: Problem) -> Problem | None:

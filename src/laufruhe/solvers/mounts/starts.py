@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +13,8 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.run_look import RunLook, asks_runs
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time, left, limited
+from laufruhe.numerics.foresight import foresight
+from laufruhe.numerics.workers import HERE, count_of, given
 from laufruhe.problem.decision import columns_of, domains_of, sides_of
 from laufruhe.problem.evaluation import Evaluation, objective_value, remounted
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
@@ -77,64 +81,47 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
     start on a flank of a resonance hides what is small beside it; never zero. Where one start is
     asked for, the design as given is.
     """
-    domains, balanced, search = domains_of(problem.unbalances), _balanced(problem), problem.search
-    decisions = problem.mount_decisions
-    starts = _most_starts(problem)
-    ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
-    low, high = sides_of(decisions)
-    given = np.array([d.start_number for d in decisions])
-    low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
-    wide = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
-    best = columns_of(domains, [d.start for d in problem.unbalances] if balanced is None else balanced)
+    domains, decisions = domains_of(problem.unbalances), problem.mount_decisions
     initial = evaluate_start(problem)
     # on a resonance a search has nowhere to go
-    found = [] if initial.resonance else [(given.tolist(), best)]
-    wanted = starts - len(found)
+    wanted = _most_starts(problem) - (not initial.resonance)
+    pool = _spread_over(problem) if wanted else np.zeros((0, len(decisions)))
+    with _looking(problem, initial, pool) as looked:
+        balanced = _balanced(problem)
+        judged = looked()
+    best = columns_of(domains, [d.start for d in problem.unbalances] if balanced is None else balanced)
+    found = [] if initial.resonance else [([d.start_number for d in decisions], best)]
     if not wanted:
         return found, objective_value(problem, initial) or 1.0
-    spread = spread_starts(
-        np.concatenate([low_log, -wide]),
-        np.concatenate([high_log, wide]),
-        _candidates(problem),
-        search.seed,
-    )
-    spread[:, : len(low)] = np.where(ratio, np.exp(np.where(ratio, spread[:, : len(low)], 0.0)), spread[:, : len(low)])
-    spread[:, : len(low)] = np.clip(spread[:, : len(low)], low, high)
-    with limited(LOOKING * left()):
-        rows, size = _promising(problem, initial, spread, len(low), wanted)
+    rows, size = _promising(problem, initial, pool, judged, wanted)
     for k, row in enumerate(rows):
-        mounts = row[: len(low)]
-        own = row[len(low) :].copy()
+        own = row[len(decisions) :].copy()
         for domain in domains:
             own[domain.columns] = domain.project(own)
-        found.append((mounts.tolist(), own if k % 2 else best))
+        found.append((row[: len(decisions)].tolist(), own if k % 2 else best))
     return found, size
 
 
-def _promising(problem: Problem, initial: Evaluation, pool: Array, count: int, wanted: int) -> tuple[Array, float]:
+def _spread_over(problem: Problem) -> Array:
+    """Points spread over all bounds, shape (points, mounts and columns of unbalances)."""
+    domains, decisions = domains_of(problem.unbalances), problem.mount_decisions
+    ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
+    low, high = sides_of(decisions)
+    low_log, high_log = (np.where(ratio, np.log(np.where(ratio, v, 1.0)), v) for v in (low, high))
+    wide = np.concatenate([domain.scale * np.ones(domain.width) for domain in domains] or [np.zeros(0)])
+    ends = np.concatenate([low_log, -wide]), np.concatenate([high_log, wide])
+    points, n = spread_starts(*ends, _candidates(problem), problem.search.seed), len(low)
+    points[:, :n] = np.where(ratio, np.exp(np.where(ratio, points[:, :n], 0.0)), points[:, :n])
+    points[:, :n] = np.clip(points[:, :n], low, high)
+    return points
+
+
+def _promising(problem: Problem, initial: Evaluation, pool: Array, judged: Array, wanted: int) -> tuple[Array, float]:
     """Points of the pool that break limits least and are worth most; a third taken as they come.
 
     With them the least objective of the pool and of the design as given.
     """
-    # higher orders hardly move a block, and take most of the time
-    loads = tuple(replace(each, wrench=each.wrench.series.kept(POOL_ORDERS)) for each in initial.loads)
-    given = replace(initial, samples=POOL_SAMPLES, resonance="", loads=loads)
-    # unbalances are still to be decided, and may keep a limit on loads
-    limits = problem.mount_limits if problem.unbalances else problem.limits
-    plain = problem.changed(objective=tuple(term for term in problem.objective if not term.measure.channel.is_checked))
-    runs, limits = RunLook(problem), tuple(limit for limit in limits if not limit.measure.channel.is_checked)
-    misses, values = np.full(len(pool), np.inf), np.full(len(pool), np.inf)
-    for k, row in in_time(enumerate(pool)):
-        try:
-            design = remounted(given, problem.design(row[:count].tolist(), problem.mount_decisions))
-        except ModelError:
-            continue
-        misses[k] = sum(max(design.standing(limit).excess, 0.0) for limit in limits)
-        values[k] = objective_value(plain, design)
-        if runs.asked:
-            missed, value = runs.at(row)
-            misses[k] = RUN_WEIGHT * (misses[k] + missed)
-            values[k] += value
+    misses, values = judged.T
     known = values[np.isfinite(values)]
     middle = float(np.median(known)) if len(known) else 0.0
     best = np.argsort(misses + values / (middle or 1.0), kind="stable")
@@ -143,3 +130,46 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, count: int, w
     given_value = math.inf if initial.resonance else objective_value(problem, initial)
     least = min((float(v) for v in (*known, given_value) if 0.0 < v < math.inf), default=1.0)
     return pool[chosen], least
+
+
+@contextmanager
+def _looking(problem: Problem, initial: Evaluation, pool: Array) -> Iterator[Callable[[], Array]]:
+    """Gives what waits for what points miss limits by and are worth, shape (points, 2); workers begin at once.
+
+    Infinite where time is over before.
+    """
+    # higher orders hardly move a block, and take most of the time
+    loads = tuple(replace(load, wrench=load.wrench.series.kept(POOL_ORDERS)) for load in initial.loads)
+    coarse = replace(initial, samples=POOL_SAMPLES, resonance="", loads=loads)
+    shares = [(problem, coarse, points) for points in np.array_split(pool, count_of(given() or HERE))]
+    with foresight(_look, math.inf) as ahead:
+        with limited(LOOKING * left()):
+            ahead.likely(enumerate(shares))
+
+        def looked() -> Array:
+            with limited(LOOKING * left()):
+                return np.concatenate([ahead.wanted(k, share) for k, share in enumerate(shares)])
+
+        yield looked
+
+
+def _look(share: tuple[Problem, Evaluation, Array]) -> Array:
+    """Of some points."""
+    problem, coarse, points = share
+    count = len(problem.mount_decisions)
+    # unbalances are still to be decided, and may keep a limit on loads
+    limits = problem.mount_limits if problem.unbalances else problem.limits
+    plain = problem.changed(objective=tuple(term for term in problem.objective if not term.measure.channel.is_checked))
+    runs, limits = RunLook(problem), tuple(limit for limit in limits if not limit.measure.channel.is_checked)
+    found = np.full((len(points), 2), math.inf)
+    for k, row in in_time(enumerate(points)):
+        try:
+            design = remounted(coarse, problem.design(row[:count].tolist(), problem.mount_decisions))
+        except ModelError:
+            continue
+        missed, value = sum(max(design.standing(limit).excess, 0.0) for limit in limits), objective_value(plain, design)
+        if runs.asked:
+            of_run, worth = runs.at(row)
+            missed, value = RUN_WEIGHT * (missed + of_run), value + worth
+        found[k] = missed, value
+    return found
