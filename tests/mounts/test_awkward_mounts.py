@@ -254,3 +254,12 @@ unbalances = [{ x = "35 mm", radius = "40 mm", unbalance = { between = ["0 kg m"
         result = solve(problem_of(tmp_path, engine, BLOCK, lossy, shaft, asked))
     assert result.status == "optimal"
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize("limit", ['maximum mount force"\nmax = "0 N"', 'maximum mount travel"\nmax = "0 mm"'])
+def test_a_limit_on_an_order_that_no_load_has_stands_at_zero(tmp_path: Path, limit: str) -> None:
+    """Four throws in a plane have no first order: the limit is kept, and a search has nothing to hold."""
+    asked = '[objective]\nminimise = "rms mount force"\n[search]\nstarts = 1\nboxes = 0\n'
+    asked += f'[[constraints]]\norders = [1]\nlimit = "{limit}\n'
+    result = solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked))
+    assert result.status.has_design

@@ -132,7 +132,7 @@ class SmoothProgram:
                 self._held.add(row, self.moves.intervals.least, self.moves.intervals.most, name)
         tops = ca.vertcat(*(top for top, _ in self._held.heads)) if self._held.heads else ca.MX(0, 1)
         lower, upper = self._bounds()
-        constraints = ca.vertcat(*self._held.expressions) if self._held.expressions else None
+        constraints = ca.densify(ca.vertcat(*self._held.expressions)) if self._held.expressions else None
         return NonlinearProgram(
             ca.vertcat(self._v, self._u, self._t, self._modes.symbols, tops),
             least,
