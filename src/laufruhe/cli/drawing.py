@@ -15,6 +15,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
 
+from laufruhe.cli.screen import loudness, speak
 from laufruhe.numerics.cores import processors
 from laufruhe.numerics.processes import Copy, Processes, called
 
@@ -37,6 +38,7 @@ def artist(kinds: Sequence[str]) -> Iterator[Ask]:
     with Processes(1, _copy() if is_other else ()) as workers:
         if is_other:
             workers.submit(gc.set_threshold, SELDOM)
+            workers.submit(speak, loudness())
             workers.submit(called, "laufruhe.plots:get_ready")
         yield partial(_asked, workers if is_other else None)
 

@@ -43,6 +43,8 @@ def handing_out(json: str | None, *problems: Path) -> Iterator[Callable[[Shown, 
                     stream.write(shown)
                 else:
                     shown(stream)
+                # what cannot be written is told here
+                stream.flush()
             if json == "-":
                 typer.echo(data(), nl=False)
             elif place is not None:
@@ -146,8 +148,19 @@ def is_quiet() -> bool:
     return _loudness.get() == QUIET
 
 
+def loudness() -> int:
+    """What is typed as -q and -v."""
+    return _loudness.get()
+
+
+def speak(loud: int) -> None:
+    """In a process that a command has made: be as loud as it."""
+    _loudness.set(loud)
+    warn_plainly()
+
+
 def warn_plainly() -> None:
-    """Warnings of this package as lines of the command, in the processes that it makes too; none with -q."""
+    """Warnings of this package as lines of the command; none with -q."""
     usual = warnings.formatwarning
 
     def format_of(
