@@ -68,7 +68,7 @@ def draw(trades: list[dict[str, Any]]) -> None:
 def main() -> None:
     """Measure, and keep the table alone."""
     started, before = time.perf_counter(), processor_seconds()
-    _, as_json = traded(READY, FOLDER, print)
+    *_, as_json = traded(READY, FOLDER, print)
     seconds, spent = time.perf_counter() - started, processor_seconds() - before
     (FOLDER / "trades.json").write_text(as_json(), encoding="utf-8")
     # the pages of single problems are not kept
