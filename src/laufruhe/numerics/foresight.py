@@ -40,12 +40,14 @@ class Foresight(Generic[T, A]):
         if executor is None:
             return
         unasked = ((key, step) for key, step in steps if key not in self._asked)
-        # where nobody works any more, or steps cannot be told to others, all is worked out when it is wanted
-        with suppress(RuntimeError, OSError, PicklingError, AttributeError, TypeError):
+        # where nobody works any more, all is worked out when it is wanted
+        with suppress(RuntimeError, OSError):
             begun: list[Future[Any]] = [*self._starting, *self._asked.values()]
             room = count_of(executor) - sum(not future.done() for future in begun)
             for key, step in islice(unasked, max(room, 0)):
-                self._asked[key] = executor.submit(worked, time.time() + left(), self._work, step)
+                # and so is what cannot be told to others
+                with suppress(PicklingError, AttributeError, TypeError):
+                    self._asked[key] = executor.submit(worked, time.time() + left(), self._work, step)
 
     def _workers(self) -> Executor | None:
         """Those that were given; else processes, once they are worth it: none is waited for while it starts."""

@@ -13,12 +13,10 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Bounded, Box, Waiting
 from laufruhe.prove.mounts.box_lines import BoxLines
-from laufruhe.prove.mounts.subdivision import StiffnessBoxes
+from laufruhe.prove.mounts.subdivision import StiffnessBoxes, worth_halving
 
 Keeps = Callable[[Array], bool]
 """Whether a design keeps the limits, by the exact model."""
-# of the length of a side, what counts where limits tell nothing
-EVEN = 1e-12
 
 
 class LimitBoxes:
@@ -66,7 +64,7 @@ class LimitBoxes:
             self._boxes.add_runs(own, lower[left], upper[left])
             found[left], pull[left] = own.excess, own.pull
         found = np.where(broken | (found > 0.0), np.inf, found)
-        return found, np.argmax(np.nan_to_num(pull) + EVEN * (upper - lower) / upper.max(), axis=1)
+        return found, worth_halving(pull, lower, upper)
 
 
 class _Excluding(Bounded):

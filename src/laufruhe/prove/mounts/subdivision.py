@@ -40,6 +40,8 @@ HALVINGS = 45
 RUN_SHARE = 18
 # of the gap that counts as proven, what small orders may take of it
 LEFT_OUT = 0.05
+# of the length of a side, what counts where nothing is told of it
+EVEN = 1e-12
 
 
 def divides(problem: Problem) -> bool:
@@ -72,6 +74,11 @@ def divided_bounds(problem: Problem, value: float, room: float, shares: Sequence
         return
     counts = [math.ceil(share * most) for share in shares]
     yield from divided_on(search, search.model.lower, search.model.upper, value, room, counts)
+
+
+def worth_halving(pull: Array, lower: Array, upper: Array) -> NDArray[np.intp]:
+    """Of every box the side that pulls most; the longest where nothing is told."""
+    return np.asarray(np.argmax(np.nan_to_num(pull) + EVEN * (upper - lower) / upper.max(), axis=1))
 
 
 class StiffnessBoxes:
@@ -166,7 +173,7 @@ class StiffnessBoxes:
             pull[left] = np.maximum(pull[left], self.add_runs(own, lower[left], upper[left]))
             found[left] = self.constant + numbers[left] + own.least
         found = np.where(broken, np.inf, found)
-        return found, np.argmax(np.nan_to_num(pull) + 1e-12 * (upper - lower) / upper.max(), axis=1)
+        return found, worth_halving(pull, lower, upper)
 
     def hold(self, boxes: BoxLines, lower: Array, upper: Array) -> None:
         """Add limits that have linear functions under them, those of run-ups left out."""

@@ -156,6 +156,8 @@ def _looking(problem: Problem, initial: Evaluation, pool: Array) -> Iterator[Cal
 def _look(share: tuple[Problem, Evaluation, Array]) -> Array:
     """Of some points."""
     problem, coarse, points = share
+    if not len(points):
+        return np.zeros((0, 2))
     count = len(problem.mount_decisions)
     # unbalances are still to be decided, and may keep a limit on loads
     limits = problem.mount_limits if problem.unbalances else problem.limits
