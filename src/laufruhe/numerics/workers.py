@@ -111,9 +111,10 @@ def at_hand(*works: Callable[..., object], libraries: Sequence[str] = ()) -> Ite
         yield
         return
     # what has imported all that the search needs begins at once
-    own = Processes(first=Copy.several(processors()))
+    count = processors()
+    own = Processes(count, Copy.several(count))
     try:
-        for _ in range(own.count):
+        for _ in range(count):
             own.submit(imported, *works, libraries=libraries)
         with working_on(own):
             yield
