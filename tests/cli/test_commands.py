@@ -226,8 +226,8 @@ def test_every_complaint_gets_a_line(here: Path) -> None:
     assert "did you mean 'rod_ratio'?" in result.stderr
 
 
-@pytest.mark.parametrize("tolerance", ["0", "-1", "nan", "inf"])
-def test_a_tolerance_is_above_zero(here: Path, tolerance: str) -> None:
+@pytest.mark.parametrize("tolerance", ["0", "-1", "nan", "inf", "1", "2"])
+def test_a_tolerance_is_a_share(here: Path, tolerance: str) -> None:
     path = written(here, scenes.TIGHT)
     refused(run("solve", path, "--tolerance", tolerance), "--tolerance")
     assert list(here.iterdir()) == [path]

@@ -38,8 +38,8 @@ def test_explain_as_json(tmp_path: Path) -> None:
     assert data["fidelity"]["crank_inertia"] is None
 
 
-@pytest.mark.parametrize("tolerance", ["0", "-1", "nan"])
-def test_tolerance_must_be_positive(tolerance: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("tolerance", ["0", "-1", "nan", "1", "2"])
+def test_a_tolerance_is_a_share(tolerance: str, tmp_path: Path) -> None:
     path = written(tmp_path, scenes.GIVEN)
     answer = RUN.invoke(app, ["explain", str(path), "--tolerance", tolerance])
     assert answer.exit_code == 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import pickle
 import tomllib
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 import laufruhe
 from laufruhe.errors import InputError, LaufruheError, ModelError
 from laufruhe.problem.problem import Problem
+from laufruhe.solvers.conclusion import decision_values
 from problem_files import PROBLEMS
 
 LANCHESTER = PROBLEMS / "tractor-four-lanchester.toml"
@@ -93,6 +95,63 @@ def test_open_and_fixed_undo_each_other(problem: Problem) -> None:
     opened = problem.open("left.y", "60 mm", "120 mm")
     assert next(d for d in opened.decisions if d.name == "left.y").start == pytest.approx(0.1)
     assert opened.fix("left.y").engine == problem.engine
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "geared-three-leads",
+        "two-machines-angle",
+        "inline-five-damper",
+        "diesel-70-hp-flywheel",
+        "opposed-pistons-lead",
+    ],
+)
+def test_leads_dampers_and_rims_take_values_by_the_names_that_results_show(name: str) -> None:
+    problem = laufruhe.load(PROBLEMS / f"{name}.toml")
+    for decision in problem.decisions:
+        for entry in decision_values(decision, 0.3 * decision.lower + 0.7 * decision.upper):
+            found = problem.with_values({entry.name: f"{entry.value!r} {entry.unit}".rstrip()})
+            moved = {d.name: d.start for d in found.decisions}
+            assert moved.pop(decision.name) == pytest.approx(entry.value, rel=1e-12)
+            assert moved == {d.name: d.start for d in problem.decisions if d is not decision}
+
+
+def test_shafts_of_a_crankshaft_take_values_by_the_names_that_results_show() -> None:
+    tables = tomllib.loads((PROBLEMS / "inline-five-torsion.toml").read_text(encoding="utf-8"))
+    disc = tables["torsion"]["discs"][0]
+    disc["inertia"] = {"between": ["0.001 kg m^2", "1 kg m^2"]}
+    disc["shaft"] = {"pieces": [{"length": "80 mm", "diameter": {"between": ["20 mm", "80 mm"]}}]}
+    problem = laufruhe.load(tables)
+    values = {"torsion.pulley.inertia": "0.5 kg m^2", "torsion.pulley.diameter": "60 mm"}
+    assert [decision.name for decision in problem.decisions] == list(values)
+    assert [decision.start for decision in problem.with_values(values).decisions] == [0.5, 0.06]
+
+
+def test_throws_take_values_by_the_names_that_results_show() -> None:
+    """One between bounds starts there; those that are open together are all given, and are decided no more."""
+    tables = tomllib.loads((PROBLEMS / "twin-vee-open.toml").read_text(encoding="utf-8"))
+    problem = laufruhe.load(tables)
+    result = laufruhe.solve(problem)
+    values = {d.name: f"{d.value!r} {d.unit}".rstrip() for d in result.decisions}
+    assert {"throw 1", "bank angle"} <= set(values)
+    again = laufruhe.evaluate(problem.with_values(values))
+    assert result.objective is not None
+    assert again.objective is not None
+    assert again.objective.value == pytest.approx(result.objective.value, rel=1e-9)
+    with pytest.raises(InputError, match="give values for all throws"):
+        problem.with_values({"throw 2": 40})
+    given = laufruhe.load(LANCHESTER).with_values({"throw 2": 170})
+    assert given.engine.slider_cranks[1].throw == pytest.approx(math.radians(170))
+
+
+def test_shafts_that_a_star_leaves_out_are_left_out() -> None:
+    problem = laufruhe.load(PROBLEMS / "two-stroke-four-open.toml")
+    throws = {f"throw {k + 1}": angle for k, angle in enumerate((0, 90, 270, 180))}
+    for built in (0, 1):
+        found = problem.with_values({**throws, "balancer built": built})
+        assert any(rotor.shaft.name == "balancer" for rotor in found.engine.rotors) is bool(built)
+        assert found.phasing is None or found.phasing.throws is not None
 
 
 def test_more_freedom_is_never_worse(problem: Problem) -> None:

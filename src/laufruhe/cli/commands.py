@@ -22,13 +22,13 @@ from laufruhe.cli.screen import (
     DONE,
     FAILED,
     INTERRUPTED,
-    above_zero,
     at_work,
     complain,
     exit_statuses,
     handing_out,
     in_time,
     progress,
+    share_below_one,
     spoken,
     warn_plainly,
 )
@@ -254,7 +254,7 @@ def explain(
     with exit_statuses(problem), spoken(quiet, verbose), handing_out(json, problem) as hand_out:
         from laufruhe.cli.fidelity import explained
 
-        hand_out(*explained(problem, above_zero("--tolerance", tolerance, "1e-3")))
+        hand_out(*explained(problem, share_below_one("--tolerance", tolerance)))
 
 
 @app.command(epilog=_example("laufruhe trade problem.toml"))

@@ -65,11 +65,17 @@ def json_file(json: str | None, problems: Iterable[Path], places: ExitStack) -> 
     return places.enter_context(files.staged_file(path, "--json"))
 
 
-def above_zero(option: str, value: float, example: str) -> float:
-    """Refuse a value that is no number above zero."""
-    if not (math.isfinite(value) and value > 0.0):
-        raise refused(option, f"{value:g}", "must be a number above zero", f"try {example}")
+def above_zero(option: str, value: float, example: str, below: float = math.inf) -> float:
+    """Refuse a value that is no number above zero, or none below another."""
+    if not 0.0 < value < below:
+        most = "" if math.isinf(below) else f" and below {below:g}"
+        raise refused(option, f"{value:g}", f"must be a number above zero{most}", f"try {example}")
     return value
+
+
+def share_below_one(option: str, value: float) -> float:
+    """Refuse a tolerance that is no share of the objective: all of it or more would mean nothing."""
+    return above_zero(option, value, "1e-3", below=1.0)
 
 
 @contextmanager

@@ -13,7 +13,7 @@ import typer
 from laufruhe.cli.check import doubt
 from laufruhe.cli.drawing import drawing
 from laufruhe.cli.request import Request, timed
-from laufruhe.cli.screen import DONE, FAILED, Watched, above_zero, json_file, progress
+from laufruhe.cli.screen import DONE, FAILED, Watched, json_file, progress, share_below_one
 from laufruhe.errors import SolverError, counted
 from laufruhe.files.reader import load
 from laufruhe.numerics.progress import Listener
@@ -59,7 +59,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
     with timed(seconds, "load"):
         problem = load(request.problem)
         if request.tolerance is not None:
-            problem = replace(problem, tolerance=above_zero("--tolerance", request.tolerance, "1e-3"))
+            problem = replace(problem, tolerance=share_below_one("--tolerance", request.tolerance))
     doubt(problem, request.problem)
     with ExitStack() as places:
         # a file called '...toml' would name the folder above

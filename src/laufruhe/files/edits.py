@@ -18,6 +18,26 @@ _AXES = {"x": 0, "y": 1, "z": 2}
 _SIZES = ("mass", "unbalance", "balance_factor")
 _ACROSS = {"y": 0, "z": 1}
 _NUMBER = re.compile(r"\s*-\s*(?=[\d.])")
+_THROW, _BUILT = re.compile(r"throw (\d{1,3})"), " built"
+
+
+def with_values(tables: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Numbers at other values; those that are open start there and stay open.
+
+    Throws that are open together have no start: with values for all of them they are the crank that a result shows.
+    """
+    engine, found = tables.get("engine", {}), dict(tables)
+    star = {int(throw[1]): name for name in values if (throw := _THROW.fullmatch(name))}
+    told: set[str] = set()
+    if engine.get("throws") == "open" and star and sorted(star) == list(range(1, len(star) + 1)):
+        own = {key: values[name] for key in PHASES if (name := key.replace("_", " ")) in values}
+        own["throws"] = [values[star[k]] for k in sorted(star)]
+        built = {name: name.removesuffix(_BUILT) for name in values if name.endswith(_BUILT)}
+        found = with_star(tables, own, [shaft for name, shaft in built.items() if not float(values[name])])
+        told = {*star.values(), *built, *(key.replace("_", " ") for key in own)}
+    for name, value in values.items():
+        found = found if name in told else with_value(found, name, value)
+    return found
 
 
 def with_value(tables: Mapping[str, Any], name: str, value: Any) -> dict[str, Any]:
@@ -92,6 +112,8 @@ def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
     if name.replace(" ", "_") in tables.get("engine", {}):
         # masses of all cylinders are called by their key alone
         return "engine", name.replace(" ", "_")
+    if own := _THROW.fullmatch(name):
+        return _throw(tables, name, int(own[1]) - 1)
     named = list(_named(tables))
     # a part may be called as a table is: the name that results show comes first
     known = [(label, keys) for label, keys in named if name.startswith(f"{label}.")]
@@ -107,8 +129,17 @@ def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
     raise Refused(name, None, "is no number of this problem", nearest(name, _examples(tables, named)))
 
 
+def _throw(tables: Mapping[str, Any], name: str, k: int) -> Keys:
+    """Of one throw, counted from zero."""
+    throws = tables.get("engine", {}).get("throws")
+    if not isinstance(throws, list) or not 0 <= k < len(throws):
+        remedy = "give values for all throws, or write them into the problem file first"
+        raise Refused(name, None, "is no number of this problem", remedy)
+    return "engine", "throws", k
+
+
 def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
-    """Weights, unbalances of shafts, shafts and mounts by the names that results show."""
+    """Weights, shafts, their unbalances, absorbers, the rim and mounts by the names that results show."""
     for k, weight in enumerate(tables.get("counterweights", ())):
         yield weight.get("name", ""), ("counterweights", k)
     for k, shaft in enumerate(tables.get("balancer_shafts", ())):
@@ -116,12 +147,34 @@ def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
         for j in range(len(names)):
             yield name_of_unbalance(shaft.get("name", ""), names, j), ("balancer_shafts", k, "unbalances", j)
         yield shaft.get("name", ""), ("balancer_shafts", k)
+    for k, shaft in enumerate(tables.get("engine", {}).get("shafts", ())):
+        yield shaft.get("name", ""), ("engine", "shafts", k)
+    if "rim" in tables.get("flywheel", {}):
+        yield "flywheel", ("flywheel", "rim")
+    yield from _twisting(tables.get("torsion", {}))
     for k, geared in enumerate(tables.get("geared_inertias", ())):
         yield geared.get("name", ""), ("geared_inertias", k)
     for k, bearing in enumerate(tables.get("main_bearings", ())):
         yield bearing.get("name", str(k + 1)), ("main_bearings", k)
     for k, place in enumerate(tables.get("mounts", {}).get("places", ())):
         yield place.get("name", str(k + 1)), ("mounts", "places", k)
+
+
+def _twisting(torsion: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
+    """Absorbers, discs, and under the name of a disc or of the crank its shaft and the first piece of that."""
+    for kind in ("absorbers", "discs"):
+        for k, told in enumerate(torsion.get(kind, ())):
+            keys: Keys = ("torsion", kind, k)
+            yield f"torsion.{told.get('name')}", keys
+            yield from _sections(f"torsion.{told.get('name')}", (*keys, "shaft"), told.get("shaft"))
+    yield from _sections("torsion.crank", ("torsion", "crank"), torsion.get("crank"))
+
+
+def _sections(label: str, keys: Keys, shaft: Mapping[str, Any] | None) -> Iterator[tuple[str, Keys]]:
+    """A shaft and the first of its pieces, which alone may be open."""
+    if shaft:
+        yield from ((label, (*keys, "pieces", 0)) for _ in shaft.get("pieces", ())[:1])
+        yield label, keys
 
 
 def _below(here: Mapping[str, Any], words: list[str]) -> Keys | None:

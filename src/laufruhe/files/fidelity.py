@@ -36,7 +36,7 @@ class FidelityTable(Table):
         "Motion of the pistons; auto takes the cheapest that keeps the objective in tolerance.",
         "exact",
     )
-    tolerance: f.Positive | None = f.told("Relative error of the objective that auto may make.")
+    tolerance: f.Tolerance | None = f.told("Relative error of the objective that auto may make.")
 
     def own(self, key: str) -> Any:
         """What stands at the key of a choice."""

@@ -77,8 +77,8 @@ class Number:
         SI unit; "" for a plain number.
     openable
         Whether `{ between = [low, high] }` may stand in place of the number.
-    least, above, most
-        Smallest value, value to exceed, largest value [SI].
+    least, above, most, below
+        Smallest value, value to exceed, largest value, value to stay under [SI].
     plain
         Factor that turns a bare number into SI, where one is allowed (degrees).
     """
@@ -88,6 +88,7 @@ class Number:
     least: float = -math.inf
     above: float = -math.inf
     most: float = math.inf
+    below: float = math.inf
     plain: float | None = None
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
@@ -141,6 +142,8 @@ class Number:
             raise refusal(f"is below any engine; {units.advice(self.unit)}, or 0")
         if value <= self.above:
             raise refusal(f"must be more than {units.shown(self.above, self.unit)}; {units.advice(self.unit)}")
+        if value >= self.below:
+            raise refusal(f"must be less than {units.shown(self.below, self.unit)}; give a smaller value")
         if value < self.least:
             raise refusal(f"must be at least {units.shown(self.least, self.unit)}; give a larger value")
         if value > self.most:
@@ -269,6 +272,7 @@ Ratio: TypeAlias = Annotated[float, Number("", least=-100.0, most=100.0), AfterV
 NonNegative: TypeAlias = Annotated[float, Number("", least=0.0)]
 Part: TypeAlias = Annotated[float, Number("", least=0.0, most=1.0)]
 Positive: TypeAlias = Annotated[float, Number("", above=0.0)]
+Tolerance: TypeAlias = Annotated[float, Number("", above=0.0, below=1.0)]
 OpenFraction: TypeAlias = Annotated[float | Open, Number("", least=-10.0, most=10.0, openable=True)]
 NonNegativeLength: TypeAlias = Annotated[float, Number("m", least=0.0)]
 Unbalance: TypeAlias = Annotated[float, Number("kg m", least=0.0)]

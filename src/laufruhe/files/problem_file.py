@@ -49,7 +49,7 @@ class ProblemFile(Table):
     title: str = Field(min_length=1)
     source: str = ""
     assumptions: list[str] = Field(default_factory=list)
-    tolerance: f.Positive = f.told("Relative gap at which an optimum counts as proven.", 1e-4)
+    tolerance: f.Tolerance = f.told("Relative gap at which an optimum counts as proven.", 1e-4)
     engine: EngineTable
     phasing: PhasingTable | None = None
     operating_points: list[OperatingPointTable] = Field(min_length=1)

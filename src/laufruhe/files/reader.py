@@ -137,9 +137,7 @@ class _Origin:
 
     def with_values(self, values: Mapping[str, Any]) -> Problem:
         """Numbers at other values."""
-        return self._edited(
-            *(partial(edits.with_value, name=name, value=plain(value, DEEPEST)) for name, value in values.items())
-        )
+        return self._edited(partial(edits.with_values, values=plain(values, DEEPEST)))
 
     def opened(self, name: str, low: Any, high: Any, start: Any) -> Problem:
         """A number left open."""
