@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from importlib.resources import files
 from urllib.parse import urlsplit
 
-from playwright.sync_api import Browser, Page, Route, WebSocketRoute, sync_playwright
+from playwright.sync_api import Browser, Page, Route, WebSocketRoute, expect, sync_playwright
 
 # an executable by its path goes before those that the distributions have
 CHOSEN = "LAUFRUHE_CHROMIUM"
@@ -21,6 +21,9 @@ INNER = {"file", "data", "blob", "about"}
 LOOPBACK = "127.0.0.1"
 GRAVE = {"serious", "critical"}
 SCREEN = {"width": 1280, "height": 720}
+PATIENCE = 120_000
+"""With whatever a page is waited for [ms]; what comes sooner is not waited for."""
+expect.set_options(timeout=PATIENCE)
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,7 @@ def launched() -> Iterator[Browser]:
     # a sandbox needs a user other than root
     words = ["--disable-gpu", *(["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else [])]
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=executable(), args=words)
+        browser = playwright.chromium.launch(executable_path=executable(), args=words, timeout=PATIENCE)
         yield browser
         browser.close()
 
@@ -63,6 +66,7 @@ def foreign(address: str) -> bool:
 def watched(browser: Browser, **options: object) -> Iterator[Watched]:
     """A page that reaches files and 127.0.0.1 only."""
     context = browser.new_context(**{"service_workers": "block", "viewport": SCREEN, **options})  # type: ignore[arg-type]
+    context.set_default_timeout(PATIENCE)
     seen = Watched(context.new_page())
 
     def refuse(route: Route) -> None:
@@ -78,6 +82,11 @@ def watched(browser: Browser, **options: object) -> Iterator[Watched]:
     seen.page.on("pageerror", lambda error: seen.errors.append(str(error)))
     yield seen
     context.close()
+
+
+def drawn(page: Page) -> None:
+    """All that was asked for is on the screen: a frame after the next has begun."""
+    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
 def violations(page: Page) -> list[dict[str, object]]:

@@ -12,7 +12,7 @@ import pytest
 from playwright.sync_api import Page, expect
 from typer.testing import CliRunner
 
-from browser import pages
+from browser import chromium, pages
 from laufruhe.cli import app
 from laufruhe.files.reader import load
 from laufruhe.present.numbers import figure
@@ -129,6 +129,7 @@ def test_keys_alone_are_enough(solved: Page) -> None:
     for _ in range(3):
         solved.keyboard.press("PageUp")
     expect(solved.locator("[data-measure=objective]")).not_to_have_text(best)
+    chromium.drawn(solved)
     worse = told(solved)
     solved.keyboard.press("End")
     expect(solved.locator("[data-measure=objective]")).not_to_have_text(worse)
@@ -158,8 +159,10 @@ def test_a_link_is_the_design(solved: Page) -> None:
     slider.focus()
     for _ in range(4):
         slider.press("PageDown")
-    solved.wait_for_function("decodeURIComponent(location.hash).includes('right.unbalance=')")
-    solved.wait_for_timeout(400)
+    name = "right.unbalance"
+    last = solved.evaluate("name => laufruheLive.page.then(page => `${name}=${page.design()[name]}`)", name)
+    solved.wait_for_function("last => decodeURIComponent(location.hash).includes(last)", arg=last)
+    chromium.drawn(solved)
     link, shown = solved.url, told(solved)
     assert "right.unbalance" in unquote(link)
     other = solved.context.new_page()

@@ -148,7 +148,7 @@ def test_shells_complete_commands_and_engines(shell: str, here: Path) -> None:
     if shell == "bash":
         # the command itself is asked once
         words = [sys.executable, "-c", "import sys; sys.argv = ['laufruhe']; from laufruhe.cli import main; main()"]
-        alone = subprocess.run(words, env={**os.environ, **environment}, capture_output=True, text=True, timeout=60)
+        alone = subprocess.run(words, env={**os.environ, **environment}, capture_output=True, text=True, timeout=300)
         assert alone.stdout.split() == found.split()
 
 
@@ -234,6 +234,6 @@ def test_letters_that_cannot_be_drawn_are_told_in_one_line(more: list[str], line
     """By a process that draws, once for all pictures; next to no font has Linear A."""
     path = written(tmp_path, scenes.SHAKING_ONLY.replace('title = "', 'title = "\U00010600 '))
     words = [sys.executable, "-m", "laufruhe", "evaluate", str(path), "--out", str(tmp_path / "out"), *more]
-    found = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120)
+    found = subprocess.run(words, capture_output=True, text=True, check=True, timeout=300)
     told = "laufruhe: no installed font has '\U00010600', so pictures show boxes in its place"
     assert [line[: len(told)] for line in found.stderr.splitlines()] == lines * [told]

@@ -33,7 +33,7 @@ def follow(path: Path, **state: Any) -> dict[str, Any]:
 
 
 def settle(path: Path, **state: Any) -> dict[str, Any]:
-    return json.loads(answers.settle(source(path), Asked(**state), 60.0))  # type: ignore[no-any-return]
+    return json.loads(answers.settle(source(path), Asked(**state), 600.0))  # type: ignore[no-any-return]
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +101,7 @@ def test_limits_that_contradict_each_other_are_named() -> None:
     edits = (Edit("set", "constraints.1.max", "0.05 kg"),)
     for found in (
         json.loads(answers.follow(of, Asked(edits))),
-        json.loads(answers.settle(of, Asked(edits), 60.0)),
+        json.loads(answers.settle(of, Asked(edits), 600.0)),
     ):
         assert found["optimum"] is None
         assert sorted(found["conflict"]) == ["balancer mass", "maximum mount force"]

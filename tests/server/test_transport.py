@@ -6,7 +6,8 @@ import http.client
 import json
 import socket
 import threading
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import closing
 
 import pytest
@@ -15,6 +16,7 @@ from laufruhe.server.guard import HEADERS, TOKEN
 from laufruhe.server.transport import MOST_AT_ONCE, MOST_BYTES, Answer, Server
 
 SECRET = "the problem"
+PATIENCE = 60.0
 
 
 @pytest.fixture(scope="module")
@@ -41,13 +43,20 @@ def asked(
     headers.update({name.replace("_", "-"): value for name, value in changes.items() if value is not None})
     for name in (name for name, value in changes.items() if value is None):
         headers.pop(name.replace("_", "-"))
-    with closing(http.client.HTTPConnection("127.0.0.1", server.port, timeout=10)) as connection:
+    with closing(http.client.HTTPConnection("127.0.0.1", server.port, timeout=PATIENCE)) as connection:
         connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
         for name, value in headers.items():
             connection.putheader(name, value)
         connection.endheaders(body)
         answer = connection.getresponse()
         return answer, answer.read()
+
+
+def wait_for(holds: Callable[[], bool]) -> None:
+    until = time.monotonic() + PATIENCE
+    while not holds() and time.monotonic() < until:
+        time.sleep(0.01)
+    assert holds()
 
 
 def test_who_has_the_token_is_answered(server: Server) -> None:
@@ -147,23 +156,20 @@ def test_nobody_beyond_this_machine_is_listened_to(server: Server) -> None:
 
 
 def test_connections_beyond_the_most_are_closed_and_room_comes_back(server: Server) -> None:
+    # those of other tests take room until their threads have ended
+    wait_for(lambda: server._room._value == MOST_AT_ONCE)
     held = [socket.create_connection(("127.0.0.1", server.port)) for _ in range(MOST_AT_ONCE)]
     try:
         # they are let in one after the other: once the last is answered all are, and it stays open
         held[-1].sendall(f"GET /page.js HTTP/1.1\r\nHost: {server.guard.hosts[0]}\r\n\r\n".encode())
         assert held[-1].recv(12) == b"HTTP/1.1 200"
-        with socket.create_connection(("127.0.0.1", server.port), timeout=10) as one_more:
+        with socket.create_connection(("127.0.0.1", server.port), timeout=PATIENCE) as one_more:
             assert one_more.recv(1) == b""
     finally:
         for connection in held:
             connection.close()
-    for _ in range(200):
-        try:
-            if asked(server)[0].status == 200:
-                return
-        except (http.client.RemoteDisconnected, ConnectionError):
-            threading.Event().wait(0.02)
-    raise AssertionError("no room came back")
+    wait_for(lambda: server._room._value > 0)
+    assert asked(server)[0].status == 200
 
 
 def test_nothing_of_a_request_is_written_down(server: Server, capfd: pytest.CaptureFixture[str]) -> None:

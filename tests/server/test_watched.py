@@ -12,7 +12,14 @@ from laufruhe.server.watched import Watched
 from problem_files import FOUR, MOUNTS, written
 
 TEXT = FOUR + '[[operating_points]]\nspeed = "2500 rpm"\n' + MOUNTS
-PATIENCE = 20.0
+PATIENCE = 120.0
+
+
+def saved(path: Path, text: str) -> None:
+    """At once: whoever looks sees the old text or the new one, and no part of it."""
+    new = path.with_suffix(".new")
+    new.write_text(text, encoding="utf-8")
+    new.replace(path)
 
 
 @pytest.fixture
@@ -25,15 +32,15 @@ def watched(tmp_path: Path) -> Iterator[Watched]:
 
 def test_changes_are_told_and_what_is_wrong_leaves_the_last_good_state(watched: Watched) -> None:
     first = watched.source
-    watched.path.write_text(TEXT.replace('"2500 rpm"', "2500 rpm"), encoding="utf-8")
+    saved(watched.path, TEXT.replace('"2500 rpm"', "2500 rpm"))
     assert watched.later(1, PATIENCE) == 2
     assert watched.source is first
     line = TEXT.splitlines().index('speed = "2500 rpm"') + 1
     assert f"line {line}, " in watched.complaint
-    watched.path.write_text(TEXT.replace("2500", "10000000"), encoding="utf-8")
+    saved(watched.path, TEXT.replace("2500", "10000000"))
     assert watched.later(2, PATIENCE) == 3
     assert "rpm" in watched.complaint or watched.source is not first
-    watched.path.write_text(TEXT.replace("2500", "2600"), encoding="utf-8")
+    saved(watched.path, TEXT.replace("2500", "2600"))
     assert watched.later(3, PATIENCE) == 4
     assert watched.complaint == ""
     assert watched.source.tables["operating_points"][0]["speed"] == "2600 rpm"

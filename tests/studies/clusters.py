@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -47,17 +47,20 @@ title = "t"
 sweep = [{{ quantity = "engine.rod_ratio", from = 0.2, to = 0.3, points = {points} }}]
 cases = [{{ name = "single", problem = "single.toml" }}]
 """
-LAUFRUHE = (sys.executable, "-c", "from laufruhe.cli import main; main()")
+# on a slow machine too schedulers and workers come in time
+_TOLD = "import laufruhe.numerics.cluster as own; own.ANSWERS = own.PATIENCE = 600.0; "
+LAUFRUHE = (sys.executable, "-c", _TOLD + "from laufruhe.cli import main; main()")
 QUIET = ("--no-dashboard", "--dashboard-address", "127.0.0.1:0")  # the usual port may be taken, by another test too
-EACH = ("--nthreads", "1", *QUIET, "--death-timeout", "60")
+EACH = ("--nthreads", "1", *QUIET, "--death-timeout", "600")
 _SOURCE = str(Path(laufruhe.__file__).parents[1])
+_PATIENT = dict.fromkeys((f"DASK_DISTRIBUTED__COMM__TIMEOUTS__{name}" for name in ("CONNECT", "TCP")), "600s")
 _THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 TIMED = "## Where the time went"
 
 
 def environment() -> dict[str, str]:
-    """Of every process: one thread each, and the package under test."""
-    return {**os.environ, **_THREADS, "PYTHONPATH": _SOURCE}
+    """Of every process: one thread each, the package under test, and patience with a slow machine."""
+    return {**os.environ, **_THREADS, **_PATIENT, "PYTHONPATH": _SOURCE}
 
 
 def prepared(
@@ -88,10 +91,7 @@ class Cluster:
 
     def start(self, count: int) -> None:
         """A scheduler on its port, and workers."""
-        if not self.port:
-            with socket.socket() as one:
-                one.bind(("127.0.0.1", 0))
-                self.port = one.getsockname()[1]
+        self.port = self.port or _port()
         self.scheduler = self._process("scheduler", "--host", "127.0.0.1", "--port", str(self.port), *QUIET)
         for _ in range(count):
             self.add()
@@ -127,6 +127,15 @@ class Cluster:
             return subprocess.Popen(
                 [sys.executable, "-m", "dask", *words, *more], cwd=local, env=environment(), stdout=log, stderr=log
             )
+
+
+def _port() -> int:
+    """Free, and of those that no system hands out unasked: it is taken later, and once more after a kill."""
+    rng = random.SystemRandom()
+    while True:
+        with socket.socket() as one, suppress(OSError):
+            one.bind(("127.0.0.1", rng.randrange(10_000, 32_000)))
+            return int(one.getsockname()[1])
 
 
 @contextmanager
@@ -191,7 +200,7 @@ def _same_data(one: Path, other: Path, name: str) -> bool:
         return first.identical(second)
 
 
-def wait_until(done: object, seconds: float = 60.0) -> None:
+def wait_until(done: object, seconds: float = 600.0) -> None:
     """Until something holds, or for too long."""
     until = time.monotonic() + seconds
     while not done() and time.monotonic() < until:  # type: ignore[operator]

@@ -39,7 +39,7 @@ def test_killed_clients_workers_and_schedulers_change_no_bit(
 ) -> None:
     folder = clusters.prepared(tmp_path, **SMALL)
     first = clusters.started(folder, "--scheduler", workers.address)
-    clusters.wait_until(lambda: clusters.pieces_done(folder) >= KILLED_AT)
+    clusters.wait_until(lambda: clusters.pieces_done(folder) >= KILLED_AT or first.poll() is not None)
     first.kill()
     first.communicate()
     kept = clusters.pieces_done(folder)

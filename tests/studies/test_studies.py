@@ -8,7 +8,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -344,6 +343,25 @@ def whole(small: Path, tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
     return computed(study(tmp_path_factory.mktemp("whole"), LONG), small)
 
 
+# stops where it stands once three points are kept; on a slow machine too it has the time to say so when interrupted
+HALTS = """
+import time
+import laufruhe.cli.supervised
+from laufruhe.studies.kept_points import KeptPoints
+laufruhe.cli.supervised.PATIENCE = 300
+keep, kept = KeptPoints.keep, []
+def keep_three(*words):
+    keep(*words)
+    kept.append(words)
+    if len(kept) == 3:
+        print("three", flush=True)
+        time.sleep(1e4)
+KeptPoints.keep = keep_three
+from laufruhe.cli import main
+main()
+"""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGKILL])
 def test_stopped_study_goes_on(tmp_path: Path, small: Path, stop: signal.Signals, whole: xr.Dataset) -> None:
@@ -352,19 +370,17 @@ def test_stopped_study_goes_on(tmp_path: Path, small: Path, stop: signal.Signals
     source = str(Path(laufruhe.studies.scenes.__file__).parents[2])
     environment = {**os.environ, "PYTHONPATH": source}
     out = tmp_path / "out"
-    command = [sys.executable, "-m", "laufruhe", "study", str(path), "--out", str(out), "--jobs", "1"]
+    command = [sys.executable, "-c", HALTS, "study", str(path), "--out", str(out), "--jobs", "1"]
     # a test run in the background has its interrupts ignored, and hands that on
     heard = lambda: signal.signal(signal.SIGINT, signal.default_int_handler)  # noqa: E731
-    process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True, preexec_fn=heard)
-    kept = out / KEPT
-    for _ in range(2000):
-        if kept.is_file() and len(points_in(kept.read_bytes())) >= 3:
-            break
-        time.sleep(0.01)
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    process = subprocess.Popen(command, env=environment, text=True, preexec_fn=heard, **pipes)  # type: ignore[call-overload]
+    assert process.stdout.readline() == "three\n"
     process.send_signal(stop)
     said = process.communicate()[1]
+    kept = out / KEPT
     content = kept.read_bytes()
-    assert 3 <= len(points_in(content)) < 25
+    assert len(points_in(content)) == 3
     if stop is signal.SIGINT:
         assert process.returncode == 130
         assert said == "laufruhe: interrupted; finished points are kept, the same command goes on\n"

@@ -236,7 +236,8 @@ class Processes(Executor):
     @property
     def pids(self) -> tuple[int, ...]:
         """Of the processes that run."""
-        return tuple(child.pid for child in self._children)
+        with self._lock:
+            return tuple(child.pid for child in self._children)
 
     def _tend(self) -> None:
         """Hand call after call to one process; in one thread, for the process ends with the thread that started it."""
