@@ -68,7 +68,9 @@ def best(result: Result) -> float:
 def test_best_of_all_assemblies(read: Read, engine: str, quantity: str, lots: str) -> None:
     pistons = PISTONS[:4] if "rods" in lots else PISTONS
     problem = read(engine + POINT + LEAST.format(quantity) + "[assembly]\n" + lots, pistons)
-    result, values = solve(problem), every(problem)
+    result = solve(problem)
+    # many angles may tell otherwise of the proof than those asked for
+    values = every(result.problem)
     assert result.certificate is not None
     assert result.assembly is not None
     assert result.certificate.kind is Proof.GLOBAL

@@ -135,7 +135,8 @@ def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], found: Resu
         if passed():
             return _Answer(replace(told, why=LONG))
         if not measure.channel.is_moved_by(kinds):
-            value = math.nan if found.initial.resonance else found.initial.standing(limit).value
+            known = {own.name: own.value for own in found.limits}
+            value = math.nan if found.initial.resonance else known.get(limit.name, math.nan)
             return _Answer(replace(told, value=value, why="nothing that is open changes it"))
         held = others if math.isinf(rest.minimum) and math.isinf(rest.maximum) else (*others, rest)
         try:

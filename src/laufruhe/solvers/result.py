@@ -156,6 +156,11 @@ class Result(Told):
         """Of the problem."""
         return self.problem.name
 
+    @property
+    def measured(self) -> Evaluation:
+        """What the objective is of: the design, or the worst engine found that is built to it."""
+        return self.final if self.robust is None else self.robust.worst_engine
+
     @cached_property
     def error_estimate(self) -> float:
         """Relative error of the objective from sampling the cycle; studies keep none, and do not wait for it."""

@@ -13,12 +13,16 @@ from dataclasses import replace
 from laufruhe.numerics.budget import rounds
 from laufruhe.problem.evaluation import FINE, Evaluation, finely, is_of_few, objective_value
 from laufruhe.problem.measure import Limit
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import gap_of
 from laufruhe.solvers.conclusion import KEPT
 from laufruhe.solvers.result import Result, Status
 
 ROUNDS, MOST_TIMES = 4, 16
 """Times that more angles are taken, and how many times as many at once."""
+FELT, LEAST_TIMES = 0.1, 2.0
+"""Share of the tolerance by which an objective may be misread, and tolerances that more count as at least."""
 
 
 def solve_told(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
@@ -26,7 +30,7 @@ def solve_told(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
     result = solve(problem)
     for _ in rounds(ROUNDS):
         own = problem.fidelity
-        untold = max(_untold(result) / KEPT, _open_gap(result)) if own.samples < FINE else 0.0
+        untold = max(_untold(result) / KEPT, _misproven(result)) if own.samples < FINE else 0.0
         if untold <= 1.0:
             break
         # means at equal steps come nearer by the square of these; the gas keeps its own
@@ -60,20 +64,32 @@ def _untold(result: Result) -> float:
     return max((abs(many.standing(x).excess - few.standing(x).excess) for x in limits), default=0.0)
 
 
-def over_read(problem: Problem, evaluation: Evaluation) -> float:
-    """By how much few angles read an objective of loads too large, where that is more than the tolerance; else zero."""
+def _misread(problem: Problem, evaluation: Evaluation) -> float:
+    """By how much few angles read an objective of loads too large; negative where they read too little."""
     terms = [term for term in problem.load_terms if is_of_few(term.measure, evaluation.samples)]
     if not terms or evaluation.resonance:
         return 0.0
-    told, value = replace(problem, objective=tuple(terms)), objective_value(problem, evaluation)
-    over = objective_value(told, evaluation) - objective_value(told, finely(evaluation))
-    return over if over > problem.tolerance * value else 0.0
+    told = replace(problem, objective=tuple(terms))
+    return objective_value(told, evaluation) - objective_value(told, finely(evaluation))
 
 
-def _open_gap(result: Result) -> float:
-    """Tolerances by which an objective is read too large, where nothing else keeps its gap open; else zero."""
-    problem, proof = result.problem, result.certificate
-    if proof is None or not result.status.has_design or not problem.tolerance < proof.gap or not problem.search.proves:
+def over_read(problem: Problem, evaluation: Evaluation) -> float:
+    """By how much few angles read an objective of loads too large, where that is more than the tolerance; else zero."""
+    over = _misread(problem, evaluation)
+    return over if over > problem.tolerance * objective_value(problem, evaluation) else 0.0
+
+
+def _misproven(result: Result) -> float:
+    """Tolerances by which an objective is misread, where many angles tell otherwise of its proof; else zero."""
+    problem, proof, told = result.problem, result.certificate, result.objective
+    if proof is None or told is None or not result.status.has_design or not problem.search.proves:
         return 0.0
-    over = over_read(problem, result.final) / (objective_value(problem, result.final) or 1.0)
-    return over / problem.tolerance if proof.gap - over <= problem.tolerance else 0.0
+    over = _misread(problem, result.measured)
+    value = told.value - over
+    if abs(over) <= FELT * problem.tolerance * value:
+        return 0.0
+    # a bound that stands over the value is none, by as much as one under it proves nothing
+    nothing = nothing_of(problem, result.final.engine)
+    gap = max(gap_of(value, proof.lower_bound, nothing), gap_of(proof.lower_bound, value, nothing))
+    agree = (gap <= problem.tolerance) is (proof.gap <= problem.tolerance)
+    return 0.0 if agree else max(abs(over) / (problem.tolerance * value), LEAST_TIMES)

@@ -18,6 +18,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.tolerances.error_parts import Terms
 from laufruhe.prove.tolerances.worst_case import MOST_NODES, worst_case
+from laufruhe.solvers.conclusion import KEPT
 
 QUICK = 1
 """Parts of the errors that are looked at while designs still change."""
@@ -39,6 +40,8 @@ class Found:
         What no engine exceeds of each limit.
     excess
         Largest relative excess over a limit.
+    broken
+        Names of limits that an engine found breaks.
     divisions
         Parts of the errors that were looked at.
     proven
@@ -50,6 +53,7 @@ class Found:
     errors: tuple[Array, ...]
     limits: tuple[tuple[Limit, float], ...]
     excess: float
+    broken: tuple[str, ...]
     divisions: int
     proven: bool
 
@@ -62,6 +66,11 @@ def moved_limits(problem: Problem) -> tuple[Limit, ...]:
 def excess_of(limits: Sequence[tuple[Limit, float]]) -> float:
     """Largest relative excess; negative where all have room."""
     return max(((value - limit.maximum) / (limit.maximum or 1.0) for limit, value in limits), default=0.0)
+
+
+def names_broken(limits: Sequence[tuple[Limit, float]]) -> tuple[str, ...]:
+    """Of limits that are passed by more than counts as kept."""
+    return tuple(limit.name for limit, value in limits if value > limit.maximum * (1.0 + KEPT))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +87,7 @@ class EveryError:
         columns, most = self.problem.tolerances.columns, MOST_NODES if proven else QUICK
         found = worst_case(built.terms, columns, self.tolerance, most=most)
         errors, limits, divisions = [found.errors], [], found.nodes
+        broken: list[str] = []
         finely = {self.samples: built}
         for limit in moved_limits(self.problem):
             angles = told_at(limit.measure, self.samples)
@@ -88,7 +98,10 @@ class EveryError:
             divisions += own.nodes
             if own.value > limit.maximum:
                 errors.append(own.errors)
-        return Found(found.value, found.bound, tuple(errors), tuple(limits), excess_of(limits), divisions, proven)
+            broken += names_broken([(limit, own.value)])
+        return Found(
+            found.value, found.bound, tuple(errors), tuple(limits), excess_of(limits), tuple(broken), divisions, proven
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,8 +137,8 @@ class DrawnEngines:
             limits.append((limit, float(own.max())))
             if own.max() > limit.maximum:
                 errors.append(self.errors[int(np.argmax(own))])
-        value = float(worst.max())
-        return Found(value, value, tuple(errors), tuple(limits), excess_of(limits), len(self.errors), True)
+        value, broken = float(worst.max()), names_broken(limits)
+        return Found(value, value, tuple(errors), tuple(limits), excess_of(limits), broken, len(self.errors), True)
 
     def _measured(self, values: Sequence[Value], limit: Limit | None) -> Array:
         samples = self.samples if limit is None else told_at(limit.measure, self.samples)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -18,9 +18,9 @@ from laufruhe.problem.sets import Value
 from laufruhe.problem.tolerance import Over, Tolerance
 from laufruhe.prove.certificate import Proof, certified
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.conclusion import KEPT, Design, Shown, decided, decision_values, limit_values
+from laufruhe.solvers.conclusion import KEPT, Design, Shown, decided, decision_values, limit_values, none_within
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.tolerances.adversaries import Adversary, Found
+from laufruhe.solvers.tolerances.adversaries import Adversary, Found, names_broken
 from laufruhe.solvers.tolerances.result import CONFIDENCE, SHARE, SHARES, BuiltDesign, PricedTolerance, RobustResult
 from laufruhe.solvers.values import LimitValue, ObjectiveValue
 
@@ -66,11 +66,12 @@ def compared(
         _design("best drawing", problem, nominal, first, sample.values(problem, nominal), share),
         _design("decided", problem, robust, found, values, share),
     )
+    worst = evaluated(problem.built(found.errors[0]), robust, seeker.samples)
     exceeding = int((values > found.bound * (1.0 + 1e-12)).sum())
     return RobustResult(
         over=over, exact=over.share is None and problem.tolerances.is_affine, share=share,
         nominal=designs[0], robust=designs[1], tolerances=_priced(problem, robust, held, sample, share),
-        scenarios=scenarios, divisions=found.divisions, engines=len(values), seed=sample.seed,
+        scenarios=scenarios, divisions=found.divisions, engines=len(values), seed=sample.seed, worst_engine=worst,
         exceeding=exceeding, exceeding_at_most=_at_most(exceeding, len(values)),
     )  # fmt: skip
 
@@ -165,6 +166,23 @@ def _limited(own: LimitValue, worst: float, price: float, tolerance: float) -> L
     return replace(own, value=worst, active=active, shadow_price=price if active else 0.0)
 
 
+def none_built(problem: Problem, given: Found, conflict: tuple[str, ...], timing: dict[str, float]) -> Result:
+    """No design keeps its limits in every engine: which of them, and how the worst engines of the one given stand."""
+    found = none_within(problem, evaluate(problem), conflict, timing)
+    return replace(found, limits=_in_the_worst(problem, found.limits, given, {}))
+
+
+def _in_the_worst(
+    problem: Problem, limits: Sequence[LimitValue], found: Found, prices: Mapping[Limit, float]
+) -> tuple[LimitValue, ...]:
+    """Limits of a drawing as its worst engines stand to them."""
+    worst = dict(found.limits)
+    return tuple(
+        _limited(own, worst.get(limit, own.value), prices.get(limit, 0.0), problem.tolerance)
+        for limit, own in zip(problem.limits, limits, strict=True)
+    )
+
+
 def robust_result(
     problem: Problem, design: Design, given: Found, found: Found, held: Held, shown: Shown, details: RobustResult,
     timing: dict[str, float],
@@ -175,16 +193,12 @@ def robust_result(
     certificate = certified(
         found.bound, shown.bound, nothing, problem.tolerance, shown.reach, shown.kkt_residual, shown.method
     )
-    worst = dict(found.limits)
     prices: dict[Limit, float] = {}
     for limit, price in (priced for own in held.prices for priced in own):
         prices[limit] = prices.get(limit, 0.0) + price
-    limits = tuple(
-        _limited(own, worst.get(limit, own.value), prices.get(limit, 0.0), problem.tolerance)
-        for limit, own in zip(problem.limits, limit_values(problem, design.evaluation), strict=True)
-    )
+    limits = _in_the_worst(problem, limit_values(problem, design.evaluation), found, prices)
     status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
-    broken = [limit.name for limit in problem.limits if worst.get(limit, 0.0) > limit.maximum * (1.0 + KEPT)]
+    broken = names_broken(found.limits)
     message = f"the best design found breaks {' and '.join(map(repr, broken)) or 'a limit'} in some engines"
     return Result(
         problem=problem,
@@ -196,7 +210,7 @@ def robust_result(
         initial=evaluate(problem),
         final=design.evaluation,
         message="" if met else message,
-        error=partial(error_of, problem, design.evaluation),
+        error=partial(error_of, problem, details.worst_engine),
         timing=timing,
         robust=details,
     )  # fmt: skip

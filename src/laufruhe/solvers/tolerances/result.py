@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.tolerance import Over
 
 SHARE = 0.95
@@ -87,6 +88,8 @@ class RobustResult:
         Parts of the errors that the bound looked at.
     engines, seed
         Drawn for the comparison, other ones than those that decided.
+    worst_engine
+        The exact model's evaluation of the worst engine found of the design decided.
     exceeding, exceeding_at_most
         How many of them exceed the objective, and the share of all that does, at most, with CONFIDENCE.
     """
@@ -101,5 +104,6 @@ class RobustResult:
     divisions: int
     engines: int
     seed: int
+    worst_engine: Evaluation
     exceeding: int
     exceeding_at_most: float

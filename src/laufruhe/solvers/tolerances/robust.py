@@ -22,19 +22,19 @@ from laufruhe.numerics.budget import in_time
 from laufruhe.numerics.progress import tell, within
 from laufruhe.numerics.spectrum import common_base
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.problem.tolerance import Over
 from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, judged, none_within, unbalances_of
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, judged, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import conflict_of, is_empty, tightened
-from laufruhe.solvers.result import Result
+from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.tolerances.adversaries import Adversary, DrawnEngines, EveryError, Found
-from laufruhe.solvers.tolerances.conclusion import Held, compared, robust_result
+from laufruhe.solvers.tolerances.conclusion import Held, compared, none_built, robust_result
 
 Solve = Callable[[Problem], Result]
 
@@ -103,22 +103,23 @@ def solve_robust(problem: Problem, solve: Solve) -> Result:
     with within("drawing"):
         drawing = solve(problem.changed(over=None))
     acting = problem.tolerances.acting
-    if (drawing.certificate is None and problem.decisions) or not acting.each:
+    without = drawing.certificate is None and (problem.decisions or drawing.status is Status.INFEASIBLE)
+    if without or not acting.each:
         return replace(drawing, problem=problem)
     problem = replace(problem, tolerances=acting, fidelity=drawing.problem.fidelity)
     start = tuple(unbalances_of(problem, drawing))
     tell("worst errors of the drawing")
     seeker, found = _found(problem, over, start, drawing)
-    if found.conflict:
-        return none_within(problem, evaluate(problem), found.conflict, {"solve": time.perf_counter() - started})
-    solved = time.perf_counter()
     seeker = replace(seeker, samples=found.samples)
+    given = seeker.at(problem.start, proven=False)
+    if found.conflict:
+        return none_built(problem, given, found.conflict, {"solve": time.perf_counter() - started})
+    solved = time.perf_counter()
     reach = Reach.WHOLE if over.share is None else Reach.ASIDE
     design = judged(problem, found.values, found.samples)
     shown = Shown(found.bound, reach, found.held.residual, _method(problem, found))
     details = compared(problem, seeker, start, found.values, found.found, found.held, found.scenarios)
     timing = {"solve": solved - started, "compare": time.perf_counter() - solved}
-    given = seeker.at(problem.start, proven=False)
     return robust_result(problem, design, given, found.found, found.held, shown, details, timing)
 
 
@@ -258,7 +259,8 @@ def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], 
     found = seeker.at(start, proven=not problem.decisions)
     best = Least(start, found, 0.0, Held((found.errors[0],), (1.0,), ((),)), 1, 0, seeker.samples)
     if not problem.decisions:
-        return replace(best, bound=found.value)
+        # what an engine that was found breaks is broken, whatever else is
+        return replace(best, bound=found.value, conflict=found.broken)
     program, values, bound = _Program(problem, nothing), start, 0.0
     program.add([np.zeros(problem.tolerances.count)])
     samples, level, before, known = program.angles // COARSER, 0.0, math.inf, True
