@@ -10,10 +10,11 @@ import zlib
 import numpy as np
 import pytest
 
+import ready
 from laufruhe.files.reader import load
-from laufruhe.live import page_assets
+from laufruhe.live import live_model, page_assets
 from laufruhe.live.saving import written
-from laufruhe.problem.evaluation import objective_value
+from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.report.result_report import result_document
 from laufruhe.report.web_page import as_html
 from laufruhe.solvers import state
@@ -128,3 +129,16 @@ def test_script_and_style_ask_for_nothing():
     for text in page_assets().values():
         for word in ("http://", "https://", "import ", "eval(", "innerHTML", "url("):
             assert word not in text.replace("http://www.w3.org/2000/svg", "")
+
+
+def test_what_a_star_is_decided_to_be_is_saved_from_its_result_alone():
+    result = ready.solved("vee-eight-open")
+    model = live_model(result.problem, result)
+    text, values = model.save.text, {entry.name: entry.value for entry in result.decisions}
+    for mark, name, unit in model.save.numbers:
+        text = text.replace(json.dumps(mark), written(values[name], unit))
+    saved = load(text)
+    assert saved.phasing is None
+    assert objective_value(saved, evaluate(saved)) == pytest.approx(result.objective.value, rel=1e-9)
+    # as the file has them
+    assert {slider.shown for slider in model.sliders} == {"kg m"}

@@ -35,7 +35,7 @@ def test_a_case_without_a_design_says_so_in_its_place() -> None:
     shown = {text.get_text(): text.get_position()[0] for text in axes.texts}
     low, high = axes.get_xlim()
     assert low < shown["no design"] < high
-    assert "21051" in shown, "no exponents on bars"
+    assert "21\u2009051" in shown, "no exponents on bars"
     assert [text.get_text() for text in figure.legends[0].get_texts()] == ["as given", "proven optimum"]
 
 

@@ -97,6 +97,12 @@ class Scene:
         return max(leaning) < 0.5
 
     @property
+    def is_star(self) -> bool:
+        """Whether more than two cylinders stand each in a direction of its own: from beside they cover each other."""
+        banks = [round(part.bank, 6) for part in self.engine.slider_cranks]
+        return len(banks) > 2 and len(set(banks)) == len(banks)
+
+    @property
     def beside(self) -> str:
         """From where the second view is taken."""
         return "from above" if self.is_flat else "from the left"
@@ -141,18 +147,20 @@ def _front(axes: Axes, scene: Scene, phi: float) -> None:
     """From the front: y to the right, z up, turning clockwise (C3)."""
     # what stands further back is drawn first
     poses = [Pose.of(part, phi) for part in sorted(scene.engine.slider_cranks, key=lambda part: part.x)]
-    bore = bore_of(scene.engine)
+    bore, heads = bore_of(scene.engine), dict[str, complex]()
     for k, pose in enumerate(poses):
         behind = 4.0 + k / len(poses)
         if pose.bodies:
             bodies(axes, pose)
         else:
-            cylinder(axes, pose, bore)
+            heads[_number_of(pose)] = cylinder(axes, pose, bore)
             piston_at(axes, pose, bore, behind, **_piston_look(scene, pose))
             bar(axes, (pose.foot, 0.15 * bore), (pose.piston, 0.09 * bore), behind, **_rod_look(scene))
             slot(axes, pose, bore, behind)
         bar(axes, (pose.crank, 0.2 * bore), (pose.pin, 0.15 * bore), behind + 2.0, **_crank_look(scene, pose))
         axes.add_patch(Circle(at(pose.pin), MM * 0.08 * bore, facecolor="white", edgecolor=INK, zorder=7.5))
+    for number, head in heads.items() if scene.is_star else ():
+        axes.text(*at(head), number, ha="center", va="center", size=SMALL, zorder=6.0)
     for rotor in scene.weights:
         centre, along = complex(rotor.shaft.z, rotor.shaft.y), direction(rotor, phi)
         middle = 90.0 - math.degrees(along)
@@ -202,7 +210,8 @@ def _side(axes: Axes, scene: Scene, phi: float) -> None:
             walls, ends = (x - 0.48 * bore, x + 0.48 * bore), (piston - 0.5 * high, piston + 0.5 * high)
             box(axes, walls, ends, 5.0, **_piston_look(scene, pose))
         pistons.append((pose, piston))
-    _numbers(axes, pistons, quarter, bore)
+    if not scene.is_star:
+        _numbers(axes, pistons, quarter, bore)
     for rotor in scene.weights:
         low, high = heights_of(half_disc(abs(rotor.unbalance)), direction(rotor, phi) - quarter)
         middle = level(complex(rotor.shaft.z, rotor.shaft.y))
@@ -214,12 +223,17 @@ def _side(axes: Axes, scene: Scene, phi: float) -> None:
     axes.set(xlabel="x [mm], the front at the left", ylabel="y [mm]" if scene.is_flat else "z [mm]")
 
 
+def _number_of(pose: Pose) -> str:
+    """Of the cylinder; empty where its name has none."""
+    return next((word for word in pose.part.name.split() if word.isdecimal()), "")
+
+
 def _numbers(axes: Axes, pistons: Sequence[tuple[Pose, float]], quarter: float, bore: float) -> None:
     """Of the cylinders, on their pistons, where these are large enough; those of one place together."""
     inch = abs(float(np.ptp(axes.get_xlim()))) * axes.figure.dpi / axes.bbox.width
     found: list[tuple[float, float, list[str]]] = []
     for pose, up in pistons:
-        number = next((word for word in pose.part.name.split() if word.isdecimal()), "")
+        number = _number_of(pose)
         # pistons of two banks may stand behind each other
         lean = float(np.sign(round(math.sin(pose.part.bank - quarter), 9)))
         if not number or width_of(number) > (0.45 if lean else 0.9) * 0.96 * MM * bore / inch:

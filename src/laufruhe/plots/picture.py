@@ -14,12 +14,13 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from laufruhe.plots import style
 from laufruhe.plots.letters import prepare
 from laufruhe.plots.style import as_svg, heading, page, save, styled
-from laufruhe.plots.words import SMALL, apart, ink_on, legible, typeset
+from laufruhe.plots.words import SMALL, apart, grouped, ink_on, legible, typeset
 from laufruhe.studies.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
 
 MOST_ENTRIES, FEW_ENTRIES = 8, 5
@@ -71,35 +72,38 @@ def hue(colour: Colour) -> str:
 
 
 def _panel(axes: Axes, panel: Panel) -> None:
+    words = [(mark, _words(axes, mark)) for mark in panel.marks if isinstance(mark, Words)]
     for mark in panel.marks:
         _mark(axes, mark)
     axes.set_title(typeset(panel.title), loc="left", size=SMALL)
     _axis(axes, "x", panel.x)
     _axis(axes, "y", panel.y)
-    free = {mark.text for mark in panel.marks if isinstance(mark, Words) and mark.across == "left"}
-    apart([text for text in axes.texts if text.get_text() in free])
+    apart([text for mark, text in words if mark.across == "left"])
+
+
+def _words(axes: Axes, mark: Words) -> Text:
+    drawn = axes.text(
+        mark.x, mark.y, typeset(grouped(mark.text)), size=SMALL, clip_on=False, ha=mark.across, va=mark.along,
+        color=ink_on(hue(mark.inside)) if mark.inside else legible(hue(mark.colour)),
+    )  # fmt: skip
+    if mark.boxed:
+        drawn.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.0})
+    return drawn
 
 
 def _mark(axes: Axes, mark: Mark) -> None:
-    if isinstance(mark, Words):
-        drawn = axes.text(
-            mark.x, mark.y, typeset(mark.text), size=max(mark.size, SMALL), clip_on=False,
-            color=ink_on(hue(mark.inside)) if mark.inside else legible(hue(mark.colour)),
-            ha=mark.across, va=mark.along,
-        )  # fmt: skip
-        if mark.boxed:
-            drawn.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.0})
-    elif isinstance(mark, Bars):
+    """All marks but words, which are kept clear of each other."""
+    if isinstance(mark, Bars):
         draws = axes.bar if mark.upright else axes.barh
         fill: dict[str, Any] = (
             {"facecolor": "none", "edgecolor": hue(mark.colour)} if mark.hollow else {"color": hue(mark.colour)}
         )
         bars = draws(mark.places, mark.values, mark.width, linewidth=1.3 if mark.hollow else 0.0, **fill)
         if mark.numbers:
-            axes.bar_label(bars, list(mark.numbers), size=SMALL)
+            axes.bar_label(bars, [grouped(text) for text in mark.numbers], size=SMALL)
     elif isinstance(mark, Area):
         axes.fill_between(mark.x, mark.low, mark.high, color=hue(mark.colour), linewidth=0)
-    elif np.size(mark.x):
+    elif isinstance(mark, Line) and np.size(mark.x):
         axes.plot(mark.x, mark.y, clip_on=bool(mark.width), **_look(mark))
 
 

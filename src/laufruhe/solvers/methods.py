@@ -235,6 +235,8 @@ def solve(
                 raise
             found = None
         found = found if found is not None and not passed() else _cut_short(problem, found)
+        # what a method made of the problem is of the same file
+        found = replace(found, problem=replace(found.problem, origin=problem.origin))
         if not further or found.status is Status.FEASIBLE:
             return found
         if found.status is Status.OPTIMAL:

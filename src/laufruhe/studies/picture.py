@@ -73,7 +73,6 @@ class Words:
     x: float
     y: float
     text: str
-    size: float = 9.0
     colour: Colour = "ink"
     across: str = "left"
     along: str = "center"

@@ -37,7 +37,7 @@ def _shares(axes: Axes, facts: MountingFacts) -> None:
     axes.imshow(np.clip(energy, 0.0, 100.0), cmap=shades, vmin=0.0, vmax=115.0, aspect="auto")
     for i, j in np.argwhere(np.abs(energy) >= 0.5):
         colour = ink_on(to_hex(shades(energy[i, j] / 115.0)))
-        axes.text(j, i, f"{energy[i, j]:.0f}", ha="center", va="center", size=SMALL, color=colour)
+        axes.text(j, i, f"{energy[i, j]:.0f}".replace("-", "−"), ha="center", va="center", size=SMALL, color=colour)
     axes.set_xticks(range(6), [number(f, 3) for f in facts.modes.frequencies])
     for j, label in enumerate(axes.get_xticklabels()):
         label.set_fontweight("bold" if j in facts.excited else "normal")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -28,6 +28,7 @@ WIDE, HIGH = 6.8, 1.65
 COLOURS = {"gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK}
 # a part that is a smaller share of the largest is not drawn, and an order not shown
 FELT, SEEN = 1e-3, 1e-2
+_MEAN: Any = {"color": FAINT, "linewidth": 1.0, "linestyle": (0, (4, 1.6)), "zorder": 1.5}
 
 
 def applies(result: Result) -> bool:
@@ -66,7 +67,7 @@ def figure(result: Result) -> Figure:
     radius = f"; over {1e3 * min(radii):.4g} mm, the tangential force" if len(radii) == 1 else ""
     lines = f"Torque on the crankshaft at {points[k].name}{radius}."
     legend = [entry(name, color=COLOURS[name], linewidth=2.6 - 1.2 * (name == "all")) for name in felt]
-    legend.append(entry(f"mean, {number(facts[k].mean, scale=whole)} N m", color=FAINT, linestyle=(0, (4, 1.6))))
+    legend.append(entry(f"mean, {number(facts[k].mean, scale=whole)} N m", **_MEAN))
     legend += [entry(f"speed {one.name}", color=one.colour, linewidth=1.8) for one in turning]
     return headed(drawn, result, "Torque over one working cycle", lines, legend)
 
@@ -82,7 +83,7 @@ def _torque(axes: Axes, parts: Mapping[str, Spectrum], degrees: Array, mean: flo
     for name, part in parts.items():
         wide = 1.4 if name == "all" else 2.6
         axes.plot(degrees, factor * part.values(np.radians(degrees)), color=COLOURS[name], linewidth=wide)
-    axes.axhline(factor * mean, color=FAINT, linewidth=1.0, linestyle=(0, (4, 1.6)))
+    axes.axhline(factor * mean, **_MEAN)
     axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
     axes.set_ylabel(f"torque [{unit[1]}]")
 
@@ -115,7 +116,7 @@ def _speed(axes: Axes, result: Result, k: int, degrees: Array) -> list[Series]:
         axes.plot(angles, RPM * speeds, color=one.colour, linewidth=1.8)
         shown.append(one)
         told = f"degree of irregularity {number(degree, 3)}" + (f" (1/{1.0 / degree:.4g})" if degree > 0.0 else "")
-    axes.axhline(RPM * point.speed, color=FAINT, linewidth=0.7, zorder=0.5)
+    axes.axhline(RPM * point.speed, **_MEAN)
     axes.set_ylabel("speed [rpm]")
     axes.margins(y=0.25)
     axes.text(0.99, 0.94, told, ha="right", va="top", size=SMALL, transform=axes.transAxes, color=INK)

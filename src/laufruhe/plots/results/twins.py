@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from laufruhe.machine import Engine
 from laufruhe.machine.crank_names import name_of_crank
 from laufruhe.plots.style import BLUE, VERMILION, entry, headed, page, point_name, styled
-from laufruhe.plots.words import FAINT, INK, SMALL, UNSEEN
+from laufruhe.plots.words import FAINT, INK, SMALL, UNSEEN, in_thousands
 from laufruhe.present.measures import firing_words, hardest_point
-from laufruhe.present.numbers import figure as told
+from laufruhe.present.numbers import number
 from laufruhe.present.twins import KINDS, ORDERS, Parts, is_twin, parts_of
 from laufruhe.solvers.result import Result
 
@@ -77,20 +77,18 @@ def _firings(axes: Axes, result: Result) -> None:
     engine = result.final.engine
     whole = math.degrees(engine.cycle.angle)
     fired = sorted((math.degrees(part.firing_angle) % whole, part.name.split()[-1]) for part in engine.cylinders)
-    for (angle, number), (following, _) in zip(fired, [*fired[1:], (fired[0][0] + whole, "")], strict=True):
+    for (angle, name), (following, _) in zip(fired, [*fired[1:], (fired[0][0] + whole, "")], strict=True):
         axes.plot([angle, angle], [0.0, 1.0], color=INK, linewidth=5.0, solid_capstyle="butt")
-        axes.text(angle, 1.1, number, ha="center", size=SMALL)
+        axes.text(angle, 1.1, name, ha="center", size=SMALL)
         middle = 0.5 * (angle + following)
         axes.text(middle % whole, 0.5, f"{following - angle:.3g}°", ha="center", va="center", size=SMALL, color=FAINT)
-    axes.set(xlim=(-0.06 * whole, 1.06 * whole), ylim=(0.0, 1.6), xlabel="crank angle [deg]", yticks=[])
+    axes.set(xlim=(-0.06 * whole, 1.06 * whole), ylim=(0.0, 1.6), xlabel="crank angle [°]", yticks=[])
     axes.set_xticks(np.linspace(0.0, whole, 5))
     axes.set_title(firing_words(result)[0], loc="left", size=9)
 
 
 def _circles(axes: Axes, forward: complex, backward: complex, largest: float, unit: str) -> None:
-    size, factor, name = (largest or 1.0), 1.0, unit
-    if size >= 2e3:
-        factor, name = 1e-3, f"k{unit}"
+    factor, name = in_thousands(largest, unit)
     ahead, against = forward * np.exp(1j * TURN), backward * np.exp(-1j * TURN)
     looks: list[tuple[Any, dict[str, Any]]] = [
         (ahead, {"color": FORWARD, "linewidth": 1.2}),
@@ -100,7 +98,7 @@ def _circles(axes: Axes, forward: complex, backward: complex, largest: float, un
     for path, look in looks:
         axes.plot(factor * path.imag, factor * path.real, **look)
     axes.plot(factor * (forward + backward).imag, factor * (forward + backward).real, "o", color=INK, markersize=5)
-    reach = 1.1 * factor * size
+    reach = 1.1 * factor * (largest or 1.0)
     across, up = ("about y", "about z") if unit == "N m" else ("lateral", "vertical")
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal", xlabel=f"{across} [{name}]")
     axes.set_ylabel(f"{up} [{name}]")
@@ -112,12 +110,12 @@ def _bars(axes: Axes, parts: Parts, largest: Mapping[str, float]) -> None:
     """Sizes of both parts, of forces and of couples, each over the largest of its kind."""
     names = []
     for row, ((kind, order), pair) in enumerate(parts.items()):
-        most = largest[kind] or 1.0
+        most, (factor, unit) = largest[kind] or 1.0, in_thousands(largest[kind], KINDS[kind][1])
         for j, (own, colour) in enumerate(zip(pair, (FORWARD, BACKWARD), strict=True)):
             at = -row - 0.36 * j
             axes.barh(at, abs(own) / most, 0.32, color=colour)
-            size = told(abs(own), KINDS[kind][1], 3, scale=most)
-            axes.text(abs(own) / most + 0.03, at, size, va="center", size=SMALL)
+            size = number(factor * abs(own), 3, scale=factor * most)
+            axes.text(abs(own) / most + 0.03, at, f"{size} {unit}", va="center", size=SMALL)
         names.append(f"{ORDERS[order]}\n{kind}")
     axes.set_yticks([-row - 0.18 for row in range(len(parts))], names)
     axes.set(xlim=(0.0, 1.75), xticks=[])

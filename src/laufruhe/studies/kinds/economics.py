@@ -309,5 +309,5 @@ def _levels(data: xr.Dataset, right: float, high: float) -> list[p.Mark]:
         # names of levels close together stand one under the other
         top = min(force, top - LINE * high)
         place, colour = top + 0.15 * LINE * high, "ink" if more else "faint"
-        marks.append(p.Words(right, place, f"{name}: {force:.0f}", 7.5, colour, "right", "bottom", boxed=True))
+        marks.append(p.Words(right, place, f"{name}: {force:.0f}", colour, "right", "bottom", boxed=True))
     return marks

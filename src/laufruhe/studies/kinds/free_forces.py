@@ -196,7 +196,7 @@ def _column(data: xr.Dataset, what: str, order: Any, first: bool) -> p.Panel:
         p.Line(printed, rows, width=0.0, marker="o", size=3.5),
     ]
     for row, value in zip(rows, free, strict=True):
-        marks.append(p.Words(value + 0.04 * most, row, f"{value:.4g}" if value > 1e-9 else "0", 6.5))
+        marks.append(p.Words(value + 0.04 * most, row, f"{value:.4g}" if value > 1e-9 else "0"))
     ticks = [(float(k), str(name)) for k, name in enumerate(data["case"].values)] if first else []
     side = p.Axis(ends=(rows[-1] + 0.6, -0.6), ticks=ticks, grid=False)
     return p.Panel(marks, p.Axis(ends=(0.0, 1.3 * most)), side, f"{what}, order {order}")

@@ -312,18 +312,16 @@ def _speed_axis(data: xr.Dataset) -> p.Axis:
 
 
 def _orders(case: str, design: str, one: xr.Dataset) -> p.Panel:
-    """Amplitude of every order, named at its peak; on the axis the speeds at which it meets a mode."""
+    """Amplitude of every order, named beside the panel; on the axis the speeds at which it meets a mode."""
     speeds, top = one["speed"].values, float(one["amplitude"].max()) or 1.0
+    edge = float(speeds.max() + 0.015 * np.ptp(speeds))
     marks: list[p.Mark] = []
     for k, order in enumerate(one["order"].values):
         values, colour = one["amplitude"].values[:, k], p.colour(k, one.sizes["order"])
         if np.isnan(values).all():
             continue
-        peak = int(np.argmax(np.nan_to_num(values)))
-        side = "right" if speeds[peak] > speeds.mean() else "left"
         marks.append(p.Line(speeds, values, colour))
-        at = speeds[peak], values[peak] + 0.05 * top
-        marks.append(p.Words(*at, f"order {order:g}", colour=colour, across=side, boxed=True))
+        marks.append(p.Words(edge, (1.08 - 0.11 * k) * top, f"order {order:g}", colour=colour))
         met = 2.0 * math.pi * PER_RAD * one["frequency"].values[0] / order if "frequency" in one else np.zeros(0)
         met = met[(met > speeds.min()) & (met < speeds.max())]
         marks.append(p.Line(met, np.zeros(len(met)), colour, width=0.0, marker="|", size=10.0))

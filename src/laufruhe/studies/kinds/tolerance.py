@@ -318,9 +318,9 @@ def _row(row: xr.Dataset, k: int) -> list[p.Mark]:
     return [
         p.Area(places, np.full(len(places), k), k - TALL * density),
         p.Line([worst], [k - 0.3], "after", marker="|", size=14.0, width=0.0),
-        p.Words(worst * 1.08, k - 0.3, f"{worst:.0f}", 8.0, "after"),
+        p.Words(worst * 1.08, k - 0.3, f"{worst:.0f}", "after"),
         p.Line([at], [k - 0.3], marker="D", width=0.0),
-        p.Words(at * 1.12, k - 0.3, number(nominal, 3), 8.0),
+        p.Words(at * 1.12, k - 0.3, number(nominal, 3)),
     ]
 
 

@@ -99,7 +99,7 @@ def _drawn_panel(panel: PanelTable, names: Names, reading: str) -> Panel:
         marks += _bars(panel.bars, names, 0.0 if ends is None else max(ends))
     for words in panel.words:
         across, up = (number_of(at, names) for at in (words.x, words.y))
-        marks.append(Words(across, up, filled(words.text, names), 9.0, words.colour, words.across, words.along))
+        marks.append(Words(across, up, filled(words.text, names), words.colour, words.across, words.along))
     title = ", ".join(words for words in (filled(panel.title, names), reading) if words)
     return Panel(marks, _axis(panel.x, names), _axis(panel.y, names), title)
 
@@ -133,7 +133,7 @@ def _curves(curve: CurveTable, names: Names) -> Iterator[Mark]:
         xs, ys = np.broadcast_arrays(xs, ys)
         yield Line(xs, ys, colour, filled(curve.label, own), curve.width, curve.dash, curve.marker)
         if curve.end:
-            yield Words(float(xs[-1]), float(ys[-1]), f" {filled(curve.end, own)}", 9.0, colour)
+            yield Words(float(xs[-1]), float(ys[-1]), f" {filled(curve.end, own)}", colour)
 
 
 def _bars(bars: BarsTable, names: Names, end: float) -> Iterator[Mark]:
@@ -150,10 +150,10 @@ def _bars(bars: BarsTable, names: Names, end: float) -> Iterator[Mark]:
         if bars.outline:
             yield Bars(places, high, 0.9 * width, colour, hollow=True)
         for x, inner, outer in zip(places, low, high, strict=True):
-            yield Words(x, outer + ABOVE * top, _number(outer, top, bars.number), 9.0, "ink", "center", "bottom")
+            yield Words(x, outer + ABOVE * top, _number(outer, top, bars.number), "ink", "center", "bottom")
             if bars.outline and inner > LEAST_INSIDE * max(top, end):
                 number = _number(inner, top, bars.number)
-                yield Words(x, inner - ABOVE * top, number, 9.0, "ink", "center", "top", inside=colour)
+                yield Words(x, inner - ABOVE * top, number, "ink", "center", "top", inside=colour)
 
 
 def _number(value: float, top: float, spec: str) -> str:
