@@ -11,15 +11,18 @@ import pytest
 
 from laufruhe.files.reader import load_tables
 from laufruhe.load_models.affine import AffineModel
+from laufruhe.numerics.budget import limited
 from laufruhe.problem.evaluation import evaluate, finely, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import best_bound
+from laufruhe.prove.certificate import Proof, best_bound
 from laufruhe.solvers import Result, Status, solve
+from laufruhe.solvers.boxes.sizes import solve_sizes
 from laufruhe.solvers.conclusion import KEPT
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.stars.rooms import surely_broken
 from laufruhe.solvers.throws import uneven
+from laufruhe.solvers.told_limits import solve_told
 
 ENGINE: dict[str, Any] = {
     "layout": "inline", "cycle": "two-stroke", "stroke": "100 mm", "rod_ratio": 0.3, "reciprocating_mass": "1 kg",
@@ -151,6 +154,35 @@ def test_a_gap_is_not_left_open_for_what_few_angles_read_too_much() -> None:
     assert result.status is Status.OPTIMAL
     assert result.objective.value == pytest.approx(evaluate(result.problem, result.final.engine, 5760).value(
         result.problem.objective[0].measure), rel=1e-4)  # fmt: skip
+
+
+def test_time_that_is_over_leaves_no_design_that_few_angles_alone_allow() -> None:
+    """48 angles have half a percent too little of the second order; no time is left to look at more."""
+    told = sized(0)
+    most = 0.998 * of_many_angles(0).objective.value
+    limit = {"name": "quiet", "limit": "mean shaking force", "orders": [2], "max": f"{most} N"}
+    asked = problem(told, objective={"minimise": "rms shaking force"}, constraints=[*told["constraints"], limit])
+    with limited(1e-9):
+        result = solve_told(asked, solve_sizes)
+    assert finely(result.final).excess(asked.limits) > KEPT
+    assert result.status is Status.FAILED
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.NONE
+    assert "'quiet'" in result.message
+
+
+@pytest.mark.parametrize("throw", [0, 3])
+def test_time_that_is_over_leaves_no_proof_that_few_angles_alone_have(throw: float) -> None:
+    """Of the heaviest piston, nothing open: 48 angles have 0.6 % too little, or a quarter of a percent too much."""
+    engine = {**ENGINE, "reciprocating_mass": "1 kg ± 5 %", "throws": [throw]}
+    asked = problem({"engine": engine, "robust": {"over": "worst case"}}, objective=SECOND)
+    heaviest = evaluate(asked.built(np.ones(1)), samples=5760).value(asked.objective[0].measure)
+    with limited(1e-9):
+        result = solve(asked)
+    assert result.objective is not None
+    assert result.certificate is not None
+    assert result.objective.value == pytest.approx(heaviest, rel=1e-4)
+    assert result.certificate.lower_bound <= heaviest * (1.0 + 1e-9)
 
 
 @pytest.mark.parametrize(("throw", "share", "told"), [(0, 0.998, Status.INFEASIBLE), (3, 1.0005, Status.OPTIMAL)])

@@ -145,8 +145,7 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
     proven = certificate.kind is Proof.GLOBAL
     message = f"the design as given has no finite loads: {initial.resonance}" if initial.resonance else ""
     if not met:
-        broken = quoted(broken_limits(problem.limits, design.evaluation)) or "a limit"
-        message = f"the best design found breaks {broken}; relax it, or open more"
+        message = broken_message(problem, design.evaluation)
     return Result(
         problem=problem,
         status=Status.FAILED if not met else Status.OPTIMAL if proven else Status.FEASIBLE,
@@ -160,6 +159,12 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
         error=partial(error_of, problem, design.evaluation),
         timing=timing,
     )
+
+
+def broken_message(problem: Problem, evaluation: Evaluation) -> str:
+    """That the best design found is none."""
+    broken = quoted(broken_limits(problem.limits, evaluation)) or "a limit"
+    return f"the best design found breaks {broken}; relax it, or open more"
 
 
 def state(problem: Problem, to_start_from: bool = False) -> Result:

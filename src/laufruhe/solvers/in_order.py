@@ -16,6 +16,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+from laufruhe.numerics.budget import passed
 from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.nothing import nothing_of
@@ -93,7 +94,9 @@ def _together(
     message = last.message
     if len(stages) < len(problem.ranks):
         name = problem.ranks[len(stages)].terms[0].measure.name
-        message = f"objective {len(stages) + 1}, {name}, found no design under the limits of those before it"
+        # the last design keeps all limits of this one
+        why = "was not decided: time was over" if passed() else "found no design under the limits of those before it"
+        message = f"objective {len(stages) + 1}, {name}, {why}"
     weakest = min((rank.proof for rank in ranks), key=STRENGTH)
     whole = not message and all(stage.status is Status.OPTIMAL for stage in stages)
     first = stages[0]

@@ -30,7 +30,7 @@ from laufruhe.solvers.mounts.convex import is_convex
 from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.rooms import surely_broken, with_room
-from laufruhe.solvers.told_limits import solve_told
+from laufruhe.solvers.told_limits import solve_told, told_excess
 
 LIBRARIES = ("casadi", "clarabel", "cvxpy", "pyscipopt")
 """Packages that are imported where something open needs them, named as their modules."""
@@ -249,7 +249,7 @@ def _cut_short(problem: Problem, found: Result | None) -> Result:
     if found is None or found.status is Status.FAILED:
         with suppress(ModelError):
             given = judged(problem, problem.start)
-            if problem.phasing is None and given.excess <= KEPT:
+            if problem.phasing is None and max(given.excess, told_excess(problem, given.evaluation)) <= KEPT:
                 shown = Shown(0.0, Reach.ASIDE, math.inf, f"the design as given; {CUT_SHORT}")
                 return concluded(given, given.evaluation, shown, {})
     if found is None:

@@ -15,8 +15,8 @@ from laufruhe.problem.evaluation import FINE, Evaluation, finely, is_of_few, obj
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import gap_of
-from laufruhe.solvers.conclusion import KEPT
+from laufruhe.prove.certificate import Proof, gap_of
+from laufruhe.solvers.conclusion import KEPT, broken_message, limit_values
 from laufruhe.solvers.result import Result, Status
 
 ROUNDS, MOST_TIMES = 4, 16
@@ -26,18 +26,46 @@ FELT, LEAST_TIMES = 0.1, 2.0
 
 
 def solve_told(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
-    """Solve, and again at more angles where many tell otherwise than these do."""
+    """Solve, and again at more angles where many tell otherwise than these do; what time leaves is judged at many."""
     result = solve(problem)
     for _ in rounds(ROUNDS):
         own = problem.fidelity
-        untold = max(_untold(result) / KEPT, _misproven(result)) if own.samples < FINE else 0.0
+        untold = _told_otherwise(result) if own.samples < FINE else 0.0
         if untold <= 1.0:
-            break
+            return result
         # means at equal steps come nearer by the square of these; the gas keeps its own
         times = min(math.ceil(math.sqrt(2.0 * untold)), MOST_TIMES)
         problem = problem.at(replace(own, samples=times * own.samples, gas_samples=own.gas_steps))
         result = solve(problem)
-    return result
+    return result if _told_otherwise(result) <= 1.0 else _as_many_tell(result)
+
+
+def _told_otherwise(result: Result) -> float:
+    """By how much many angles tell otherwise, in what counts as kept or as proven."""
+    return max(_untold(result) / KEPT, _misproven(result))
+
+
+def _as_many_tell(result: Result) -> Result:
+    """A design whose angles were too few, and which time or rounds left so, judged at many."""
+    problem, told, proof = result.problem, result.objective, result.certificate
+    if told is None or proof is None or not result.status.has_design:
+        return result
+    value = told.value - _misread(problem, result.measured)
+    final = result.final if result.robust else finely(result.final)
+    gap = gap_of(value, proof.lower_bound, nothing_of(problem, final.engine))
+    weaker = Proof.WITHIN_GAP if proof.kind is Proof.GLOBAL else proof.kind
+    met = told_excess(problem, result.final) <= KEPT or result.robust is not None
+    kind = Proof.NONE if not met else Proof.GLOBAL if gap <= problem.tolerance else weaker
+    status = Status.FAILED if not met else Status.OPTIMAL if kind is Proof.GLOBAL else Status.FEASIBLE
+    return replace(
+        result,
+        status=status,
+        objective=replace(told, value=value),
+        certificate=replace(proof, kind=kind, gap=gap, lower_bound=min(proof.lower_bound, value)),
+        limits=result.limits if result.robust else limit_values(problem, final, result.prices, value),
+        final=final,
+        message=result.message if met else broken_message(problem, final),
+    )
 
 
 def told_excess(problem: Problem, evaluation: Evaluation) -> float:
