@@ -87,6 +87,7 @@ def _without(key: str) -> Callable[[dict[str, Any]], Any]:
         (_without("certificate"), "certificate: is missing"),
         (lambda r: r | {"status": "fine"}, "status"),
         (lambda r: r | {"decisions": {"left.unbalance": {"value": "much"}}}, "left.unbalance"),
+        (lambda r: r | {"decisions": {"left.unbalance": 3.0}}, "left.unbalance"),
         (lambda r: r | {"objective": {**r["objective"], "value": "much"}}, "objective.value"),
     ],
 )

@@ -15,11 +15,11 @@ from pydantic import BaseModel, ValidationError
 from laufruhe import units
 from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, printed
 from laufruhe.files.fields import FORMS
+from laufruhe.files.toml_text import toml_key
 
 Loc: TypeAlias = tuple[str | int, ...]
 MOST_COMPLAINTS = 20
 """That a file gets at once."""
-_BARE = re.compile(r"[A-Za-z0-9_-]+")
 _CLOSE = 0.6
 _FEW = 3
 _COUNTED = {
@@ -86,7 +86,7 @@ def key_path(loc: Sequence[str | int]) -> str:
     """engine.throws[2], counted from one as the reader counts; in quotes what TOML has in quotes."""
     text = ""
     for part in loc:
-        key = f"[{part + 1}]" if isinstance(part, int) else part if _BARE.fullmatch(part) else f'"{part}"'
+        key = f"[{part + 1}]" if isinstance(part, int) else toml_key(part)
         text += key if not text or isinstance(part, int) else f".{key}"
     return text
 

@@ -44,7 +44,7 @@ def operating_points(
     gas: GasModel | None,
     cycle: Cycle,
     stroke: float | None,
-    brake: Brake | None = None,
+    brake: Brake | None,
 ) -> tuple[OperatingPoint, ...]:
     """Speeds and loads of an engine whose gas, where a point says no other, is this."""
     points = []

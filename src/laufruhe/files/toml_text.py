@@ -19,10 +19,10 @@ def _lines(table: Mapping[str, Any], above: tuple[str, ...]) -> Iterator[str]:
     """Values first, then tables, then lists of tables."""
     lists = {key: value if isinstance(value, list) else [value] for key, value in table.items()}
     inner = {key: tables for key, tables in lists.items() if tables and all(map(_is_table, tables))}
-    yield from (f"{_key(key)} = {toml_value(value)}" for key, value in table.items() if key not in inner)
+    yield from (f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items() if key not in inner)
     for key, tables in inner.items():
         path = (*above, key)
-        name = ".".join(map(_key, path))
+        name = ".".join(map(toml_key, path))
         for one in tables:
             yield from ("", f"[[{name}]]" if isinstance(table[key], list) else f"[{name}]", *_lines(one, path))
 
@@ -32,7 +32,8 @@ def _is_table(value: Any) -> bool:
     return isinstance(value, Mapping) and "between" not in value
 
 
-def _key(key: str) -> str:
+def toml_key(key: str) -> str:
+    """A key as a file has it, in quotes where it needs them."""
     return key if _BARE.fullmatch(key) else json.dumps(key, ensure_ascii=False)
 
 
@@ -43,7 +44,7 @@ def toml_value(value: Any) -> str:
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007F")
     if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{_key(key)} = {toml_value(one)}' for key, one in value.items())} }}"
+        return f"{{ {', '.join(f'{toml_key(key)} = {toml_value(one)}' for key, one in value.items())} }}"
     if isinstance(value, list):
         return f"[{', '.join(map(toml_value, value))}]"
     return repr(value)

@@ -141,6 +141,12 @@ def in_thousands(largest: float, unit: str) -> tuple[float, str]:
     return (1e-3, f"k{unit}") if abs(largest) >= LARGE else (1.0, unit)
 
 
+def label_of(name: str, unit: str, inches: float) -> str:
+    """Of the axis of an objective, which is called so where its name is longer than the axis."""
+    behind = f" [{unit}]" if unit else ""
+    return f"{name if width_of(f'{name}{behind}') <= inches else 'objective'}{behind}"
+
+
 def empty(axes: Axes, words: str) -> None:
     """A panel with nothing in it says why."""
     axes.set_yticks([])
@@ -215,7 +221,7 @@ def grouped(number: str) -> str:
     return whole[: len(whole) - len(digits)] + f"{int(digits):,}".replace(",", THIN_SPACE) + point + rest
 
 
-def round_ticks(axis: Axis, most: int = 6, **more: Any) -> None:
+def round_ticks(axis: Axis, most: int, **more: Any) -> None:
     """Ticks at steps of 1, 2 or 5, their numbers in full."""
     axis.set_major_locator(MaxNLocator(most, steps=_ROUND, **more))
     axis.set_major_formatter(PlainNumbers())

@@ -60,7 +60,7 @@ def figure(value: float, unit: str, digits: int = 4, scale: float = 0.0) -> str:
 _WORKSHOP = {"kg": ("g", 1e3), "kg m": ("g mm", 1e6)}
 
 
-def in_grams(value: float, unit: str, scale: float = 0.0) -> str:
+def in_grams(value: float, unit: str, scale: float) -> str:
     """A mass in g or an unbalance in g mm, as a workshop has them, behind an equals sign; empty for all else."""
     if unit not in _WORKSHOP or abs(value) <= NOTHING * scale:
         return ""

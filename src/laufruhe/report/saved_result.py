@@ -7,56 +7,32 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ValidationError
 
 from laufruhe.errors import InputError, refused, wrong_call
 from laufruhe.files.complaints import complaints_of
-from laufruhe.prove.certificate import Certificate, Proof
+from laufruhe.prove.certificate import Certificate
 from laufruhe.report.files import RESULT, write
 from laufruhe.report.json_result import as_json
 from laufruhe.solvers.result import Result, Status, Told
 from laufruhe.solvers.values import DecisionValue, LimitValue, ObjectiveValue
 
-# where JSON has null there is no number
-Number: TypeAlias = Annotated[float, BeforeValidator(lambda value: math.nan if value is None else value)]
+
+def _numbers(entry: Any) -> Any:
+    """Where JSON has null there is no number."""
+    return {k: math.nan if v is None else v for k, v in entry.items()} if isinstance(entry, dict) else entry
 
 
-class _Objective(BaseModel):
-    name: str
-    value: Number
-    unit: str
-    initial: Number
+def _named(entries: Any) -> Any:
+    """Decisions stand under their names."""
+    if not isinstance(entries, dict):
+        return entries
+    return {name: {"name": name, **each} if isinstance(each, dict) else each for name, each in entries.items()}
 
 
-class _Certificate(BaseModel):
-    kind: Proof
-    lower_bound: Number
-    gap: Number
-    kkt_residual: Number
-    method: str
-
-
-class _Decision(BaseModel):
-    value: float
-    unit: str
-    lower: float
-    upper: float
-    initial: float
-    at_bound: bool
-    shadow_price: Number
-
-
-class _Limit(BaseModel):
-    name: str
-    value: Number
-    limit: float
-    unit: str
-    active: bool
-    shadow_price: Number
-    side: str
-    error_estimate: Number
+_NULLS = BeforeValidator(_numbers)
 
 
 class _File(BaseModel):
@@ -67,13 +43,13 @@ class _File(BaseModel):
     status: Status
     message: str
     conflict: list[str]
-    objective: _Objective | None
-    certificate: _Certificate
-    decisions: dict[str, _Decision]
-    constraints: list[_Limit]
+    objective: Annotated[ObjectiveValue | None, _NULLS]
+    certificate: Annotated[Certificate, _NULLS]
+    decisions: Annotated[dict[str, Annotated[DecisionValue, _NULLS]], BeforeValidator(_named)]
+    constraints: list[Annotated[LimitValue, _NULLS]]
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class SavedResult(Told):
     """A result as its `result.json` has it [SI].
 
@@ -89,13 +65,6 @@ class SavedResult(Told):
 
     problem: str
     title: str
-    status: Status
-    objective: ObjectiveValue | None
-    certificate: Certificate | None
-    decisions: tuple[DecisionValue, ...]
-    limits: tuple[LimitValue, ...]
-    message: str
-    conflict: tuple[str, ...]
     record: Mapping[str, Any]
 
     @property
@@ -144,16 +113,16 @@ def read_result(path: str | Path) -> SavedResult:
         file = _File.model_validate(record)
     except ValidationError as error:
         raise InputError(str(place), complaints_of(error, _File)) from None
-    proof, goal = file.certificate, file.objective
+    has_design = file.status.has_design
     return SavedResult(
         problem=file.problem,
         title=file.title,
         status=file.status,
         # without a design there is no value of one
-        objective=ObjectiveValue(**dict(goal)) if goal is not None and file.status.has_design else None,
-        certificate=Certificate(**dict(proof)) if proof.method else None,
-        decisions=tuple(DecisionValue(name=name, **dict(each)) for name, each in file.decisions.items()),
-        limits=tuple(LimitValue(**dict(each)) for each in file.constraints) if file.status.has_design else (),
+        objective=file.objective if has_design else None,
+        certificate=file.certificate if file.certificate.method else None,
+        decisions=tuple(file.decisions.values()),
+        limits=tuple(file.constraints) if has_design else (),
         message=file.message,
         conflict=tuple(file.conflict),
         record=record,

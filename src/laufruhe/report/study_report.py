@@ -40,7 +40,7 @@ def write_study(
     command: str,
     say: Callable[[str], None],
     draw: Callable[[Picture, Path], Callable[[], str]],
-    ending: str = ".png",
+    ending: str,
 ) -> None:
     """Datasets, tables, pictures and the report into a folder that exists.
 

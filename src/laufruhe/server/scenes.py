@@ -62,7 +62,7 @@ class Scene:
     def _result(self, found: Followed | None) -> Result:
         """The design that follows, as far as a model of the page asks; nothing of it is proven but the bound."""
         problem, known = self.problem, found is not None and not found.conflict
-        bare = Result(problem, Status.FEASIBLE, None, None, (), (), self.given, self.given)
+        bare = Result(problem=problem, status=Status.FEASIBLE, initial=self.given, final=self.given)
         if found is None or not known:
             return bare
         entries = [e for d, v in zip(problem.decisions, found.values, strict=True) for e in decision_values(d, v)]

@@ -185,8 +185,6 @@ def state(problem: Problem, to_start_from: bool = False) -> Result:
         status=Status.INFEASIBLE if why else Status.FEASIBLE,
         message=why,
         objective=ObjectiveValue.given(problem, evaluation),
-        certificate=None,
-        decisions=(),
         limits=() if evaluation.resonance else limit_values(problem, evaluation),
         initial=evaluation,
         final=evaluation,
@@ -212,9 +210,6 @@ def none_within(problem: Problem, initial: Evaluation, conflict: tuple[str, ...]
     return Result(
         problem=problem,
         status=Status.INFEASIBLE,
-        objective=None,
-        certificate=None,
-        decisions=(),
         limits=limit_values(problem, initial),
         initial=initial,
         final=initial,

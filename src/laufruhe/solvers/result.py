@@ -51,16 +51,17 @@ class Status(StrEnum):
         return self in (Status.OPTIMAL, Status.FEASIBLE)
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Told:
-    """What a result says of its design, whether it was solved now or read back."""
+    """What a result says of its design, whether it was solved now or read back, as `Result` names it."""
 
     status: Status
-    objective: ObjectiveValue | None
-    certificate: Certificate | None
-    decisions: tuple[DecisionValue, ...]
-    limits: tuple[LimitValue, ...]
-    message: str
-    conflict: tuple[str, ...]
+    objective: ObjectiveValue | None = None
+    certificate: Certificate | None = None
+    decisions: tuple[DecisionValue, ...] = ()
+    limits: tuple[LimitValue, ...] = ()
+    message: str = ""
+    conflict: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -93,7 +94,7 @@ class Told:
         return f"<strong>{lines[0]}</strong><ul>" + "".join(f"<li>{line}</li>" for line in lines[1:]) + "</ul>"
 
 
-@dataclass(frozen=True, eq=False, repr=False)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Result(Told):
     """A design, what was proven of it, and everything a report shows.
 
@@ -132,15 +133,8 @@ class Result(Told):
     """
 
     problem: Problem
-    status: Status
-    objective: ObjectiveValue | None
-    certificate: Certificate | None
-    decisions: tuple[DecisionValue, ...]
-    limits: tuple[LimitValue, ...]
     initial: Evaluation
     final: Evaluation
-    message: str = ""
-    conflict: tuple[str, ...] = ()
     error: Callable[[], float] = float
     timing: dict[str, float] = field(default_factory=dict)
     phasing: PhasingResult | None = None

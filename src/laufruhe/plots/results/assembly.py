@@ -5,12 +5,11 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from laufruhe.plots.style import AFTER, BEFORE, SKY, entry, headed, page, styled
-from laufruhe.plots.words import INK
-from laufruhe.present.measures import objective_unit
+from laufruhe.plots.words import INK, label_of
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.tolerances.result import SHARES
 
-MEAN = (0, (1, 2))
+MEAN, WIDE = (0, (1, 2)), 6.4
 
 
 def applies(result: Result) -> bool:
@@ -24,17 +23,14 @@ def figure(result: Result) -> Figure:
     found, objective = result.assembly, result.objective
     if found is None or objective is None:
         raise ValueError("no parts were chosen")
-    drawn = page(1, 1, (6.4, 3.0))
+    drawn = page(1, 1, (WIDE, 3.0))
     axes = drawn.panels[0]
     axes.plot(found.quantiles, [100.0 * share for share in SHARES], color=SKY, linewidth=1.8)
     axes.axvline(objective.value, color=AFTER, linewidth=1.8)
     axes.axvline(objective.initial, color=BEFORE, linewidth=1.8)
     axes.axvline(found.mean_parts, color=INK, linewidth=1.2, linestyle=MEAN)
     axes.margins(x=0.06)
-    name, unit = objective.name, objective_unit(result)
-    axes.set(
-        ylim=(0.0, 104.0), ylabel="assemblies below [%]", xlabel=f"{name} [{unit}]" if len(name) < 60 else f"[{unit}]"
-    )
+    axes.set(ylim=(0.0, 104.0), ylabel="assemblies below [%]", xlabel=label_of(objective.name, objective.unit, WIDE))
     legend = [
         entry("at random", color=SKY), entry("as they come", color=BEFORE), entry("chosen", color=AFTER),
         entry("parts of mean mass", color=INK, linestyle=MEAN),

@@ -6,14 +6,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled, thin
-from laufruhe.plots.words import FAINT, INK, SMALL
+from laufruhe.plots.words import FAINT, INK, SMALL, label_of
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.tolerances.result import SHARES, RobustResult
 
 WORST, DRAWN = (0, (4, 2)), (0, (1, 2))
-MOST_TOLERANCES = 8
+MOST_TOLERANCES, WIDE = 8, 6.4
 
 
 def applies(result: Result) -> bool:
@@ -27,7 +27,7 @@ def figure(result: Result) -> Figure:
     found, unit = result.robust, objective_unit(result)
     if found is None:
         raise ValueError("nothing was decided for built engines")
-    drawn = page(2, 1, (6.4, 2.5), gap=0.7)
+    drawn = page(2, 1, (WIDE, 2.5), gap=0.7)
     first, second = drawn.panels
     for design, colour in ((found.nominal, BEFORE), (found.robust, AFTER)):
         first.plot(design.quantiles, [100.0 * share for share in SHARES], color=colour, linewidth=1.8)
@@ -35,9 +35,7 @@ def figure(result: Result) -> Figure:
         first.axvline(design.worst, color=colour, linewidth=1.4, linestyle=WORST)
     first.axhline(100.0 * found.share, color=FAINT, linewidth=0.7, linestyle=DRAWN)
     name = result.problem.changed(over=None).objective_name
-    first.set(
-        ylim=(0.0, 104.0), ylabel="engines below [%]", xlabel=f"{name} [{unit}]" if len(name) < 60 else f"[{unit}]"
-    )
+    first.set(ylim=(0.0, 104.0), ylabel="engines below [%]", xlabel=label_of(name, unit, WIDE))
     _bars(second, found, unit)
     worst = "worst case, which no engine exceeds" if found.exact else "worst engine drawn"
     legend = [
@@ -60,6 +58,6 @@ def _bars(axes: Axes, found: RobustResult, unit: str) -> None:
         axes.text(max(one.saving, 0.0) + 0.01 * top, k, price, size=SMALL, color=FAINT, va="center")
     axes.set(
         ylim=(len(shown) - 0.4, -0.75), xlim=(0.0, 1.15 * top), yticks=[],
-        xlabel=f"shadow price times tolerance [{unit}]",
+        xlabel=label_of("shadow price times tolerance", unit, WIDE),
     )  # fmt: skip
     axes.grid(axis="y", visible=False)

@@ -8,11 +8,12 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled
-from laufruhe.plots.words import FAINT, SMALL
+from laufruhe.plots.words import FAINT, SMALL, label_of
 from laufruhe.present.measures import has_ranking, ranking_of
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
 
+HIGH = 3.4
 _BOUND: Any = {"color": BEFORE, "linestyle": (0, (4, 2))}
 
 
@@ -25,7 +26,7 @@ def applies(result: Result) -> bool:
 def figure(result: Result) -> Figure:
     """What uneven firing buys, and what no design with that freedom goes under."""
     trade = ranking_of(result).trade
-    drawn = page(1, 1, (6.4, 3.4))
+    drawn = page(1, 1, (6.4, HIGH))
     axes = drawn.panels[0]
     # more freedom that buys nothing is no new design
     points = [p for before, p in zip((None, *trade), trade, strict=False) if before is None or p.value < before.value]
@@ -45,7 +46,7 @@ def figure(result: Result) -> Figure:
     axes.set(
         xlim=(-0.03 * freedom[-1], 1.08 * freedom[-1]), ylim=(-0.03 * top, 1.15 * top),
         xlabel="largest deviation of a firing interval from even [°]",
-        ylabel=f"{name} [{unit}]" if len(name) < 42 else f"objective [{unit}]",
+        ylabel=label_of(name, unit, HIGH),
     )  # fmt: skip
     legend = [entry("best local optimum found", color=AFTER, marker="o"), entry("proven: no design below", **_BOUND)]
     lines = "What slightly uneven crank angles buy; each point is a design, evaluated by the exact model."

@@ -91,4 +91,4 @@ def _geometry_given(engine: Engine, layout: Layout) -> tuple[float, float]:
 def no_star(problem: Problem, why: str, status: Status = Status.INFEASIBLE, conflict: tuple[str, ...] = ()) -> Result:
     """No star, and why."""
     given = evaluate(problem)
-    return Result(problem, status, None, None, (), (), given, given, why, conflict)
+    return Result(problem=problem, status=status, initial=given, final=given, message=why, conflict=conflict)

@@ -78,7 +78,7 @@ def solve_assembly(problem: Problem) -> Result:
     return Result(
         problem=problem, status=status if met else Status.FAILED,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)), certificate=certificate,
-        decisions=(), limits=limits, initial=initial, final=final,
+        limits=limits, initial=initial, final=final,
         message="" if met else "the best assembly breaks a limit, and limits do not choose parts; relax it",
         error=partial(error_of, problem, final), timing={"solve": time.perf_counter() - started},
         assembly=search.result([part.name for part in problem.engine.slider_cranks]),
