@@ -300,6 +300,17 @@ def test_on_a_phone_the_optimum_stays_in_sight_and_groups_are_folded(shown: Page
     assert serious(shown) == []
 
 
+def test_on_a_phone_pictures_keep_their_letters_and_are_moved(shown: Page) -> None:
+    shown.set_viewport_size({"width": 390, "height": 844})
+    shown.locator("#picture").click()
+    expect(shown.locator("#pictures-state")).to_contain_text("5 of 5")
+    image = shown.locator("#drawn img").first
+    image.scroll_into_view_if_needed()
+    assert image.evaluate("(drawn) => drawn.clientWidth") > 600
+    assert shown.evaluate("document.documentElement.scrollWidth") <= 390
+    assert serious(shown) == []
+
+
 def test_a_crank_is_clicked_and_given_back(page: Page) -> None:
     with served(PROBLEMS / "vee-eight-open.toml") as (address, _):
         page.goto(address)

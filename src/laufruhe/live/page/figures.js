@@ -113,7 +113,7 @@ class OverAngle extends Compared {
       grid.append(drawn("path", { d: `M${x} 12V264` }), label(x, 280, trimmed((most * k) / 4)));
     }
     grid.append(drawn("path", { d: `M52 ${this.y(0)}h${this.wide}M52 ${this.y(1)}h${this.wide}`, class: "axis" }));
-    this.root.append(grid, label(52 + this.wide / 2, 297, "crank angle [deg]"), this.top, zero, this.before, ...this.lines);
+    this.root.append(grid, label(52 + this.wide / 2, 297, "crank angle [°]"), this.top, zero, this.before, ...this.lines);
   }
 
   /** Height of a share of the largest. */

@@ -36,8 +36,9 @@ export class Pictures {
   add(told) {
     if (told.error) throw new Refusal(told.error);
     if (!told.image) return;
-    const figure = element("figure", {}, element("img", { src: told.image, alt: told.caption }), element("figcaption", {}, told.caption));
-    byId("drawn").append(figure);
+    const image = element("img", { src: told.image, alt: told.caption });
+    const region = { class: "scroll", role: "region", tabindex: "0", "aria-label": `Picture ${byId("drawn").children.length + 1}` };
+    byId("drawn").append(element("figure", {}, element("div", region, image), element("figcaption", {}, told.caption)));
     byId("pictures-state").textContent = `${byId("drawn").children.length} of ${told.of}`;
   }
 }

@@ -3,6 +3,9 @@ import { drawFront } from "./front.js";
 import { listen, Refusal } from "./link.js";
 import { byId, element } from "./parts.js";
 
+/** @param {any[]} points */
+const counted = (points) => `${points.length} point${points.length === 1 ? "" : "s"}`;
+
 /** What the objective is traded against, and the points so far. */
 export class Trade {
   /** @param {(point: import("./front.js").Point) => void} picked */
@@ -40,7 +43,7 @@ export class Trade {
     try {
       await listen("front", { ...asked, across }, (told) => this.add(told, points, across), mine.signal);
       const held = asked.held.length ? "; what is not affine is held as it is" : "";
-      byId("front-state").textContent = `${points.length} points, done${held}`;
+      byId("front-state").textContent = `${counted(points)}, done${held}`;
     } catch (error) {
       if (error.name !== "AbortError") throw error;
     }
@@ -55,7 +58,7 @@ export class Trade {
     if (told.error) throw new Refusal(told.error);
     if (!told.text) return;
     points.push(told);
-    byId("front-state").textContent = `${points.length} points`;
+    byId("front-state").textContent = counted(points);
     drawFront(byId("front"), points, across, this.picked);
   }
 }
