@@ -253,3 +253,19 @@ def test_wrong_shapes_are_refused():
         NonlinearProgram(x, x[0], np.zeros(1), np.ones(2))
     with pytest.raises(ValueError, match="above"):
         NonlinearProgram(x, x[0], np.ones(2), np.zeros(2))
+
+
+def test_a_largest_of_many_rows_ends_no_worse_than_where_it_starts():
+    """A hundred rows that are slack at the far end draw the path of a barrier there, whatever the start (N2)."""
+    z = ca.SX.sym("z", 2)
+    x, top = z[0], z[1]
+    high, rows = 1.0 - 0.2 * ca.exp(-((x / 0.3) ** 2)) - 0.05 * x, 100
+    program = NonlinearProgram(
+        z, top, np.zeros(2), np.array([1.0, 10.0]), constraints=ca.vertcat(high, *[0.79 - 0.7 * x] * rows) - top,
+        constraint_lower=np.full(rows + 1, -np.inf), constraint_upper=np.zeros(rows + 1),
+        constraint_names=("row",) * (rows + 1),
+    )  # fmt: skip
+    near, far = (solve_nonlinear(program, [np.array(start)])[0] for start in ((0.1, 0.86), (0.9, 1.0)))
+    assert near.kkt_residual < 1e-7
+    assert near.value < 0.8 + 1e-6
+    assert far.value == pytest.approx(0.95, abs=1e-4)

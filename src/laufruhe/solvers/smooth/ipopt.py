@@ -36,6 +36,13 @@ _OPTIONS = {
     "mu_strategy": "adaptive",
     "bound_relax_factor": 1e-10,
 }
+# a barrier so small that a start is not pushed away from where it stands
+_NEAR = {"mu_strategy": "monotone", "mu_init": 1e-4} | dict.fromkeys(
+    ("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"), 1e-6
+)
+# share by which an end is worse than its start that is followed again by such a barrier, and what that start may break:
+# norms are softened less from stage to stage, so that the end of one breaks the next by as much
+STRAYED, SOFTENED = 1e-3, 2e-2
 
 _ENDINGS = {
     "Solve_Succeeded": Ending.CONVERGED,
@@ -93,7 +100,7 @@ def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
     if not points:
         return []
     tell("derivatives of the smooth program")
-    built = _built(task.oracle, task.expand, task.max_iterations, task.outside)
+    built = _of_task(task)
     return [_from_start(task, built, k, point) for k, point in in_time(telling("starts", points))]
 
 
@@ -174,6 +181,10 @@ class _Program:
     clock: _Clock
     kept: Any = None
 
+    def value(self, y: Array, parameters: Sequence[float]) -> float:
+        """Objective at a point."""
+        return float(self.solver.get_function("nlp_f")(y, list(parameters)))
+
     def slopes(self, y: Array, parameters: Sequence[float]) -> tuple[float, Array, Array, Array]:
         """Objective, constraints, gradient and Jacobian at a point, evaluated anew."""
         f, gradient = self.solver.get_function("nlp_grad_f")(y, list(parameters))
@@ -182,14 +193,14 @@ class _Program:
 
 
 @lru_cache(maxsize=_BUILT)
-def _built(oracle: str, expand: bool, max_iterations: int, outside: Outside | None) -> _Program:
-    """A program that can be solved: to build it costs as much as some starts."""
+def _built(oracle: str, expand: bool, max_iterations: int, outside: Outside | None, near: bool = False) -> _Program:
+    """A program that can be solved, and stays `near` its start: to build it costs as much as some starts."""
     function, told = ca.Function.deserialize(oracle), None
     if expand:
         scalars = function.expand()
         if scalars.n_instructions() <= LONG * function.n_instructions():
             function = scalars
-    solver = {**_OPTIONS, "max_iter": max_iterations}
+    solver = {**_OPTIONS, **(_NEAR if near else {}), "max_iter": max_iterations}
     if outside is not None:
         function, told = _with_outside(function, outside)
         # slopes are told, and no bends
@@ -212,19 +223,19 @@ def _with_outside(function: Any, outside: Outside) -> tuple[Any, _Told]:
 def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptimum:
     began = time.process_time()
     y, iterations, ending, begun = point / task.scales, 0, Ending.FAILED, 0
-    sides = {"lbx": task.lower, "ubx": task.upper, "lbg": task.constraint_lower, "ubg": task.constraint_upper}
     m = b = np.zeros(0)
     for number, stage in enumerate(task.stages):
         if number and passed():
             ending = Ending.UNFINISHED
             break
-        built.clock.start(min(task.max_seconds, max(left(), SHORTEST)))
-        found, begun = built.solver(x0=y, p=list(stage), **sides), number + 1
-        stats = built.solver.stats()
-        iterations += int(stats["iter_count"])
-        ending = _ENDINGS.get(stats["return_status"], Ending.FAILED)
-        y = np.clip(_flat(found["x"]), task.lower, task.upper)
-        m, b = _flat(found["lam_g"]), _flat(found["lam_x"])
+        end, begun = _ended(task, built, y, stage), number + 1
+        iterations += end.iterations
+        if _strayed(task, built, y, end, stage):
+            again = _ended(task, _of_task(task, near=True), y, stage)
+            iterations += again.iterations
+            found = again.ending in (Ending.CONVERGED, Ending.ACCEPTABLE)
+            end = again if found and built.value(again.y, stage) < built.value(end.y, stage) else end
+        y, m, b, ending = end.y, end.m, end.b, end.ending
         if ending in (Ending.FAILED, Ending.INFEASIBLE):
             break
     f, g, gradient, jacobian = built.slopes(y, task.stages[-1])
@@ -247,6 +258,45 @@ def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptim
         ending=ending,
         start=k,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _End:
+    """Where a stage ended, and its multipliers of constraints and bounds."""
+
+    y: Array
+    m: Array
+    b: Array
+    ending: Ending
+    iterations: int
+
+
+def _of_task(task: Task, near: bool = False) -> _Program:
+    return _built(task.oracle, task.expand, task.max_iterations, task.outside, near)
+
+
+def _ended(task: Task, built: _Program, y: Array, stage: Sequence[float]) -> _End:
+    """One stage from a point."""
+    built.clock.start(min(task.max_seconds, max(left(), SHORTEST)))
+    found = built.solver(
+        x0=y, p=list(stage), lbx=task.lower, ubx=task.upper, lbg=task.constraint_lower, ubg=task.constraint_upper
+    )
+    stats = built.solver.stats()
+    ending = _ENDINGS.get(stats["return_status"], Ending.FAILED)
+    end = np.clip(_flat(found["x"]), task.lower, task.upper)
+    return _End(end, _flat(found["lam_g"]), _flat(found["lam_x"]), ending, int(stats["iter_count"]))
+
+
+def _strayed(task: Task, built: _Program, start: Array, end: _End, stage: Sequence[float]) -> bool:
+    """Whether a start that keeps every side is better than where it ended: a barrier led it away from what was near.
+
+    Programs that are told numbers from outside are taken as they are, for each look costs.
+    """
+    if task.outside is not None or passed():
+        return False
+    last, first, g, *_ = built.value(end.y, stage), *built.slopes(start, stage)
+    over = max(_outside(g, task.constraint_lower, task.constraint_upper), _outside(start, task.lower, task.upper))
+    return bool(over <= SOFTENED and first + over < last - STRAYED * abs(last))
 
 
 def _flat(value: Any) -> Array:
