@@ -543,7 +543,10 @@ def test_four_springs_are_proven_in_a_few_boxes() -> None:
 
 @pytest.mark.slow
 def test_no_local_search_finds_less_than_the_bound_of_six_springs() -> None:
-    """Nelder and Mead on the exact model, from far and from beside the design."""
+    """Nelder and Mead on the exact model, from far and from beside the design.
+
+    Asked whether all designs are a tenth worse, the bound comes near to the best of them, and no further.
+    """
     from scipy.optimize import minimize
 
     problem = replace(load(powertrain("2 4", "7 Hz", 6) | {"search": {"starts": 1}}), tolerance=1e-3)
@@ -559,5 +562,10 @@ def test_no_local_search_finds_less_than_the_bound_of_six_springs() -> None:
     best = np.log(np.array([decision.value for decision in result.decisions]) / low) / np.log(high / low)
     starts = [0.95 * best + 0.02, *np.random.default_rng(7).random((2, 6))]
     ends = [minimize(worth, start, method="Nelder-Mead", options={"maxfev": 150}) for start in starts]
-    assert min(float(end.fun) for end in ends) >= bound * (1.0 - 1e-6)
+    least = min(float(end.fun) for end in ends)
+    assert least >= bound * (1.0 - 1e-6)
     assert result.certificate.kind is Proof.GLOBAL
+    assert result.objective is not None
+    few, value = replace(problem, search=replace(problem.search, boxes=4)), result.objective.value
+    asked = spring_bound(few, 1.1 * value, 1e-3 * value, [decision.value for decision in result.decisions])
+    assert 0.999 * value < asked.bound <= min(value, least) * (1.0 + 1e-9)
