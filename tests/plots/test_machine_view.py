@@ -18,6 +18,7 @@ from laufruhe.plots.motion import animate
 from laufruhe.plots.results import engine
 from laufruhe.present.poses import STEEL, THICKNESS, Pose, half_disc
 from laufruhe.solvers import state
+from picture_faults import faults_of
 from problem_files import PROBLEMS
 
 
@@ -87,9 +88,14 @@ def test_the_engine_turns(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     assert all(np.abs(frames[k] - frames[0]).max() > 50 for k in (1, 3))
 
 
-@pytest.mark.parametrize(("name", "ahead", "beside"), [("radial-seven", 7, 0), ("vee-six-60", 0, 6)])
+@pytest.mark.parametrize(
+    ("name", "ahead", "beside"), [("radial-seven", 7, 0), ("deltic-row", 6, 0), ("vee-six-60", 0, 6)]
+)
 def test_cylinders_are_numbered_where_they_do_not_cover_each_other(name: str, ahead: int, beside: int) -> None:
-    front, side = engine.figure(state(load(PROBLEMS / f"{name}.toml"))).axes
+    problem = load(PROBLEMS / f"{name}.toml")
+    drawn = engine.figure(state(problem))
+    assert not faults_of(drawn, problem.title)
+    front, side = drawn.axes
     for axes, count in ((front, ahead), (side, beside)):
         numbers = [number for text in axes.texts for number in text.get_text().split(", ")]
         assert sorted(map(int, numbers)) == list(range(1, count + 1))

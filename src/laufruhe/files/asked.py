@@ -16,7 +16,9 @@ from laufruhe.files.scene import PLACES, QuantityTable, Scene, as_tuple
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE, MEASURES, Limit, Measure, Rank, Term
 
 QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": list(MEASURES)})]
-SIDES = ("min", "max", "outside")
+SIDES = {"max": "at most", "min": "at least"}
+EDGES = (*SIDES, "outside")
+"""Keys of a limit that say where it stands."""
 
 
 class TermTable(QuantityTable):
@@ -120,7 +122,7 @@ def _limit(table: ConstraintTable, where: str, scene: Scene) -> Limit:
     measure = scene.measure(table.limit, table, f"{where}.limit")
     sides, channel = measure.channel.sides, measure.channel
     norm, remedy = not channel.is_number, "give " + " or ".join(sides)
-    for key in SIDES:
+    for key in EDGES:
         if getattr(table, key) is not None and key not in sides:
             rule = f"{channel}, which has a largest value only" if norm else table.limit
             raise Refused(f"{where}.{key}", None, f"cannot stand beside {rule}", remedy)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -250,7 +249,7 @@ def _place(rotor: Rotor, table: SizedTable, reference: float, where: str, into: 
     key, size, gain = _size(table, where)
     angle, direction = Open.of(table.angle), gain * cis(as_turn(reference))
     _check_convex(key, size, angle, where)
-    start = size.start * _direction(angle.start)
+    start = size.start * cis(as_turn(angle.start))
     into.add(replace(rotor, unbalance=direction * start), f"{where}.name")
     if size.is_open:
         drive = RotorDrive(rotor.name, direction)
@@ -271,11 +270,6 @@ def _set(size: Open, angle: Open) -> Set:
     if not angle.is_open:
         return Interval(*size.bounds, angle.lower)
     return Sector(size.upper, (angle.lower, angle.lower + math.tau if _is_whole_turn(angle) else angle.upper))
-
-
-def _direction(angle: float) -> complex:
-    turn = as_turn(angle)
-    return cis(turn) if not isinstance(turn, float) else cmath.exp(1j * angle)
 
 
 def _is_whole_turn(angle: Open) -> bool:

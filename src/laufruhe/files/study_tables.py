@@ -14,14 +14,13 @@ from pydantic import BaseModel, BeforeValidator, Field
 from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files import nested
-from laufruhe.files.asked import limit_name
+from laufruhe.files.asked import SIDES, limit_name
 from laufruhe.files.complaints import Refused, measured, nearest
 from laufruhe.files.fields import Name, Table, refusal
 from laufruhe.files.problem_file import ProblemFile
 
 MOST_POINTS = 100_000
 _DIGITS = 12
-SIDES = {"max": "at most", "min": "at least"}
 
 
 def _single(given: object) -> object:

@@ -71,7 +71,7 @@ def bodies(axes: Axes, pose: Pose) -> None:
 
 
 def cylinder(axes: Axes, pose: Pose, bore: float) -> complex:
-    """The walls that a piston runs between, from one dead centre to the other; gives a place beyond their head."""
+    """The walls that a piston runs between, from one dead centre to the other; gives a place beside them."""
     turn = cmath.exp(1j * pose.part.bank)
     along = complex((pose.piston - pose.crank) / turn)
     ends = [Pose.of(pose.part, phi).piston for phi in np.linspace(0.0, math.tau / abs(pose.part.shaft.ratio), 13)]
@@ -80,7 +80,7 @@ def cylinder(axes: Axes, pose: Pose, bore: float) -> complex:
         walls = [pose.crank + turn * complex(height, along.imag + side * bore) for height in
                  (min(heights) - 0.25 * bore, max(heights) + 0.3 * bore)]  # fmt: skip
         axes.plot(*zip(*map(at, walls), strict=True), color=FAINT, linewidth=0.8, zorder=2.0)
-    return pose.crank + turn * complex(max(heights) + 0.45 * bore, along.imag)
+    return pose.crank + turn * complex(max(heights) + 0.1 * bore, along.imag + 0.72 * bore)
 
 
 def piston_at(axes: Axes, pose: Pose, bore: float, order: float, **look: Any) -> None:

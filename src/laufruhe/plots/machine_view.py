@@ -147,20 +147,20 @@ def _front(axes: Axes, scene: Scene, phi: float) -> None:
     """From the front: y to the right, z up, turning clockwise (C3)."""
     # what stands further back is drawn first
     poses = [Pose.of(part, phi) for part in sorted(scene.engine.slider_cranks, key=lambda part: part.x)]
-    bore, heads = bore_of(scene.engine), dict[str, complex]()
+    bore, places = bore_of(scene.engine), dict[str, complex]()
     for k, pose in enumerate(poses):
         behind = 4.0 + k / len(poses)
         if pose.bodies:
             bodies(axes, pose)
         else:
-            heads[_number_of(pose)] = cylinder(axes, pose, bore)
+            places[_number_of(pose)] = cylinder(axes, pose, bore)
             piston_at(axes, pose, bore, behind, **_piston_look(scene, pose))
             bar(axes, (pose.foot, 0.15 * bore), (pose.piston, 0.09 * bore), behind, **_rod_look(scene))
             slot(axes, pose, bore, behind)
         bar(axes, (pose.crank, 0.2 * bore), (pose.pin, 0.15 * bore), behind + 2.0, **_crank_look(scene, pose))
         axes.add_patch(Circle(at(pose.pin), MM * 0.08 * bore, facecolor="white", edgecolor=INK, zorder=7.5))
-    for number, head in heads.items() if scene.is_star else ():
-        axes.text(*at(head), number, ha="center", va="center", size=SMALL, zorder=6.0)
+    for number, place in places.items() if scene.is_star else ():
+        axes.text(*at(place), number, ha="center", va="center", size=SMALL, zorder=6.0)
     for rotor in scene.weights:
         centre, along = complex(rotor.shaft.z, rotor.shaft.y), direction(rotor, phi)
         middle = 90.0 - math.degrees(along)

@@ -14,8 +14,9 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.plots.machine_parts import MM, at
 from laufruhe.plots.machine_view import Scene, draw_views, legend_of, views
 from laufruhe.plots.style import VERMILION, Page, Series, entry_of_dots, headed, point_name, series_of, styled
+from laufruhe.plots.words import in_thousands
 from laufruhe.present.measures import hardest_point, has_loads
-from laufruhe.present.numbers import figure as words
+from laufruhe.present.numbers import number
 from laufruhe.present.poses import Pose, bore_of
 from laufruhe.problem.curves import forces_of
 from laufruhe.solvers.result import Result
@@ -39,7 +40,7 @@ def animate(result: Result, path: Path) -> None:
     k, series = hardest_point(result) if result.problem.points else 0, series_of(result, loads=True)
     loads = [_loads(one, k) for one in series] if has_loads(result) else []
     largest = max((float(np.abs(one[:, :, 1:]).max()) for one in loads), default=0.0)
-    frames = []
+    frames, (factor, unit) = [], in_thousands(largest, "N")
     for step in range(FRAMES):
         drawn, phi = views(scene), result.final.engine.cycle.angle * step / FRAMES
         draw_views(drawn, scene, phi)
@@ -47,7 +48,7 @@ def animate(result: Result, path: Path) -> None:
         for one, forces in zip(series, loads, strict=False):
             _arrows(drawn.panels[0], scene, forces[step], largest, one.colour)
         told = f"{math.degrees(phi):.1f}° of crank angle"
-        scale = f"; longest arrow {words(largest, 'N', 3)}" if largest else ""
+        scale = f"; longest arrow {number(factor * largest, 3)} {unit}" if largest else ""
         where = f", at {point_name(result, k)}" if loads else ""
         fires = entry_of_dots("fires", color=VERMILION, markersize=7.0)
         legend = [*legend_of(scene), fires, *(one.entry(": forces") for one in series[: len(loads)])]

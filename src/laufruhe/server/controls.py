@@ -9,9 +9,8 @@ from typing import Any
 
 from laufruhe import units
 from laufruhe.files import edits
-from laufruhe.files.asked import limit_name
+from laufruhe.files.asked import SIDES, limit_name
 from laufruhe.files.complaints import Refused
-from laufruhe.files.study_tables import SIDES
 from laufruhe.problem.problem import Problem
 from laufruhe.server.asked import CRANK, OBJECTIVE, STAR
 

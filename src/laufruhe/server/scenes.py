@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from laufruhe.errors import ModelError
-from laufruhe.files.asked import SIDES
+from laufruhe.files.asked import EDGES
 from laufruhe.live import live_model
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit
@@ -115,6 +115,6 @@ def scene_of(problem: Problem, tables: Mapping[str, Any]) -> Scene:
 
 def key_of(tables: Mapping[str, Any]) -> str:
     """Of all but where limits stand."""
-    limits = [{k: v for k, v in entry.items() if k not in SIDES} for entry in tables.get("constraints", [])]
+    limits = [{k: v for k, v in entry.items() if k not in EDGES} for entry in tables.get("constraints", [])]
     text = json.dumps({**tables, "constraints": limits}, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

@@ -20,6 +20,13 @@ function filled(made, attributes, children) {
   return made;
 }
 
+/** Hand a TOML file to the user. */
+function download(text, name) {
+  const href = URL.createObjectURL(new Blob([text], { type: "application/toml" }));
+  element("a", { href, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(href), 1000);
+}
+
 /** A picture that readers aloud know by its label. */
 function picture(width, height, label) {
   return drawn("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label });

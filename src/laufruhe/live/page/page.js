@@ -265,11 +265,9 @@ class Page {
   }
 
   save() {
-    const url = URL.createObjectURL(new Blob([savedText(this.model, this.values)], { type: "application/toml" }));
-    const link = element("a", { href: url, download: `${this.model.name}-moved.toml` });
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(url), 1000);
-    this.said.textContent = `${this.model.name}-moved.toml is saved. ${this.model.save.note}`;
+    const name = `${this.model.name}-moved.toml`;
+    download(this.text(), name);
+    this.said.textContent = `${name} is saved. ${this.model.save.note}`;
   }
 
   // the handle
@@ -347,7 +345,7 @@ async function show(model, root) {
   return new Page(root).open(typeof model === "string" ? JSON.parse(model) : model);
 }
 
-window.laufruheLive = { show, element, drawn, NORMS, opened, measured, judged, rowsAt, savedText, number };
+window.laufruheLive = { show, element, drawn, download, NORMS, opened, measured, judged, rowsAt, savedText, number };
 
 const told = document.getElementById("live-model");
 if (told) window.laufruheLive.page = show(told.textContent, document.getElementById("live"));

@@ -302,7 +302,8 @@ function back() {
 
 async function save() {
   const { edits, held } = asked();
-  download(await ask("save", { edits, held, design: state.handle ? state.handle.design() : {} }));
+  const { toml, file } = await ask("save", { edits, held, design: state.handle ? state.handle.design() : {} });
+  download(toml, file);
 }
 
 /** Keep what is shown, or show what was kept. */

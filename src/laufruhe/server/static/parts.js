@@ -10,8 +10,11 @@ export function byId(id) {
   return found;
 }
 
-/** @type {{element: (tag: string, attributes?: object, ...children: (Node | string)[]) => any, drawn: typeof element}} */
-export const { element, drawn } = window.laufruheLive;
+/**
+ * @type {{element: (tag: string, attributes?: object, ...children: (Node | string)[]) => any, drawn: typeof element,
+ *   download: (text: string, name: string) => void}}
+ */
+export const { element, drawn, download } = window.laufruheLive;
 
 /**
  * A number to so many figures, without zeros that say nothing.
@@ -36,14 +39,4 @@ export function ticks(low, high, count = 5) {
   const found = [];
   for (let k = Math.ceil(low / step); k * step <= high + 1e-9 * step; k += 1) found.push(k * step);
   return found;
-}
-
-/**
- * Hand a file to the user.
- * @param {{toml: string, file: string}} told
- */
-export function download(told) {
-  const href = URL.createObjectURL(new Blob([told.toml], { type: "application/toml" }));
-  element("a", { href, download: told.file }).click();
-  setTimeout(() => URL.revokeObjectURL(href), 1000);
 }
