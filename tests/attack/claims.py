@@ -15,8 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from attack import own_judge
 from attack.families import moving_mass, toml
 from attack.openings import Openings
+from attack.own_families import OWN_FAMILIES
 from attack.plain_loads import number
 from attack.plain_scene import Table, terms_of
 from attack.rivals import Rival, best_star, convex_rival, least_broken, local_rival
@@ -130,9 +132,20 @@ def try_problem(family: str, seed: int, table: Table, rng: np.random.Generator, 
         (folder / f"{family}-{seed}-{os.getpid()}.toml").unlink(missing_ok=True)
         verdict.seconds = time.perf_counter() - started
     started = time.perf_counter()
-    judge(verdict, table, result, rng, most)
+    if family not in OWN_FAMILIES:
+        judge(verdict, table, result, rng, most)
+    if own_judge.knows(table):
+        judge_by_own(verdict, table, result, rng, most)
     verdict.own_seconds = time.perf_counter() - started
     return verdict
+
+
+def judge_by_own(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator, most: int) -> None:
+    """Complaints about a result by the own model."""
+    verdict.status = result.status.value
+    if result.certificate is not None:
+        verdict.kind, verdict.gap = result.certificate.kind.value, result.certificate.gap
+    own_judge.judge(verdict, table, result, rng, 300 * most)
 
 
 def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator, most: int) -> None:

@@ -17,12 +17,16 @@ import tempfile
 import time
 from pathlib import Path
 
+import numpy as np
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from attack.claims import Verdict, tried, try_problem
 from attack.families import FAMILIES, problem, toml
+from attack.own_families import OWN_FAMILIES
 from attack.page import lines_of, page
 from attack.plain_loads import SAMPLES
+from attack.plain_scene import Table
 from attack.variations import VARIATIONS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,7 +36,11 @@ VARIED = {
     "monotony": ("inline", "boxer", "stars", "open-vees", "elastic-balance", "joint"),
     "invariance": ("inline", "vee", "radial", "parts", "stars", "elastic-balance", "convex-mounts", "elastic-few"),
 }
-NAMES = [*FAMILIES, *(f"{variation} of {family}" for variation, families in VARIED.items() for family in families)]
+NAMES = [
+    *FAMILIES,
+    *OWN_FAMILIES,
+    *(f"{variation} of {family}" for variation, families in VARIED.items() for family in families),
+]
 FINER = 32768
 EFFORT = 6
 """Stars that are solved one by one, at most ten times as many, and hundreds of calls of a local search."""
@@ -44,16 +52,24 @@ def commit() -> str:
     return done.stdout.strip()
 
 
+def drawn(family: str, seed: int) -> tuple[Table, np.random.Generator]:
+    """A problem of any family, and the generator that goes on from there."""
+    if family not in OWN_FAMILIES:
+        return problem(family, seed)
+    rng = np.random.default_rng([*family.encode(), seed])
+    return {"title": f"{family} {seed}", **OWN_FAMILIES[family](rng)}, rng
+
+
 def attacked(name: str, seed: int, effort: int = EFFORT) -> Verdict:
     """One problem of a family, or a variation of one: "prices of inline"."""
     variation, _, family = name.rpartition(" of ")
-    table, rng = problem(family, seed)
+    table, rng = drawn(family, seed)
     with tempfile.TemporaryDirectory(prefix="attack-") as folder:
         if variation:
             vary = VARIATIONS[variation]
             return tried(Verdict(name, seed), lambda: vary(table, rng, Path(folder)))
         verdict = try_problem(family, seed, table, rng, Path(folder), effort)
-        if verdict.wrong and SAMPLES < FINER:
+        if verdict.wrong and SAMPLES < FINER and family not in OWN_FAMILIES:
             return finer(family, seed, Path(folder), effort)
         return verdict
 
@@ -115,7 +131,7 @@ def main() -> None:
         PAGE.write_text(page(told.logs, NAMES), encoding="utf-8")
         return
     if told.command == "show":
-        print(toml(problem(told.families, told.first)[0]))
+        print(toml(drawn(told.families, told.first)[0]))
         return
     run(told)
 

@@ -1,0 +1,278 @@
+"""Random problems of all that may be open on elastic mounts, which the own model judges.
+
+Limits stand a little over what a random design has, so that it keeps them, or at what few of many designs have.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+
+from attack.families import (
+    Generator,
+    balancers,
+    block,
+    boxer,
+    counterweights,
+    gas_engine,
+    inline,
+    moving_mass,
+    q,
+    vee,
+)  # fmt: skip
+from attack.own_loads import si
+from attack.own_problem import Designs, Own, opened
+from attack.own_runs import MEASURES as OF_RUNS
+from attack.plain_scene import Table
+
+UNITS = {
+    "force": "N", "travel": "m", "sag": "m", "stiffness": "N/m", "twist": "rad", "raw torque-roll residual": "N m/rad",
+}  # fmt: skip
+
+
+def unit_of(quantity: str) -> str:
+    return next((unit for name, unit in UNITS.items() if quantity.endswith(name)), "")
+
+
+def scene(rng: Generator, most_points: int, plain: bool) -> Table:
+    """Engine, gas, points and a block on mounts, all given; `plain` has nothing that no bound knows."""
+    chance = rng.random()
+    engine = gas_engine(rng) if chance < 0.5 else (inline, vee, boxer)[int(rng.integers(3))](rng)
+    held = block(rng)
+    mirrored = rng.random() < 0.25
+    if mirrored:
+        held["centre_of_gravity"][1] = "0.0 m"
+        held["inertia_products"] = ["0.0 kg m^2", held["inertia_products"][1], "0.0 kg m^2"]
+    if rng.random() < 0.25:
+        held["turning_inertia"] = q(rng.uniform(0.05, 0.4), "kg m^2", 3)
+    points = [
+        {
+            "name": f"p{k}", "speed": q(math.exp(rng.uniform(math.log(60.0), math.log(420.0))), "rad/s"),
+            "weight": float(round(rng.uniform(0.3, 3.0), 3)),
+        }
+        for k in range(int(rng.integers(1, most_points + 1)))
+    ]  # fmt: skip
+    table: Table = {"engine": engine, "operating_points": points, "block": held, "mounts": mounts(rng, mirrored, plain)}
+    if chance < 0.42:
+        table["gas"] = gas(rng)
+        if len(points) > 1 and rng.random() < 0.5:
+            points[1] |= {"gas": False} if rng.random() < 0.5 else {"motored": True}
+    return table
+
+
+def gas(rng: Generator) -> Table:
+    if rng.random() < 0.5:
+        return {
+            "model": "seiliger",
+            "peak_pressure": q(rng.uniform(55, 85), "bar"),
+            "imep": q(rng.uniform(6.5, 10), "bar"),
+        }
+    return {
+        "model": "wiebe", "imep": q(rng.uniform(2, 9), "bar"), "start": float(round(rng.uniform(-15, 2), 1)),
+        "duration": float(round(rng.uniform(35, 70), 1)), "compression_ratio": float(round(rng.uniform(10, 18), 2)),
+    }  # fmt: skip
+
+
+def mounts(rng: Generator, mirrored: bool, plain: bool) -> Table:
+    corners = [(1.0, 1.0), (-1.0, 1.0)] if mirrored else [(1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)]
+    places = []
+    for k, (along, aside) in enumerate(corners[: int(rng.integers(3, 5))]):
+        at = (along * rng.uniform(0.2, 0.4), aside * rng.uniform(0.15, 0.4), rng.uniform(-0.1, 0.1))
+        places.append({"name": f"m{k}", "position": [q(v, "m", 3) for v in at], **springs(rng, plain or mirrored)})
+        if mirrored:
+            places.append({"name": f"m{k}r", "mirror_of": f"m{k}"})
+    if not mirrored and rng.random() < 0.12:
+        places.append({"name": "mj", "joined_to": "m1", **springs(rng, True)})
+    found: Table = {"kind": "elastic", "loss_factor": float(rng.choice([0.03, 0.05, 0.1, 0.2])), "places": places}
+    if not plain and rng.random() < 0.2:
+        found["damping_per_stiffness"] = q(rng.uniform(1e-4, 1.5e-3), "s", 3)
+    return found
+
+
+def springs(rng: Generator, plain: bool) -> Table:
+    found: Table = {"stiffness": [q(v, "N/m", 4) for v in np.exp(rng.uniform(math.log(6e4), math.log(7e5), 3))]}
+    if rng.random() < 0.4:
+        found["damping"] = [q(v, "N s/m", 3) for v in rng.uniform(0, 900, 3)]
+    if rng.random() < 0.45:
+        found["turned"] = [float(round(v, 1)) for v in rng.uniform(-40, 40, 3) * (rng.random(3) < 0.7)]
+    if rng.random() < 0.2:
+        found["loss_factor"] = float(round(rng.uniform(0.02, 0.3), 3))
+    if not plain and rng.random() < 0.1:
+        found["fluid_track"] = {
+            "axis": "z", "mass": q(rng.uniform(10, 60), "kg", 3), "bulge_stiffness": q(rng.uniform(1e5, 3e5), "N/m", 3),
+            "chamber_stiffness": q(rng.uniform(2e3, 1e4), "N/m", 3), "damping": q(rng.uniform(200, 1500), "N s/m", 3),
+        }  # fmt: skip
+    return found
+
+
+def open_numbers(rng: Generator, table: Table, kinds: list[str]) -> None:
+    """One number a kind, of any mount that has its own; one that is open already stays."""
+    own = [place for place in table["mounts"]["places"] if "stiffness" in place]
+    for kind in kinds:
+        place, axis = own[int(rng.integers(len(own)))], int(rng.integers(3))
+        if kind == "stiffness" and isinstance(place["stiffness"][axis], str):
+            given, wide = si(place["stiffness"][axis]), float(rng.choice([1.6, 2.5, 5.0, 8.0]))
+            middle = given * wide ** rng.uniform(-0.5, 0.5)
+            place["stiffness"][axis] = _between(middle / wide, middle * wide, given, "N/m")
+        elif kind == "position" and isinstance(place.get("position", [None] * 3)[axis], str):
+            given, wide = si(place["position"][axis]), rng.uniform(0.03, 0.15)
+            place["position"][axis] = _between(given - wide, given + wide, given, "m")
+        elif kind == "turned" and not isinstance(place.setdefault("turned", [0.0] * 3)[axis], dict):
+            given = place["turned"][axis]
+            low, high = (round(given + side * rng.uniform(5, 60), 1) for side in (-1.0, 1.0))
+            place["turned"][axis] = {"between": [float(low), float(high)], "start": given}
+        elif kind == "loss" and not isinstance(place.get("loss_factor"), dict):
+            place["loss_factor"] = {"between": [0.02, 0.35], "start": 0.1}
+        elif kind == "damping" and not isinstance(place.setdefault("damping", ["0.0 N s/m"] * 3)[axis], dict):
+            place["damping"][axis] = _between(0.0, rng.uniform(300, 3000), 100.0, "N s/m")
+        elif kind == "lag" and not isinstance(place.get("damping_per_stiffness"), dict):
+            place["damping_per_stiffness"] = _between(0.0, 2e-3, 5e-4, "s")
+
+
+def _between(low: float, high: float, start: float, unit: str) -> Table:
+    return {"between": [q(low, unit), q(high, unit)], "start": q(start, unit)}
+
+
+def load_cases(rng: Generator, table: Table) -> None:
+    if rng.random() < 0.7:
+        table["mounts"]["stop"] = {
+            "gap": q(rng.uniform(2e-3, 8e-3), "m", 3),
+            "stiffness": q(rng.uniform(5e5, 3e6), "N/m", 3),
+        }
+    table["load_cases"] = [{"name": "bump", "times_weight": [0, 0, -float(round(rng.uniform(1, 4), 2))]}]
+    if rng.random() < 0.6:
+        table["load_cases"].append({"name": "pull", "torque": q(rng.uniform(-600, 600), "N m", 3)})
+    if rng.random() < 0.4:
+        force, place = rng.uniform(-3000, 3000, 3), rng.uniform(-0.3, 0.3, 3)
+        hit = {"name": "hit", "force": [q(v, "N", 4) for v in force], "place": [q(v, "m", 3) for v in place]}
+        table["load_cases"].append(hit)
+
+
+def asked_load(rng: Generator, table: Table) -> Table:
+    channel = str(rng.choice(["mount force", "mount travel"], p=[0.7, 0.3]))
+    found: Table = {"quantity": f"{rng.choice(['mean', 'maximum', 'rms'])} {channel}"}
+    if rng.random() < 0.3:
+        found["orders"] = [1, 2] if rng.random() < 0.5 else [int(rng.choice([1, 2]))]
+    if len(table["operating_points"]) > 1 and rng.random() < 0.25:
+        found["operating_points"] = ["p1"]
+    names = [place["name"] for place in table["mounts"]["places"] if "joined_to" not in place]
+    if rng.random() < 0.2:
+        found["mounts"] = [names[0], names[-1]]
+    if rng.random() < 0.2:
+        found["direction_weights"] = [float(round(v, 2)) for v in rng.uniform(0.1, 2, 3)]
+    return found
+
+
+def asked_number(rng: Generator, table: Table) -> Table:
+    """Of block and mounts; those of one stiffness where no fluid has another."""
+    among: list[Table] = [{"quantity": "transmissibility"}, {"quantity": "transmissibility", "orders": [1]}]
+    among.append({"quantity": "static sag"})
+    if "fluid_track" not in json.dumps(table["mounts"]):
+        among += [
+            {"quantity": "torque-roll residual", "frequency": q(rng.uniform(5, 20), "Hz", 4)},
+            {"quantity": "raw torque-roll residual"},
+            {"quantity": "raw torque-roll residual", "frequency": {"between": ["6.0 Hz", "14.0 Hz"]}},
+            {"quantity": "decoupling shortfall", "wanted": float(round(rng.uniform(0.7, 1), 2))},
+            {"quantity": "decoupling shortfall", "motions": ["roll", "bounce"], "wanted": 0.95},
+        ]
+    if "load_cases" in table:
+        among += [{"quantity": "static travel"}, {"quantity": "static mount force", "load_cases": ["bump"]}] * 2
+    return dict(among[int(rng.integers(len(among)))])
+
+
+def limits(rng: Generator, table: Table, count: int) -> list[Table]:
+    own = Own(table, 512, 1e-9)
+    low, high = own.box.T
+    one, many = (own.designs(low + (high - low) * rng.random((n, len(low)))) for n in (1, 60))
+    hard, found = rng.random() < 0.3, []
+    for k in range(count):
+        chance = rng.random()
+        if chance < 0.3 and "fluid_track" not in json.dumps(table["mounts"]):
+            told = frequency_limit(rng, one, many, hard)
+        else:
+            told = asked_load(rng, table) if chance < 0.6 else asked_number(rng, table)
+            most = float(one.measure(told)[0]) * rng.uniform(1.0, 1.08)
+            if hard and rng.random() < 0.6:
+                most = float(many.measure(told).min()) * rng.uniform(0.85, 1.01)
+            if most < 1e-9:
+                continue
+            unit = unit_of(told["quantity"])
+            told = {"limit": told.pop("quantity"), **told, "max": q(most, unit, 9) if unit else float(f"{most:.9g}")}
+        found.append({**told, "name": f"l{k}"})
+    return found
+
+
+def frequency_limit(rng: Generator, one: Designs, many: Designs, hard: bool) -> Table:
+    """Over, under or between natural frequencies of a design, or a least share of a motion."""
+    f, every, chance = np.sort(one.blocks.modes[0][0]), many.blocks.modes[0], rng.random()
+    if chance < 0.2:
+        motions = [str(m) for m in rng.choice(["roll", "bounce", "pitch", "lateral"], 2, replace=False)]
+        told: Table = {"quantity": "kinetic-energy decoupling", "motions": motions}
+        least = float(many.measure(told).max()) * 1.01 if hard else float(one.measure(told)[0]) * rng.uniform(0.92, 1.0)
+        return {"limit": told.pop("quantity"), **told, "min": float(f"{min(least, 0.999):.9g}")}
+    if chance < 0.45:
+        least = every.min(axis=1).max() * rng.uniform(0.98, 1.05) if hard else f[0] * rng.uniform(0.93, 1.0)
+        return {"limit": "natural frequencies", "min": q(least, "Hz", 9)}
+    if chance < 0.7:
+        most = every.max(axis=1).min() * rng.uniform(0.95, 1.02) if hard else f[-1] * rng.uniform(1.0, 1.07)
+        return {"limit": "natural frequencies", "max": q(most, "Hz", 9)}
+    k, share = int(np.argmax(np.diff(f))), rng.uniform(0.0, 0.2)
+    inset = share * (f[k + 1] - f[k])
+    return {"limit": "natural frequencies", "outside": [q(f[k] + inset, "Hz", 9), q(f[k + 1] - inset, "Hz", 9)]}
+
+
+def objective(told: Table) -> Table:
+    return {"minimise": told["quantity"], **{key: value for key, value in told.items() if key != "quantity"}}
+
+
+def any_mounts(rng: Generator) -> Table:
+    """Any numbers of mounts and weights open, any quantity minimised, up to three limited."""
+    plain = rng.random() < 0.5
+    table = scene(rng, 3, plain)
+    if rng.random() < 0.3:
+        load_cases(rng, table)
+    among = ["stiffness", "position", "turned", "weight", "loss", "damping", "lag"]
+    shares = [0.5, 0.2, 0.2, 0.1, 0.0, 0.0, 0.0] if plain else [0.4, 0.16, 0.16, 0.1, 0.05, 0.08, 0.05]
+    count = int(rng.integers(1, 6))
+    kinds = ["stiffness"] * count if rng.random() < 0.35 else [str(k) for k in rng.choice(among, count, p=shares)]
+    open_numbers(rng, table, kinds)
+    if "weight" in kinds:
+        table["counterweights"] = counterweights(rng, moving_mass(table["engine"]), 1)
+        if rng.random() < 0.3:
+            table["balancer_shafts"] = balancers(rng, moving_mass(table["engine"]), 1)
+    if not opened(table):
+        open_numbers(rng, table, ["stiffness"])
+    table["objective"] = objective(asked_load(rng, table) if rng.random() < 0.7 else asked_number(rng, table))
+    if found := limits(rng, table, int(rng.integers(0, 4))):
+        table["constraints"] = found
+    return {**table, "search": {"boxes": 20, "starts": 5}}
+
+
+def run_ups(rng: Generator) -> Table:
+    """A run-up limited or minimised, stiffness or a weight open."""
+    table = scene(rng, 1, True)
+    top = si(table["operating_points"][0]["speed"])
+    durations = {key: q(rng.uniform(0.3, 0.8), "s", 3) for key in ("time", "shut_down_time")}
+    table["run_up"] = {"up_to": q(min(top, 250.0) * rng.uniform(0.6, 1.0), "rad/s"), **durations}
+    if rng.random() < 0.3:
+        weight = counterweights(rng, moving_mass(table["engine"]), 1)[0]
+        table["counterweights"] = [{**weight, "angle": {"between": [0, 360]}}]
+        weight["mass"]["between"][0] = "0.0 kg"
+    else:
+        open_numbers(rng, table, ["stiffness"] * int(rng.integers(1, 4)))
+    measure = str(rng.choice(OF_RUNS))
+    if rng.random() < 0.3:
+        table["objective"] = {"minimise": measure}
+    else:
+        own = Own(table, 256, 1e-9)
+        low, high = own.box.T
+        has = own.designs(low + (high - low) * rng.random((12, len(low)))).measure({"quantity": measure})
+        most = has[0] * rng.uniform(1.0, 1.05) if rng.random() < 0.6 else has.min() * rng.uniform(0.8, 1.02)
+        table["objective"] = {"minimise": f"{rng.choice(['mean', 'maximum', 'rms'])} mount force"}
+        table["constraints"] = [{"limit": measure, "max": q(float(most), unit_of(measure), 9), "name": "l0"}]
+    return {**table, "search": {"boxes": 60, "starts": 3}}
+
+
+OWN_FAMILIES = {"any mounts": any_mounts, "run-ups": run_ups}
