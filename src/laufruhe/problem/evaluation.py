@@ -15,7 +15,7 @@ from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, lengths
 from laufruhe.numerics.spectrum import Spectrum, common_base, times
-from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.metrics import CycleMeasures, cycle_measures
 from laufruhe.physics.mounting import mounting_of, travel_of
 from laufruhe.physics.shaking_loads import shaking_loads
@@ -140,6 +140,18 @@ def finely(evaluation: Evaluation) -> Evaluation:
 def _fine(samples: int) -> int:
     """So many times as many angles that there are `FINE`, and twice as many at least."""
     return samples * max(2, math.ceil(FINE / samples))
+
+
+def finer(problem: Problem, times: int) -> Problem:
+    """The problem at so many times as many angles; the gas keeps its own."""
+    own = problem.fidelity
+    return problem.at(replace(own, samples=times * own.samples, gas_samples=own.gas_steps))
+
+
+def at_many(problem: Problem) -> Problem:
+    """The problem at as many angles as by default: what bounds a mean at fewer bounds it at these alone."""
+    times = math.ceil(EXACT.samples / problem.fidelity.samples)
+    return problem if times == 1 else finer(problem, times)
 
 
 def is_of_few(measure: Measure, samples: int) -> bool:

@@ -18,6 +18,7 @@ from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.problem import channels
+from laufruhe.problem.evaluation import at_many
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
@@ -102,7 +103,8 @@ class StiffnessBoxes:
     what = "boxes of stiffness"
 
     def __init__(self, problem: Problem, left_out: float, enough: float = math.inf) -> None:
-        self.problem, self.enough = problem, enough
+        self.enough = enough
+        self.problem = problem = at_many(problem)
         evaluation = evaluate_start(problem)
         self.model = BoxModel(problem, evaluation)
         terms = [term for term in problem.load_terms if term.measure.on_mounts]

@@ -10,6 +10,7 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
+from laufruhe.problem.evaluation import at_many
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import NEARLY, Box, Divided, Halving, Parts, Waiting, halves
@@ -54,7 +55,7 @@ def spring_bound(
         return Divided(0.0, 0)
     try:
         with ends_ahead() as ahead:
-            boxes = SpringBoxes(problem, value, room, near, ahead)
+            boxes = SpringBoxes(at_many(problem), value, room, near, ahead)
             if not boxes.most_boxes or not boxes.is_sampled_fully:
                 return Divided(0.0, 0)
             ladder = _ladder(boxes, of_many)

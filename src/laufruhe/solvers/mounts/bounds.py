@@ -18,6 +18,7 @@ from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.solvers.conclusion import KEPT, values_of
 from laufruhe.solvers.mounts.search import MountSearch
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.told_limits import over_read
 
 MOST_DIVISIONS = 3
 # share of the expansions that are worth it which are tried first
@@ -41,7 +42,8 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
     for _ in in_time(range(MOST_DIVISIONS)):
         found = search.chosen
         met = found is not None and found.design.excess <= KEPT
-        value = found.design.value if found is not None and met else math.inf
+        # of what few angles read too much no box can take anything
+        value = found.design.value - over_read(problem, found.design.evaluation) if found and met else math.inf
         room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine if found else None))
         divided = _by_boxes(problem, value, room, found.design.values if found is not None else ())
         if not divided.places or passed() or not divides(problem) or not search.again(divided.places):

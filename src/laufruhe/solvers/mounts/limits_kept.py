@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
+from laufruhe.problem.evaluation import at_many
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.exclusion import Exclusion, excluded
@@ -20,7 +21,7 @@ class LimitsKept:
     """Of a problem whose open numbers are stiffnesses alone; every design that is looked at is remembered."""
 
     def __init__(self, problem: Problem) -> None:
-        self._problem = problem
+        self._problem = problem = at_many(problem)
         decisions = problem.mount_decisions
         sides = ([getattr(d, side) for d in decisions] for side in ("start_number", "lower", "upper"))
         designs = [judged_at(problem, values) for values in sides]
