@@ -23,6 +23,7 @@ from laufruhe.report.result_report import result_document
 from laufruhe.report.screen import show
 from laufruhe.report.wording import fired
 from laufruhe.solvers import Result, state
+from problem_files import PROBLEMS
 from report.result_schema import SCHEMA
 
 RESULTS = {
@@ -192,6 +193,12 @@ def test_cylinders_that_fire_at_once_are_named(tmp_path: Path) -> None:
     assert "firing: is at once in cylinder 1 and cylinder 2; give a firing order" in page
     assert parsed(result)["warnings"] == [str(doubt) for doubt in result.problem.doubts]
     assert fired(scenes.stated(scenes.GIVEN)) == "Firing order 1-3-4-2, every 180 deg."
+
+
+def test_a_steam_engine_does_not_fire_nor_is_the_order_of_one_cylinder_told() -> None:
+    steam, shaper = (state(load(PROBLEMS / f"{name}.toml")) for name in ("steam-two-crank", "shaper"))
+    assert fired(steam) == "Dead centres at the head end in the order 1-2, intervals 270, 90 deg."
+    assert fired(shaper) == ""
 
 
 def test_cylinders_that_are_meant_to_fire_at_once_raise_no_question(tmp_path: Path) -> None:

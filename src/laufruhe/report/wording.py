@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from laufruhe.numerics.turns import as_turn, within
-from laufruhe.present.measures import breaks_a_limit, changed
+from laufruhe.present.measures import breaks_a_limit, changed, has_firing
 from laufruhe.present.numbers import figure, number, percent, trimmed
 from laufruhe.problem.plausibility import together
 from laufruhe.prove.certificate import Certificate, Proof
@@ -61,15 +61,18 @@ def fidelity_of(result: Result) -> str:
 
 
 def fired(result: Result) -> str:
-    """Firing order and intervals of the design, and which cylinders fire at once."""
+    """Firing order and intervals of the design, and which cylinders fire at once; empty of a single one."""
     engine = result.final.engine
+    if len(engine.cylinders) < 2:
+        return ""
+    firing = has_firing(result)
     turns = [float(within(as_turn(part.firing_angle), engine.cycle.turns)) for part in engine.cylinders]
     order = "-".join(str(k + 1) for k in sorted(range(len(turns)), key=lambda k: (round(turns[k], 9), k)))
     angles = [trimmed(math.degrees(interval), 5) for interval in engine.firing_intervals]
-    several = f"Firing order {order}, " if len(turns) > 1 else ""
+    lead = f"Firing order {order}" if firing else f"Dead centres at the head end in the order {order}"
     shown = f"intervals {', '.join(angles)} deg" if len(set(angles)) > 1 else f"every {angles[0]} deg"
-    sentence = f"{several or 'Fires '}{shown}."
-    groups = [f"{', '.join(names[:-1])} and {names[-1]} fire at once" for names in together(engine)]
+    sentence, do = f"{lead}, {shown}.", "fire" if firing else "stand there"
+    groups = [f"{', '.join(names[:-1])} and {names[-1]} {do} at once" for names in together(engine)]
     text = "; ".join(groups)
     return f"{sentence} {text[:1].upper()}{text[1:]}." if text else sentence
 

@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from laufruhe.plots.style import AFTER, BEFORE, PALE, WIDEST, headed, page, styled
 from laufruhe.plots.words import SMALL, ink_on, width_of
-from laufruhe.present.measures import has_ranking, ranking_of
+from laufruhe.present.measures import has_firing, has_ranking, ranking_of
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import PhasingResult, RankedOrder
 
@@ -40,8 +40,10 @@ def figure(result: Result) -> Figure:
     axes.grid(axis="y", visible=False)
     legend = [Patch(color=BEST[0], label="best star"), Patch(color=NEXT[0], label="next in the ranking")]
     intervals = ", in degrees." if uneven else f", {cycle / count:g}° for all."
-    lines = f"Cylinder that fires, and the crank angle to the next firing{intervals}"
-    return headed(drawn, result, "Firing orders", lines, legend[: 1 + any(k for k, _ in shown)])
+    fires, stands = ("Firing orders", "Cylinder that fires"), ("Orders of dead centres", "Piston at the head end")
+    title, who = fires if has_firing(result) else stands
+    lines = f"{who}, and the crank angle to the next{intervals}"
+    return headed(drawn, result, title, lines, legend[: 1 + any(k for k, _ in shown)])
 
 
 def _shown(phasing: PhasingResult) -> list[tuple[int, RankedOrder]]:
