@@ -22,8 +22,11 @@ MAKER = f"""
 import sys, itertools
 from pathlib import Path
 from laufruhe.report.files import Set, staged, write
-for k in itertools.count(int(sys.argv[2])):
+first = int(sys.argv[2])
+for k in itertools.count(first):
     with staged(Set(Path(sys.argv[1]), "--out", "solve", {NAMES})) as stage:
+        if k == first:
+            print("begun", flush=True)
         for name in {NAMES}[: 4 + k % 5]:
             write(stage / name, str(k))
 """
@@ -77,13 +80,20 @@ def test_a_kill_at_any_moment(makers: int, swaps: bool, tmp_path: Path) -> None:
     no_swap = "" if swaps else "import ctypes; ctypes.CDLL = lambda *_: None\n"
     for kill in range(6):
         running = [
-            subprocess.Popen([sys.executable, "-c", no_swap + MAKER, str(folder), str(kill * 10**6 + k)])
+            subprocess.Popen(
+                [sys.executable, "-c", no_swap + MAKER, str(folder), str(kill * 10**6 + k)], stdout=subprocess.PIPE
+            )
             for k in range(makers)
         ]
-        time.sleep(0.3 + rng.random() * 0.3)
+        for one in running:
+            assert one.stdout is not None
+            assert one.stdout.read(5) == b"begun"
+        time.sleep(rng.random() * 0.1)
         for one in running:
             one.send_signal(signal.SIGKILL)
         assert [one.wait() for one in running] == [-signal.SIGKILL] * makers
+        for one in running:
+            one.stdout.close()
         if swaps:
             names, texts = held(folder)
             assert len(texts) == 1
