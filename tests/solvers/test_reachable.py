@@ -27,7 +27,7 @@ from laufruhe.report.sections.reach import sentences, tables
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.conclusion import Shown, concluded, judged
+from laufruhe.solvers.conclusion import Shown, concluded, judged, none_within
 from laufruhe.solvers.reachable import LONG, with_reachable
 from laufruhe.solvers.result import Result, Status
 
@@ -292,14 +292,17 @@ def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a
             return replace(solve(asked), certificate=None)
 
     steps: list[Step] = []
-    found = replace(solve(problem.changed(decisions=())), status=Status.INFEASIBLE, conflict=("light", "quiet"))
+    none = none_within(problem, solve(problem.changed(decisions=())).final, ("light", "quiet"), {})
     with limited(0.4), listening(steps.append):
-        found = with_reachable(found, problem, {Kind.UNBALANCE}, 1.0, slow)
+        found = with_reachable(none, problem, {Kind.UNBALANCE}, 1.0, slow)
     assert [(each.ended, each.why) for each in found.reached] == [(True, "")] * 2
     assert all("want of time" in text for text in sentences(found)[:2])
     assert shares[:2] == pytest.approx([0.2, 0.2])
     told = [(step.done, step.whole) for step in steps if step.what == "what limits can reach"]
     assert told == [(0, 2), (1, 2)]
+    # whoever listens is told what is known before what takes longer
+    assert {step.within[0] for step in steps} == {none.message}
+    assert "contradict" in none.message
 
 
 def test_what_nothing_open_changes_stays() -> None:

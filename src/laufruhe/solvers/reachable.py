@@ -80,7 +80,7 @@ def with_reachable(found: Result, problem: Problem, kinds: Collection[Kind], too
     solve, answers = partial(_surely, solve, problem) if drawn else solve, []
     # a limit of time that was asked for counts alone
     seconds = None if math.isfinite(left()) else max(LEAST_SECONDS, took)
-    with limited(seconds):
+    with limited(seconds), within(found.message or str(found.status)):
         for k, limit in enumerate(asked):
             tell("what limits can reach", k, len(asked))
             with within(f"what '{limit.name}' can reach"), limited(left() / (len(asked) - k)):
