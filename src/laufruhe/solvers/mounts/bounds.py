@@ -1,4 +1,4 @@
-"""What boxes prove of designs that a search of mounts has found (E37-E45, E52-E54)."""
+"""What boxes prove of designs that a search of mounts has found (E37-E45, E52-E54, E68, E69)."""
 
 from __future__ import annotations
 
@@ -7,15 +7,19 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from laufruhe.load_models.run_look import asks_runs
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import at_least, in_time, passed
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import NEARLY, Divided
 from laufruhe.prove.certificate import Reach, certified, room_of
+from laufruhe.prove.mounts.design_boxes import DesignBoxes, designed_bound, mixes_corners
 from laufruhe.prove.mounts.subdivision import divided_bound, divided_bounds, divides
 from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.solvers.conclusion import KEPT, values_of
+from laufruhe.solvers.mounts.corners import best_at
+from laufruhe.solvers.mounts.places import started_at
 from laufruhe.solvers.mounts.search import MountSearch
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.told_limits import over_read
@@ -45,13 +49,40 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
         # of what few angles read too much no box can take anything
         value = found.design.value - over_read(problem, found.design.evaluation) if found and met else math.inf
         room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine if found else None))
-        divided = _by_boxes(problem, value, room, found.design.values if found is not None else ())
-        if not divided.places or passed() or not divides(problem) or not search.again(divided.places):
+        near = found.design.values if found is not None else ()
+        if found is not None and met and mixes_corners(problem) and not divides(problem):
+            return _by_corners(problem, search, value, room, near)
+        divided = _by_boxes(problem, value, room, near)
+        places = [(place.tolist(), None) for place in divided.places]
+        if not places or passed() or not divides(problem) or not search.again(places):
             break
         # what is shown of a value is so of one that differs from it by less than counts
         if search.best is not None and search.best.design.value > value - room:
             break
     return divided
+
+
+def _by_corners(
+    problem: Problem, search: MountSearch, value: float, room: float, near: Sequence[Value]
+) -> Divided:  # fmt: skip
+    """By multipliers of corners, which meet better designs on their way; else by the forces of springs."""
+
+    def judge(mounts: Array, columns: Array) -> float:
+        design = started_at(problem, (mounts.tolist(), columns))
+        if design is None or design.excess > 0.0:
+            return math.inf
+        return design.value - over_read(problem, design.evaluation)
+
+    boxes = DesignBoxes(problem, value, best_at, judge)
+    with at_least(LEAST_SECONDS):
+        found = designed_bound(boxes, room)
+    if boxes.best is not None:
+        mounts, columns = boxes.best
+        search.again([(mounts.tolist(), columns)])
+    if passed() or found.bound >= boxes.value - room:
+        return found
+    few = spring_bound(problem, value, room, near)
+    return Divided(max(few.bound, found.bound), few.boxes + found.boxes)
 
 
 def _by_boxes(problem: Problem, value: float, room: float, near: Sequence[Value]) -> Divided:

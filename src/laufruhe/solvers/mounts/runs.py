@@ -56,7 +56,7 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     if searched and search.best is not None and search.best.design.excess <= NEAR:
         search.refined()
     if met is not None and (search.best is None or search.best.design.excess > KEPT):
-        search.again([met])
+        search.again([(met.tolist(), None)])
     divided = divided_by(problem, search, False) if bounded else Divided(0.0, 0)
     timing = {"solve": time.perf_counter() - started}
     found = search.chosen

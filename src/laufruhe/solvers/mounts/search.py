@@ -149,21 +149,20 @@ class MountSearch:
         self._take(self._ends(starts))
         self._tighten()
 
-    def again(self, places: Sequence[Array]) -> bool:
-        """From other mounts, with the unbalances found; whether a better design came of it.
+    def again(self, places: Sequence[Place]) -> bool:
+        """From other mounts, where no unbalances are told with those found; whether a better design came of it.
 
-        The mounts themselves are judged too, where nothing else is open: a search may leave a good start.
+        The places themselves are judged too, where they are whole designs: a search may leave a good start.
         """
         before = self.best
         columns = self._points[0][1] if before is None or before.optimum is None else _point(before)[1]
-        for place in places:
-            alone = None if self.problem.unbalances else judged_at(self.problem, place.tolist())
+        starts = [(mounts, columns if own is None else own) for mounts, own in places]
+        for place, (_, own) in zip(starts, places, strict=True):
+            alone = None if self.problem.unbalances and own is None else started_at(self.problem, place)
             # what passes a limit by a rounding is no better for it
             if alone is not None and alone.excess <= 0.0:
                 self._keep(Found(alone, self.joint))
-        self._under_what_is_felt(
-            lambda: self._take(self._ends([self.joint.start(place.tolist(), columns) for place in places]))
-        )
+        self._under_what_is_felt(lambda: self._take(self._ends([self.joint.start(*start) for start in starts])))
         self._tighten()
         return self.best is not None and (before is None or self.best.rank < before.rank)
 

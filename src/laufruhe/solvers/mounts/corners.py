@@ -1,0 +1,102 @@
+"""Unbalances that are best on the mounts of a corner, and multipliers that prove it (P1, P6, E69)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from laufruhe.load_models.affine import AffineNorm, AffineProblem
+from laufruhe.numerics.arrays import Array, Indices
+from laufruhe.numerics.norms import Grid, lengths
+from laufruhe.prove.certificate import Bound, Multipliers, best_bound, lower_bound
+from laufruhe.prove.mounts.mounted_loads import coarser
+from laufruhe.solvers.cones.conic import solve_cones
+from laufruhe.solvers.cones.equations import on_grid
+
+TIMES = (8, 2, 1)
+"""Times as few samples, in the order in which they are tried."""
+ENOUGH = 1e-5
+"""Gap with which multipliers of a corner are good enough."""
+ROOM = 0.02
+"""Share of a limit by which it is wider than any unbalances need it."""
+NEAR, ROUNDS = 0.98, 3
+"""Share of a peak from which rows may become one, and how often such rows are chosen."""
+
+
+def best_at(problem: AffineProblem) -> tuple[Array, Multipliers]:
+    """Best unbalances, and multipliers that prove it; where none keep the limits, those of limits a little wider."""
+    x, best = _best(problem)
+    if x is not None:
+        return x, best.multipliers
+    if all(most > 0.0 for most, _ in problem.limits):
+        x, best = _best(replace(problem, limits=_wider(problem)))
+    return problem.start if x is None else x, best.multipliers
+
+
+def _wider(problem: AffineProblem) -> tuple[tuple[float, AffineNorm], ...]:
+    """Limits that some unbalances keep with room, so that their prices stay small."""
+    shares = tuple((1.0 / most, norm) for most, norm in problem.limits)
+    coarse = coarser(replace(problem, terms=shares, limits=(), groups=tuple(range(len(shares)))), TIMES[0])
+    x = solve_cones(coarse).x
+    times = ROOM + max(weight * norm.value(problem.start if x is None else x) for weight, norm in shares)
+    return tuple((times * most, norm) for most, norm in problem.limits)
+
+
+def _best(problem: AffineProblem) -> tuple[Array | None, Bound]:
+    """Best unbalances, none where the limits are not kept, and their bound."""
+    x, best = None, lower_bound(problem, _none(problem))
+    for times in TIMES:
+        coarse = coarser(problem, times)
+        found = solve_cones(coarse)
+        if found.x is None:
+            return None, best
+        x, best = found.x, best_bound(problem, found.x, on_grid(coarse, problem, found.multipliers))
+        if times > 1 and any(norm.norm.is_largest for _, norm in problem.terms):
+            x, best = _peaks(problem, x, best)
+        if problem.objective(x) - best.value <= ENOUGH * best.value:
+            break
+    return x, best
+
+
+def _none(problem: AffineProblem) -> Multipliers:
+    """That say nothing."""
+    terms, limits = (
+        tuple(np.zeros_like(norm.constant) for _, norm in each) for each in (problem.terms, problem.limits)
+    )
+    return Multipliers(terms, limits)
+
+
+def _peaks(problem: AffineProblem, x: Array, best: Bound) -> tuple[Array, Bound]:
+    """The same at all samples, by rows alone that come near the peaks: the others have no part in them (P10)."""
+    kept = [np.zeros(0, dtype=np.intp) for _ in problem.terms]
+    for _ in range(ROUNDS):
+        kept = [
+            np.union1d(rows, _near(norm, x)) if norm.norm.is_largest else np.arange(len(norm.grid.weights))
+            for rows, (_, norm) in zip(kept, problem.terms, strict=True)
+        ]
+        few = [(weight, _rows_of(norm, rows)) for rows, (weight, norm) in zip(kept, problem.terms, strict=True)]
+        found = solve_cones(replace(problem, terms=tuple(few)))
+        if found.x is None:
+            break
+        whole = [np.zeros_like(norm.constant) for _, norm in problem.terms]
+        for z, rows, own in zip(whole, kept, found.multipliers.terms, strict=True):
+            z[rows] = own
+        bound = lower_bound(problem, replace(found.multipliers, terms=tuple(whole)))
+        best = max(best, bound, key=lambda each: each.value)
+        x = min(x, found.x, key=problem.objective)
+        if problem.objective(x) - best.value <= ENOUGH * best.value:
+            break
+        x = found.x
+    return x, best
+
+
+def _near(norm: AffineNorm, x: Array) -> Indices:
+    """Rows that come near the peak."""
+    size = lengths(norm.rows(x))
+    return np.flatnonzero(size >= NEAR * size.max())
+
+
+def _rows_of(norm: AffineNorm, rows: Indices) -> AffineNorm:
+    grid = Grid(norm.grid.weights[rows], len(rows))
+    return replace(norm, constant=norm.constant[rows], slope=norm.slope[rows], grid=grid)
