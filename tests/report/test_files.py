@@ -32,6 +32,21 @@ for k in itertools.count(first):
 """
 
 
+# is killed as soon as one folder, or so many, has got another name
+ENDS = """
+import os, signal, sys
+from pathlib import Path
+rename, left = Path.rename, [int(sys.argv[3])]
+def renamed(*words):
+    done = rename(*words)
+    left[0] -= 1
+    if left[0] == 0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    return done
+Path.rename = renamed
+"""
+
+
 def make(folder: Path, text: str, names: list[str] = NAMES, **more: object) -> None:
     with staged(Set(folder, "--out", "solve", NAMES, **more)) as stage:  # type: ignore[arg-type]
         for name in names:
@@ -101,6 +116,24 @@ def test_a_kill_at_any_moment(makers: int, swaps: bool, tmp_path: Path) -> None:
     make(folder, "done")
     assert held(folder) == (set(NAMES), {"done"})
     assert (folder / "notes.txt").read_text() == "mine"
+    assert {path.name for path in tmp_path.iterdir()} == {"set"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("swaps", "renamed"), [(True, 1), (False, 1), (False, 2), (False, 3)])
+def test_a_kill_after_each_step(swaps: bool, renamed: int, tmp_path: Path) -> None:
+    """Where folders can be swapped there is no moment without a whole set; elsewhere the next run finds one."""
+    folder = tmp_path / "set"
+    make(folder, "4")
+    once = MAKER.replace("itertools.count(first)", "[first]")
+    program = ("" if swaps else "import ctypes; ctypes.CDLL = lambda *_: None\n") + ENDS + once
+    words = [sys.executable, "-c", program, str(folder), "9", str(renamed)]
+    ended = subprocess.run(words, stdout=subprocess.DEVNULL, check=False)
+    assert ended.returncode == (0 if swaps else -signal.SIGKILL)
+    if swaps:
+        assert held(folder) == (set(NAMES), {"9"})
+    make(folder, "done")
+    assert held(folder) == (set(NAMES), {"done"})
     assert {path.name for path in tmp_path.iterdir()} == {"set"}
 
 
