@@ -28,14 +28,19 @@ KEPT = 1.1e-6
 ROUNDED = 1e-13
 """Share of the value of the design as given under which a value is nought."""
 LAYOUTS = ("inline", "vee", "boxer")
+POINTS = {"name", "speed", "weight", "imep", "motored", "gas"}
 
 
 def knows(table: Table) -> bool:
     """Whether the own model covers a file: elastic mounts alone or with unbalances, of layouts that it has."""
     engine, model = table["engine"], table.get("gas", {}).get("model", "wiebe")
     given = isinstance(engine.get("throws"), list) and all(isinstance(t, int | float) for t in engine["throws"])
+    points = {key for point in table["operating_points"] for key in point}
+    fluid = any("fluid_track" in place for place in table["mounts"].get("places", []))
+    measured = any("dynamic_stiffness" in place for place in table["mounts"].get("places", []))
     return (
-        table["mounts"].get("kind") == "elastic" and given and engine["layout"] in LAYOUTS and "drive" not in engine
+        points <= POINTS and not measured and not (fluid and "run_up" in table)
+        and table["mounts"].get("kind") == "elastic" and given and engine["layout"] in LAYOUTS and "drive" not in engine
         and model in ("wiebe", "seiliger") and "torsion" not in table
     )  # fmt: skip
 

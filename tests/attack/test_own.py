@@ -14,6 +14,7 @@ import laufruhe
 from attack import own_judge
 from attack.claims import Verdict, solved
 from attack.families import problem, toml
+from attack.own_loads import si
 from attack.own_problem import Own
 from attack.plain_scene import Table, terms_of
 from attack.run_attack import attacked, drawn
@@ -36,7 +37,7 @@ def given(table: Table, x: np.ndarray, own: Own) -> Table:
         for key in number.path:
             told = told[key]
         unit = told["between"][0].split(" ", 1)[1] if isinstance(told["between"][0], str) else ""
-        start = f"{float(value)!r} {unit}" if unit else float(value)
+        start = f"{float(value) / si('1 ' + unit)!r} {unit}" if unit else float(value)
         holder[number.path[-1]] = {**told, "start": start}
     return out
 
