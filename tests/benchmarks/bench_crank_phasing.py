@@ -235,7 +235,7 @@ def growth(found: list[Row]) -> None:
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.11, 0.13, 0.85, 0.75))
     series = (
-        ("branch and bound, proven", [(r.throws, r.search) for r in found], "#0072B2", "o-"),
+        ("halves that meet, proven", [(r.throws, r.search) for r in found], "#0072B2", "o-"),
         ("enumeration, vectorised", [(r.throws, r.enumeration) for r in found if r.enumeration], "#8a8a8a", "s-"),
         ("mixed-integer program, SCIP", [(r.throws, r.program) for r in found if r.program], "#D55E00", "^-"),
     )
@@ -308,7 +308,7 @@ def main() -> None:
         "Seconds of processor time on one core, medians of up to three runs.",
         "## Least couple of two orders, two-stroke in-line",
         "sqrt(C1^2 + (C2/4)^2) in forces of one throw times the spacing. Stars: with the first throw fixed; "
-        "enumeration and search count images once. Search: branch and bound, which ends with a proof. Enumeration "
+        "enumeration and search count images once. Search: halves that meet, which ends with a proof. Enumeration "
         "scores every star in vectorised blocks.",
         table(head, body),
         "![Time against size](crank-phasing.png)",

@@ -72,6 +72,14 @@ def star(cylinders: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def crank(cylinders: int, gas: bool) -> dict[str, Any]:
+    """Crank and firing order of a two-stroke open, on rigid mounts: each throw on a step of its own."""
+    tables = scene(cylinders, shafts=0)
+    engine = {**tables["engine"], "cycle": "two-stroke", "bore": "100 mm", "throws": "open", "firing_order": "open"}
+    fired = {"model": "wiebe", "imep": "5.5 bar", "start": -5, "duration": 50, "compression_ratio": 17}
+    return {**tables, "engine": engine, **({"gas": fired} if gas else {})}
+
+
 def elastic(springs: int, points: int = 1, cylinders: int = 4) -> dict[str, Any]:
     """So many open stiffnesses of four mounts."""
     left = iter(range(springs))
@@ -172,6 +180,9 @@ LARGE = (
     ("12 cylinders, 50 unbalances open, 10 points", lambda: scene(12, shafts=0, counterweights=50, points=10)),
     ("48 cylinders, 25 unbalances open, 100 points", lambda: scene(48, shafts=0, counterweights=25, points=100)),
     ("48 cylinders, crank and firing order open", lambda: star(48)),
+    ("15 throws of a two-stroke open, mean mount force", lambda: crank(15, False)),
+    ("47 throws of a two-stroke open, with gas", lambda: crank(47, True)),
+    ("48 throws of a two-stroke open, with gas", lambda: crank(48, True)),
     ("48 cylinders, six springs open", lambda: elastic(ELASTIC_SPRINGS, cylinders=48)),
     ("4 cylinders, six springs open, 100 points", lambda: elastic(ELASTIC_SPRINGS, 100)),
 )

@@ -169,17 +169,17 @@ def test_program_and_cuts_agree_with_unbalances_and_shafts(tmp_path, cylinders):
 
 @pytest.mark.slow
 def test_a_program_out_of_time_is_not_sold_as_an_optimum(tmp_path):
-    problem = engines.problem(tmp_path, 12)
+    problem = engines.problem(tmp_path, 13)
     space = families_of(problem.phasing)[0][0].space
     model = StarModel(problem.phasing, space, (None, None))
     assert solve_program(model.at(model.samples), space, time_limit=1e-6).star is None
-    least = solve(engines.problem(tmp_path, 12, phasing='method = "program"\ntime_limit = "0.001 s"\nbest = 1'))
+    least = solve(engines.problem(tmp_path, 13, phasing='method = "program"\ntime_limit = "0.001 s"\nbest = 1'))
     assert least.status is Status.FEASIBLE
     assert least.certificate.lower_bound <= least.objective.value
-    result = solve(engines.problem(tmp_path, 12, phasing='method = "program"\ntime_limit = "1 s"\nbest = 1'))
+    result = solve(engines.problem(tmp_path, 13, phasing='method = "program"\ntime_limit = "1 s"\nbest = 1'))
     assert result.status is Status.FEASIBLE
     assert result.certificate.kind is Proof.WITHIN_GAP
-    proven = solve(engines.problem(tmp_path, 12, phasing="best = 1")).objective.value
+    proven = solve(engines.problem(tmp_path, 13, phasing="best = 1")).objective.value
     assert result.certificate.lower_bound <= proven + 1e-9 * result.objective.initial
 
 

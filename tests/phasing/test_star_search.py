@@ -1,7 +1,8 @@
-"""Branch and bound finds what looking at every star finds, for every objective offered."""
+"""Halves that meet find what looking at every star finds, for every objective offered."""
 
 import itertools
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,8 +12,11 @@ from hypothesis import strategies as st
 from laufruhe.load_models.amplitudes import AmplitudeObjective, AmplitudeTerm
 from laufruhe.machine.layouts import inline
 from laufruhe.numerics.workers import HERE, working_on
-from laufruhe.physics.star_space import Partial, StarSpace, outside_in
+from laufruhe.physics.crank_stars import star_sums
+from laufruhe.physics.star_halves import Free, Window, meeting, shares_of, work_of
+from laufruhe.physics.star_space import StarSpace, outside_in
 from laufruhe.solvers.stars import search as star_search
+from laufruhe.solvers.stars import starts
 from laufruhe.solvers.stars.search import enumerate_stars, search_stars
 
 NONE = (0.0,) * 4
@@ -68,20 +72,49 @@ def test_enumeration_equals_plain_permutations(throws):
 
 
 @settings(max_examples=40)
-@given(st.permutations(range(6)), st.integers(1, 5), st.sampled_from(sorted(OBJECTIVES)))
-def test_no_completion_lies_under_the_bound(star, placed, name):
-    space, objective = whole(6), OBJECTIVES[name]
-    order = outside_in(6)
-    fixed = order[:placed]
-    every = np.array(list(itertools.permutations(range(6))), dtype=np.uint8)
-    match = np.all(every[:, fixed] == np.array(star, dtype=np.uint8)[list(fixed)], axis=1)
-    least = float(objective.values(space, every[match]).min())
-    counts = np.ones((1, 6), dtype=np.uint8)
-    for k in fixed:
-        counts[0, star[k]] -= 1
-    partial = Partial(np.array([star], dtype=np.uint8), counts, fixed, order[placed:])
-    bounds = star_search._Bounds(space, objective)
-    assert not bounds.beyond(partial, least * (1.0 + 1e-9) + 1e-12)[0]
+@given(st.integers(3, 7), st.sampled_from(sorted(OBJECTIVES)), st.floats(0.2, 1.5), st.data())
+def test_halves_meet_in_every_star_of_a_window(throws, name, share, data):
+    """What a window holds is found whole, and no star that is worth as little lies outside."""
+    reflect = data.draw(st.booleans())
+    space = replace(whole(throws), mirror=False, reflect=reflect)
+    objective = OBJECTIVES[name]
+    every = np.array([(0, *rest) for rest in itertools.permutations(range(1, throws))], dtype=np.uint8)
+    values = objective.values(space, every)
+    cut = share * float(np.median(values)) + 1e-9
+    window = objective.window(space, space.patterns[0], cut)
+    free = Free.whole(space.patterns[0])
+    blocks = [
+        space.canonical(block)
+        for own in shares_of(space, free)
+        for block in (meeting(space, free, own, window) if window else ())
+    ]
+    found = {tuple(star) for block in blocks for star in block}
+    assert {tuple(star) for star in space.canonical(every[values < cut * (1.0 - 1e-9)])} <= found
+    if window is not None:
+        couples = star_sums(every, throws, space.places, (window.order,))[:, 0, 1]
+        clear = np.abs(np.abs(couples.real) - window.high.real) > 1e-9
+        clear &= np.abs(np.abs(couples.imag) - window.high.imag) > 1e-9
+        inside = (np.abs(couples.real) < window.high.real) & (np.abs(couples.imag) < window.high.imag)
+        assert {tuple(star) for star in space.canonical(every[inside & clear])} <= found
+
+
+@pytest.mark.parametrize("throws", [5, 8, 11])
+def test_some_throws_are_arranged_in_every_order(throws):
+    """Of free throws all orders are met where the window is wide, and the others stay."""
+    space, free = replace(whole(throws), reflect=False), Free.of(np.arange(throws, dtype=np.uint8), (1, 2, 3, 4))
+    wide = Window(1, complex(-np.inf, -np.inf), complex(np.inf, np.inf))
+    found = np.concatenate([block for own in shares_of(space, free) for block in meeting(space, free, own, wide)])
+    assert len(np.unique(found, axis=0)) == len(found) == 24
+    assert (found[:, 5:] == np.arange(5, throws)).all()
+
+
+@pytest.mark.parametrize("throws", [4, 7, 9, 10])
+def test_arrangements_are_counted(throws):
+    for space in (whole(throws), *((in_pairs(throws),) if throws % 2 == 0 else ())):
+        free = Free.whole(space.patterns[0])
+        ways = len(shares_of(replace(space, reflect=False), free))
+        assert work_of(replace(space, reflect=False)) == free.each * ways
+        assert len(shares_of(space, free)) * 2 <= ways + 2 ** (throws // 2)
 
 
 def test_a_search_out_of_time_claims_no_proof():
@@ -149,7 +182,7 @@ def test_a_search_that_nothing_is_left_of_ends(throws):
 def test_a_piece_may_be_left_without_stars(monkeypatch):
     """All that stand in pieces may be excluded before the pieces are many."""
     monkeypatch.setattr(star_search, "WORTH_SHARING", 0)
-    monkeypatch.setattr(star_search, "STARTS", 40)
+    monkeypatch.setattr(starts, "STARTS", 40)
     space, objective = whole(7), OBJECTIVES["one order"]
     found = search_stars(space, objective, 1)
     assert found.complete

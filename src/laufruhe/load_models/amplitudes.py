@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -13,9 +14,10 @@ from laufruhe.machine import Engine, Role, SliderCrank
 from laufruhe.machine.firing import even_patterns
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.crank_stars import Stars, star_sums
+from laufruhe.physics.crank_stars import Stars, phase_waves, star_sums
 from laufruhe.physics.order_coefficients import orders_needed
 from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.physics.star_halves import Window
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Term
@@ -47,8 +49,8 @@ class AmplitudeObjective:
     orders: tuple[int, ...]
     terms: tuple[AmplitudeTerm, ...]
 
-    def values(self, space: StarSpace, stars: Stars) -> Array:
-        """Of many stars, shape (n,)."""
+    def values(self, space: StarSpace, stars: Stars, most: float = math.inf) -> Array:  # noqa: ARG002
+        """Of many stars, shape (n,); over `most` any number between it and the value would do."""
         return self._of_sums(star_sums(stars, space.phases, space.places, self.orders))
 
     def of_angles(self, places: Sequence[float], throws: Array) -> Array:
@@ -57,13 +59,33 @@ class AmplitudeObjective:
         waves = np.exp(1j * throws[:, None, :] * np.array(self.orders)[:, None])
         return self._of_sums(waves @ weights)
 
-    def largest(self, places: Sequence[float]) -> float:
+    def largest(self, space: StarSpace) -> float:
         """No crank has more: all throws on the side of their places [SI of the objective]."""
-        levers = float(np.abs(places).sum())
+        levers = float(np.abs(space.places).sum())
         return sum(
-            term.weight * float(np.hypot(np.multiply(term.force, len(places)), np.multiply(term.couple, levers)).sum())
+            term.weight * float(np.hypot(np.multiply(term.force, space.throws), np.multiply(term.couple, levers)).sum())
             for term in self.terms
         )
+
+    def least(self, space: StarSpace) -> float:
+        """No star has less: forces alone, which the pattern fixes [SI of the objective]."""
+        return min(self._forces(space, pattern) for pattern in space.patterns)
+
+    def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
+        """Of the order that weighs most: no norm is less than its share in it (S5)."""
+        shares = np.sum([np.multiply(term.weight, term.couple) for term in self.terms], axis=0)
+        place, room = int(np.argmax(shares)), value - self._forces(space, pattern)
+        if room < 0.0:
+            return None
+        most = room / shares[place] if shares[place] > 0.0 else np.inf
+        return Window(self.orders[place], complex(-most, -most), complex(most, most))
+
+    def _forces(self, space: StarSpace, pattern: Sequence[int]) -> float:
+        """What terms of forces alone have of a pattern."""
+        forces = np.abs(phase_waves(space.phases, self.orders) @ np.array(pattern))
+        forces[forces <= 1e-12 * space.throws] = 0.0
+        pure = [term for term in self.terms if not any(term.couple)]
+        return sum(term.weight * float(np.linalg.norm(np.multiply(term.force, forces))) for term in pure)
 
     def _of_sums(self, sums: NDArray[np.complex128]) -> Array:
         """Of F_h and C_h, shape (n, orders, 2)."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from laufruhe.physics.crank_stars import Stars, canonical
 
-Prune = Callable[["Partial"], NDArray[np.bool_]]
 BLOCK = 1 << 14
 
 
@@ -62,16 +61,13 @@ class StarSpace:
         """One of each star's images, the same for all of them."""
         return canonical(stars, self.phases, self.mirror, self.reflect)
 
-    def blocks(self, prune: Prune | None = None) -> Iterator[Stars]:
-        """All stars, one of each set of images, in blocks (n, throws).
-
-        Parameters
-        ----------
-        prune
-            Tells which partial stars need not be grown further.
-        """
+    def blocks(self) -> Iterator[Stars]:
+        """All stars, one of each set of images, in blocks (n, throws)."""
         for root in self.roots:
-            yield from self.below(root, prune)
+            for block in _grown(self, root):
+                own = np.all(self.canonical(block) == block, axis=1)
+                if own.any():
+                    yield block[own]
 
     @property
     def roots(self) -> tuple[Partial, ...]:
@@ -82,24 +78,6 @@ class StarSpace:
             left[0, 0] -= 1
             found.append(Partial(np.zeros((1, self.throws), dtype=np.uint8), left, order[:1], order[1:]))
         return tuple(found)
-
-    def below(self, partial: Partial, prune: Prune | None = None) -> Iterator[Stars]:
-        """All stars that some partial stars grow to, as `blocks`."""
-        for block in _grown(self, partial, prune):
-            own = np.all(self.canonical(block) == block, axis=1)
-            if own.any():
-                yield block[own]
-
-    def parted(self, pieces: int, prune: Prune) -> list[Partial]:
-        """All stars in about so many pieces for each pattern, by the throws that are placed first."""
-        found = []
-        for root in self.roots:
-            partial = root
-            while partial.open[1:] and 0 < len(partial.stars) < 2 * pieces:
-                partial = _next(self, partial, prune)
-            parts = (part for part in np.array_split(np.arange(len(partial.stars)), pieces) if len(part))
-            found += [Partial(partial.stars[k], partial.counts[k], partial.placed, partial.open) for k in parts]
-        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,11 +103,11 @@ class Partial:
 
 
 def outside_in(throws: int) -> tuple[int, ...]:
-    """First, last, second, last but one ...: the long levers first, so that bounds bite early."""
+    """First, last, second, last but one ...: images are told apart from both ends."""
     return tuple(k // 2 if k % 2 == 0 else throws - 1 - k // 2 for k in range(throws))
 
 
-def _grown(space: StarSpace, first: Partial, prune: Prune | None) -> Iterator[Stars]:
+def _grown(space: StarSpace, first: Partial) -> Iterator[Stars]:
     # depth first over blocks: what waits never exceeds a block for every throw and step
     waiting = [first]
     while waiting:
@@ -137,17 +115,16 @@ def _grown(space: StarSpace, first: Partial, prune: Prune | None) -> Iterator[St
         if not partial.open:
             yield partial.stars
             continue
-        child = _next(space, partial, prune)
+        child = _next(space, partial)
         for start in range(0, len(child.stars), BLOCK):
             part = slice(start, start + BLOCK)
             waiting.append(Partial(child.stars[part], child.counts[part], child.placed, child.open))
 
 
-def _next(space: StarSpace, partial: Partial, prune: Prune | None) -> Partial:
-    """One more throw placed, images and what need not be grown further left out."""
+def _next(space: StarSpace, partial: Partial) -> Partial:
+    """One more throw placed, images left out."""
     child = _children(partial)
-    child = _kept(child, _first_of_images(space, child))
-    return _kept(child, ~prune(child)) if prune is not None and child.open and len(child.stars) else child
+    return _kept(child, _first_of_images(space, child))
 
 
 def _children(partial: Partial) -> Partial:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -11,9 +11,11 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.amplitudes import AmplitudeObjective, amplitude_objective
+from laufruhe.load_models.couple_norms import couple_norms, three_stars
 from laufruhe.load_models.pair_tables import PairObjective
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.numerics.norms import NORMS
+from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.channels import ROCKING_COUPLE
 from laufruhe.problem.evaluation import Evaluation, evaluate, finely, objective_value
@@ -29,7 +31,7 @@ from laufruhe.solvers.stars.families import Family, FiringFamily
 from laufruhe.solvers.stars.firing_search import MOST_SLOTS, enumerate_orders
 from laufruhe.solvers.stars.program import owners_of, solve_design, widened
 from laufruhe.solvers.stars.ranking import RankedStar, ranked_star
-from laufruhe.solvers.stars.search import StarsFound, enumerate_stars, search_stars
+from laufruhe.solvers.stars.search import StarsFound, best_starts, enumerate_stars, search_stars
 
 if TYPE_CHECKING:
     from laufruhe.solvers.stars.mixed_conic import ProgramFound
@@ -88,7 +90,7 @@ def searched(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> 
             answers.append(_stars_answer(phasing, family, found, "every star looked at"))
         else:
             found = search_stars(space, own, phasing.best, phasing.time_limit)
-            answers.append(_stars_answer(phasing, family, found, "branch and bound over partial stars"))
+            answers.append(_stars_answer(phasing, family, found, "stars by halves that meet in a window of couples"))
     return _joined(answers, phasing.best)
 
 
@@ -133,7 +135,7 @@ def _stars_answer(phasing: Phasing, family: Family, found: StarsFound, method: s
 def _by_designs(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
     """Everything else is decided by cone programs: cuts where the stars can be listed, else the program."""
     if phasing.method is Method.PROGRAM or sum(family.size for family in families) > MOST_LISTED:
-        shared = None if phasing.method is Method.PROGRAM else _with_what_all_have(problem, phasing, families)
+        shared = None if phasing.method is Method.PROGRAM else _by_couples(problem, phasing, families)
         return _by_program(problem, phasing, families) if shared is None else shared
     nothing = nothing_of(problem)
     count = 10**9 if phasing.method is Method.ENUMERATION else phasing.best
@@ -160,42 +162,65 @@ def _by_designs(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
     return _joined(answers, phasing.best)
 
 
-def _with_what_all_have(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer | None:
-    """Stars that leave no more than every even star has (S40), sought among those without couples (S46).
+def _by_couples(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer | None:
+    """Even stars that differ by their couples alone: those with little first, then all that may be better (S46, S48).
 
-    None where those that are drawn leave more, which proves nothing.
+    None where stars differ by more, or anything else is open.
     """
-    if len(families) > 1 or problem.decisions:
+    if len(families) > 1 or problem.decisions or phasing.shafts.optional:
         return None
     (family,) = families
     found = _with_least_couples(phasing, family)
-    designs, bound = [], 0.0
-    for steps in found:
-        value, design = _evaluated(phasing, family, steps)
-        bound, fine = firing_bound(problem, design), finely(design)
-        # a search at more angles closes what these leave open of a mean (P7)
-        left = gap_of(objective_value(problem, fine), firing_bound(problem, fine), nothing_of(problem, design.engine))
-        if left <= problem.tolerance:
-            designs.append(_decided(phasing, family, steps, (), value, bound, True))
-    if not designs:
+    stars, looked_at = [tuple(map(int, star)) for star in found], len(found)
+    answer = _told(problem, phasing, family, stars, 0.0)
+    if answer.complete:
+        return _joined([answer], phasing.best)
+    own = couple_norms(problem, family.space, [_realised(phasing, family, star) for star in three_stars(family.space)])
+    if own is None:
         return None
+    every = search_stars(family.space, own, phasing.best, phasing.time_limit, found)
+    stars += [tuple(map(int, star)) for star in every.stars]
+    told = _told(problem, phasing, family, stars, every.lower_bound)
+    method = "stars by halves that meet in a window of couples"
+    return replace(
+        _joined([told], phasing.best), complete=every.complete, looked_at=looked_at + every.nodes, method=method
+    )
+
+
+def _told(
+    problem: Problem, phasing: Phasing, family: Family, stars: Sequence[tuple[int, ...]], bound: float
+) -> Answer:  # fmt: skip
+    """Stars with their values, and whether the best of them leaves what every even star has (S40)."""
+    designs, complete = [], False
+    for steps in dict.fromkeys(stars):
+        value, design = _evaluated(phasing, family, steps)
+        fine = finely(design)
+        # a search at more angles closes what these leave open of a mean (P7)
+        shared = firing_bound(problem, fine)
+        left = gap_of(objective_value(problem, fine), max(bound, shared), nothing_of(problem, design.engine))
+        bound = max(bound, firing_bound(problem, design))
+        complete = complete or left <= problem.tolerance
+        designs.append(_decided(phasing, family, steps, (), value, bound, left <= problem.tolerance))
     designs.sort(key=lambda design: design.value)
-    return Answer(tuple(designs), bound, True, len(found), "star without couples, which leaves what every even one has")
+    method = "star without couples, which leaves what every even one has"
+    return Answer(tuple(designs), bound, complete, len(designs), method)
 
 
-def _with_least_couples(phasing: Phasing, family: Family) -> list[tuple[int, ...]]:
-    """Stars with little couple, none where more than that tells stars apart: no swap of two throws lessens it."""
+def _with_least_couples(phasing: Phasing, family: Family) -> Stars:
+    """Stars with little couple, none where more than that tells stars apart (S47)."""
     of_couples = replace(phasing, realise=lambda candidate: _couples(phasing.realise(candidate)))
     own = _amplitudes(of_couples, family)
     if own is None:
-        return []
-    # in no time it looks at those that it starts from
-    found = search_stars(replace(family.space, mirror=True, reflect=True), own, phasing.best, 0.0)
-    return [tuple(map(int, star)) for star in found.stars]
+        return np.zeros((0, family.space.throws), dtype=np.uint8)
+    return best_starts(replace(family.space, mirror=True, reflect=True), own, phasing.best).stars
+
+
+def _realised(phasing: Phasing, family: Family, steps: Iterable[int]) -> Problem:
+    return phasing.realise(family.candidate(phasing, tuple(map(int, steps))))
 
 
 def _evaluated(phasing: Phasing, family: Family, steps: tuple[int, ...]) -> tuple[float, Evaluation]:
-    problem = phasing.realise(family.candidate(phasing, steps))
+    problem = _realised(phasing, family, steps)
     design = evaluate(problem)
     return objective_value(problem, design), design
 
@@ -256,7 +281,7 @@ def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) 
 def _first_of(phasing: Phasing, family: Family, told: tuple[int, ...] | None) -> tuple[int, ...]:
     """The star of a program, or one with less couple where that is worth less; the first where there are none."""
     known = [] if told is None else [told]
-    stars = [*known, *_with_least_couples(phasing, family)]
+    stars = [*known, *(tuple(map(int, star)) for star in _with_least_couples(phasing, family))]
     if len(stars) < 2:
         return stars[0] if stars else family.first
     return min(stars, key=lambda star: _evaluated(phasing, family, star)[0])

@@ -1,0 +1,151 @@
+"""Objectives as functions of couples against the exact model: every star of small engines, many of long ones (S48)."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from laufruhe.load_models.couple_norms import CoupleNorms, couple_norms, three_stars
+from laufruhe.physics.crank_stars import Stars, star_sums
+from laufruhe.problem.evaluation import evaluate, finely, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import solve
+from laufruhe.solvers.stars.families import Family, families_of
+from laufruhe.solvers.stars.search import enumerate_stars, search_stars
+from laufruhe.solvers.stars.starts import _blocks, good_starts, swaps
+from phasing import engines
+
+MOUNTS = (
+    '[mounts]\npositions = [["900 mm", "200 mm", "0 mm"], ["800 mm", "-250 mm", "0 mm"], ["-700 mm", "0 mm", "0 mm"]]\n'
+)
+GAS = '[gas]\nmodel = "wiebe"\nimep = "5.5 bar"\nstart = -5\nduration = 50\ncompression_ratio = 17\n'
+OBJECTIVES = {
+    norm: f'[objective]\nminimise = "{norm} mount force"\n' for norm in ("mean", "rms", "maximum", "peak to peak")
+} | {
+    "sum": '[objective]\nterms = [{ quantity = "mean mount force", weight = 1 }, '
+    '{ quantity = "maximum rocking couple", weight = 0.3 }]\n'
+}
+CASES = [
+    (5, "two-stroke", "mean", False), (6, "two-stroke", "maximum", False), (6, "two-stroke", "mean", True),
+    (5, "four-stroke", "maximum", True), (5, "four-stroke", "rms", True), (6, "two-stroke", "peak to peak", True),
+    (5, "four-stroke", "sum", False), (8, "four-stroke", "mean", True),
+]  # fmt: skip
+
+
+def asked(folder: Path, cylinders: int, cycle: str, name: str, gas: bool, phasing: str = "", rest: str = ""):
+    text = MOUNTS + (GAS if gas else "") + rest + OBJECTIVES[name]
+    problem = engines.problem(folder, cylinders, cycle, rest=text, phasing=phasing)
+    (family,) = families_of(problem.phasing)[0]
+    return problem, family
+
+
+def of_star(problem: Problem, family: Family, star) -> Problem:
+    return problem.phasing.realise(family.candidate(problem.phasing, tuple(map(int, star))))
+
+
+def norms_of(problem: Problem, family: Family) -> CoupleNorms | None:
+    return couple_norms(problem, family.space, [of_star(problem, family, star) for star in three_stars(family.space)])
+
+
+def every_star(family: Family) -> Stars:
+    first = family.first
+    found = {(0, *rest) for rest in itertools.islice(itertools.permutations(first[1:]), 2000)}
+    return np.array(sorted(found)[:: max(1, len(found) // 60)], dtype=np.uint8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("cylinders", "cycle", "name", "gas"), CASES)
+def test_couples_say_what_the_exact_model_says(cylinders, cycle, name, gas, tmp_path):
+    """Values are no more than those of the cycle and near them; what is worth as little lies in the window."""
+    problem, family = asked(tmp_path, cylinders, cycle, name, gas)
+    own, stars = norms_of(problem, family), every_star(family)
+    assert own is not None
+    exact = np.array([
+        objective_value(problem, finely(evaluate(of_star(problem, family, star)))) for star in stars
+    ])  # fmt: skip
+    low = own.values(family.space, stars)
+    assert (low <= exact * (1.0 + 1e-9)).all()
+    assert low == pytest.approx(exact, rel=5e-3)
+    assert own.least(family.space) <= low.min() * (1.0 + 1e-9)
+    assert low.max() <= own.largest(family.space)
+    for most in np.quantile(exact, (0.0, 0.1, 0.5, 0.9)):
+        window = own.window(family.space, family.space.patterns[0], most)
+        couples = star_sums(stars, family.space.phases, family.space.places, (window.order,))[:, 0, 1]
+        inside = (np.abs(couples.real) <= window.high.real) & (np.abs(couples.imag) <= window.high.imag)
+        assert inside[exact <= most].all()
+        # those over a value may be told by less, never under it
+        told = own.values(family.space, stars, most)
+        assert told[low <= most] == pytest.approx(low[low <= most], rel=1e-12)
+        assert (told[low > most] > most).all()
+        assert (told <= low * (1.0 + 1e-9)).all()
+
+
+@pytest.mark.parametrize(("cylinders", "cycle", "gas"), [(7, "two-stroke", True), (9, "four-stroke", False)])
+def test_a_star_that_is_turned_is_worth_the_same(cylinders, cycle, gas, tmp_path):
+    problem, family = asked(tmp_path, cylinders, cycle, "rms", gas)
+    own, r = norms_of(problem, family), np.random.default_rng(4)
+    stars = np.array([[0, *r.permutation(family.first[1:])] for _ in range(20)], dtype=np.uint8)
+    turned = ((stars.astype(int) + 3) % family.space.phases).astype(np.uint8)
+    assert own.values(family.space, turned) == pytest.approx(own.values(family.space, stars), rel=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("cylinders", "name", "gas"), [(7, "mean", False), (8, "maximum", True), (7, "rms", True)])
+def test_halves_find_the_best_of_all_stars(cylinders, name, gas, tmp_path):
+    problem, family = asked(tmp_path, cylinders, "two-stroke", name, gas)
+    own = norms_of(problem, family)
+    found, every = (how(family.space, own, 6) for how in (search_stars, enumerate_stars))
+    assert found.complete
+    np.testing.assert_allclose(found.values, every.values, rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_weights_on_single_throws_are_told_by_no_couple(tmp_path):
+    weights = '[[counterweights]]\nname = "w"\nx = "200 mm"\nunbalance = "0.02 kg m"\nangle = 40\n'
+    problem, family = asked(tmp_path, 6, "two-stroke", "mean", False, rest=weights)
+    assert norms_of(problem, family) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cylinders", "name", "gas"), [(11, "mean", False), (12, "maximum", True), (15, "mean", False)]
+)
+def test_long_cranks_are_proven(cylinders, name, gas, tmp_path):
+    """No star drawn, and no exchange of the best one, is under what was proven."""
+    problem, family = asked(tmp_path, cylinders, "two-stroke", name, gas)
+    result = solve(problem)
+    assert result.certificate.kind is Proof.GLOBAL
+    own, r = norms_of(problem, family), np.random.default_rng(cylinders)
+    drawn = np.array([[0, *r.permutation(family.first[1:])] for _ in range(3000)], dtype=np.uint8)
+    best = np.round(np.array(result.phasing.ranking[0].throws) / (2.0 * np.pi) * cylinders).astype(np.uint8)
+    near = swaps(best % cylinders)
+    values = own.values(family.space, np.concatenate([drawn, near]))
+    assert values.min() >= result.certificate.lower_bound * (1.0 - 1e-4)
+
+
+@pytest.mark.parametrize("phases", [1, 4, 9, 12, 15, 30, 48])
+def test_blocks_are_stars(phases):
+    r = np.random.default_rng(1)
+    for _ in range(20):
+        assert sorted(_blocks(phases, r)) == list(range(phases))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("throws", [35, 45])
+def test_blocks_leave_no_couple_of_many_throws(throws, tmp_path):
+    """Each throw on a step of its own, and nothing is left of any order."""
+    problem, _ = asked(tmp_path, throws, "two-stroke", "mean", False)
+    result = solve(problem)
+    assert result.certificate.kind is Proof.GLOBAL
+    assert result.objective.value < 1e-3
+
+
+def test_starts_are_stars_of_the_space(tmp_path):
+    problem, family = asked(tmp_path, 9, "two-stroke", "rms", False)
+    starts = good_starts(family.space, norms_of(problem, family))
+    assert (np.sort(starts, axis=1) == np.arange(9)).all()
+    assert (starts[:, 0] == 0).all()
