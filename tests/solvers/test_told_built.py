@@ -51,6 +51,15 @@ def test_the_worst_case_is_that_of_many_angles(throw: float, weights: list[Any])
     assert result.status is Status.OPTIMAL
 
 
+@pytest.mark.parametrize(("throw", "samples"), [(1, 120), (2, 240), (5, 480), (0, 1440)])
+def test_no_bound_is_over_what_an_engine_has(throw: float, samples: int) -> None:
+    """With nothing open it is that of an engine; few angles read it too large by less than the tolerance too."""
+    asked = problem(engine={**ENGINE, "throws": [throw]}, objective=SECOND, fidelity={"samples": samples})
+    result = solve(asked)
+    assert result.certificate is not None
+    assert heaviest(asked) * (1.0 - asked.tolerance) <= result.certificate.lower_bound <= heaviest(asked) * (1.0 + 1e-9)
+
+
 def test_what_a_share_of_engines_stays_below_is_that_of_many_angles() -> None:
     told = {"objective": SECOND, "robust": {"over": "90 %", "engines": 40}}
     few, many = (solve(problem(**told, fidelity={"samples": n})) for n in (48, 1440))

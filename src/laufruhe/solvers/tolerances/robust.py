@@ -22,7 +22,7 @@ from laufruhe.numerics.budget import in_time
 from laufruhe.numerics.progress import tell, within
 from laufruhe.numerics.spectrum import common_base
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.evaluation import objective_value
+from laufruhe.problem.evaluation import finely, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
@@ -259,8 +259,9 @@ def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], 
     found = seeker.at(start, proven=not problem.decisions)
     best = Least(start, found, 0.0, Held((found.errors[0],), (1.0,), ((),)), 1, 0, seeker.samples)
     if not problem.decisions:
-        # what an engine that was found breaks is broken, whatever else is
-        return replace(best, bound=found.value, conflict=found.broken)
+        # an engine that was found is built, whatever else is: what it breaks is broken, and what it has is had
+        built = evaluated(problem.built(found.errors[0]), start, seeker.samples)
+        return replace(best, bound=objective_value(problem, finely(built)), conflict=found.broken)
     program, values, bound = _Program(problem, nothing), start, 0.0
     program.add([np.zeros(problem.tolerances.count)])
     samples, level, before, known = program.angles // COARSER, 0.0, math.inf, True
