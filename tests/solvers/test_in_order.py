@@ -16,6 +16,7 @@ import moving_masses as mm
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.numerics.spectrum import order_amplitude
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.sections import tables_of
 from laufruhe.solvers import solve
@@ -194,3 +195,28 @@ def test_a_trade_is_of_the_first_objective(tmp_path: Path) -> None:
     one, two = (trade(loaded(tmp_path, text)) for text in (TWO.replace(TWO[TWO.rindex("[[objective]]") :], ""), TWO))
     assert two.problem.ranks == ()
     assert two.optimum == pytest.approx(one.optimum, rel=1e-9)
+
+
+@pytest.mark.parametrize("samples", [48, 60, 72])
+def test_what_a_rank_gives_up_is_read_at_many_angles(samples: int) -> None:
+    """The last rank is proven at few angles, which misread the mean of the first by up to 0.3 %."""
+    problem = load(
+        {
+            "title": "single",
+            "engine": {
+                "layout": "inline", "cycle": "two-stroke", "stroke": "100 mm", "rod_ratio": 0.3,
+                "reciprocating_mass": "1 kg", "throws": [3],
+            },
+            "operating_points": [{"speed": "3000 rpm"}],
+            "counterweights": [{"name": "w", "x": "0 mm", "radius": "50 mm", "angle": 183,
+                                "mass": {"between": ["0 kg", "1 kg"]}}],
+            "fidelity": {"samples": samples},
+            "objective": [
+                {"minimise": "mean shaking force", "orders": [2], "within": 0.2},
+                {"minimise": "rms shaking force", "orders": [1]},
+            ],
+        }
+    )  # fmt: skip
+    result = solve(problem)
+    first = problem.ranks[0].terms[0].measure
+    assert result.ranks[0].final == pytest.approx(evaluate(problem, result.final.engine, 5760).value(first), rel=1e-5)

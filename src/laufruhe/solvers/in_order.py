@@ -17,7 +17,7 @@ from dataclasses import replace
 from functools import partial
 
 from laufruhe.numerics.budget import passed
-from laufruhe.problem.evaluation import Evaluation, objective_value
+from laufruhe.problem.evaluation import Evaluation, finely, objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
@@ -87,8 +87,10 @@ def _together(
     """The design of the last rank, and what was proven of each."""
     last = stages[-1]
     count = len(problem.limits)
+    # each stage had its own angles: what its design is worth to the others is read at many (P7)
+    final = finely(last.final)
     ranks = tuple(
-        _rank(stage, last.final, limit, last, k, count, designs)
+        _rank(stage, final, limit, last, k, count, designs)
         for k, (stage, limit, designs) in enumerate(zip(stages, held, equal, strict=True))
     )
     message = last.message
@@ -133,7 +135,7 @@ def _rank(
         lower_bound=certificate.lower_bound if certificate else 0.0,
         gap=certificate.gap if certificate else math.inf,
         proof=certificate.kind if certificate else Proof.NONE,
-        final=objective_value(stage.problem, final),
+        final=stage.objective.value if is_last else objective_value(stage.problem, final),
         limit=None if is_last else limit.maximum,
         price=math.nan if is_last else last.limits[count + k].shadow_price,
         designs=designs,
