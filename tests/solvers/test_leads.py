@@ -147,11 +147,13 @@ def test_the_angle_between_machines_is_the_least_of_a_scan(asked: str, tmp_path:
     result = solve(loaded(tmp_path, text))
     assert result.certificate is not None
     assert result.certificate.kind is Proof.GLOBAL
-    fixed = [loaded(tmp_path, turned(text, angle)) for angle in np.linspace(0.0, 354.0, 60)]
+    # at as many angles as it was told at
+    fine = result.problem.fidelity
+    fixed = [loaded(tmp_path, turned(text, angle)).at(fine) for angle in np.linspace(0.0, 354.0, 60)]
     least = min(objective_value(each, evaluate(each)) for each in fixed)
     value = objective_value(result.problem, result.final)
     assert result.certificate.lower_bound <= value <= least * (1.0 + 1e-6)
-    at_best = loaded(tmp_path, turned(text, float(np.degrees(result.decisions[0].value))))
+    at_best = loaded(tmp_path, turned(text, float(np.degrees(result.decisions[0].value)))).at(fine)
     assert objective_value(at_best, evaluate(at_best)) == pytest.approx(value, rel=1e-6)
 
 
