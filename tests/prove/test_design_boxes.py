@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import laufruhe
+from attack.families import objective
 from attack.families import problem as random_problem
 from lanes import first_fast
 from laufruhe.load_models.affine import AffineModel
@@ -18,7 +19,7 @@ from laufruhe.numerics.bernstein import coefficients, corners_of, mixed
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import TURNED
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import minorant
+from laufruhe.prove.certificate import lower_bound, minorant
 from laufruhe.prove.mounts.design_boxes import DesignBoxes, mixes_corners
 from laufruhe.prove.mounts.mount_loops import is_looped, mount_loop
 from laufruhe.prove.mounts.mounted_loads import MountedLoads
@@ -144,7 +145,7 @@ def test_multipliers_of_a_corner_say_the_same_of_other_mounts_as_rows_do(seed: i
     assert by_orders == pytest.approx(rows, rel=1e-9)
 
 
-@pytest.mark.parametrize("seed", first_fast(SEEDS, 2))
+@pytest.mark.parametrize("seed", first_fast(SEEDS[:6], 2))
 def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
     problem, generator = joint(seed), np.random.default_rng(seed)
     boxes, told = DesignBoxes(problem, math.inf, best_at, lambda *_: math.inf), 0
@@ -161,6 +162,44 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
                 if design is not None and design.excess <= 0.0:
                     assert bound <= design.value * (1.0 + 1e-7)
     assert told >= 2
+
+
+CROSSED = {
+    "loads of the block, and a mass": (
+        [("mean mount force", 1.0), ("rms shaking force", 0.2), ("added mass", 3.0)],
+        [("added mass", "1.5 kg"), ("maximum mount travel", "8 mm")],
+    ),
+    "several at two points": (
+        [("peak to peak mount travel", 2e4), ("worst mean mount force", 1.0), ("maximum mount force", 0.3)],
+        [("maximum rocking couple", "6000 N m"), ("rms mount travel", "6 mm")],
+    ),
+}
+
+
+@pytest.mark.parametrize(("kind", "seed"), first_fast([(kind, seed) for kind in CROSSED for seed in SEEDS[1:2]], 1))
+def test_what_is_asked_may_be_crossed(kind: str, seed: int) -> None:
+    table, rng = random_problem("joint", seed)
+    terms, limits = CROSSED[kind]
+    table["objective"] = objective([{"quantity": name, "weight": weight} for name, weight in terms])
+    table["constraints"] = [{"limit": name, "max": most} for name, most in limits]
+    first = table["operating_points"][0]
+    table["operating_points"] = [first, {"name": "faster", "speed": "160 rad/s", "weight": 0.7}]
+    problem = laufruhe.load(table)
+    assert mixes_corners(problem)
+    boxes, told = DesignBoxes(problem, math.inf, best_at, lambda *_: math.inf), 0
+    for lower, upper in boxes_of(problem, rng, 3, 0.05):
+        bound = float(boxes.bounds(lower[None], upper[None])[0][0])
+        for mounts in rng.uniform(lower, upper, (4, len(lower))):
+            at = boxes.loads.at(mounts)
+            columns, multipliers = best_at(at)
+            design = started_at(problem, (mounts.tolist(), columns))
+            if design is not None and design.excess <= 0.0:
+                told += bound > 0.5 * design.value
+                assert bound <= design.value * (1.0 + 1e-7)
+            # widened limits have multipliers too, which are so of any unbalances
+            u = np.concatenate([d.project(rng.normal(size=d.width) * d.scale) for d in at.domains])
+            assert lower_bound(at, multipliers).value <= at.objective(u) or at.excess(u) > 0.0
+    assert told
 
 
 @pytest.mark.parametrize("seed", first_fast(SEEDS[:4], 2))
@@ -183,7 +222,7 @@ def test_a_price_lifts_the_least_as_far_as_a_limit_allows() -> None:
     assert priced(values, [-np.abs(over)]).min() == 1.0
 
 
-@pytest.mark.parametrize("seed", first_fast((780003, 780018, 780014, 780004, 780005, 780017, 780000), 3))
+@pytest.mark.parametrize("seed", first_fast((780003, 780018, 780014, 780004, 780017), 3))
 def test_boxes_close_on_the_best_design(seed: int) -> None:
     problem = joint(seed)
     assert mixes_corners(problem)

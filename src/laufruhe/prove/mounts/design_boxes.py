@@ -21,7 +21,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.load_models.affine import FEASIBLE, AffineProblem
+from laufruhe.load_models.affine import FEASIBLE, MOST_NUMBERS, AffineProblem
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.bernstein import corners_of, mixed
 from laufruhe.problem.decision import sides_of
@@ -38,8 +38,12 @@ from laufruhe.prove.mounts.subdivision import EVEN
 
 MOST_OPEN = 5
 """Open numbers of mounts, whose corners and coefficients are 2 and 4 to their power."""
-MOST_CORNERS, MOST_BOXES = 1200, 2500
-"""Corners whose multipliers are sought, and boxes of three numbers or fewer."""
+MOST_CORNERS, ROWS = 1200, 7e6
+"""Corners whose multipliers are sought, and rows of all of them."""
+BOXES = 2
+"""Boxes of three numbers or fewer, for each corner."""
+FEW = 2
+"""Times as many corners as a box has are worth beginning with."""
 NO_PRICE = 1e-8
 """Of the objective, what all of a limit is worth that has no price."""
 
@@ -108,7 +112,15 @@ class DesignBoxes:
     def most_boxes(self) -> int:
         """As many as some tens of seconds allow."""
         asked = self.loads.problem.search.boxes
-        return MOST_BOXES // max(4 ** (len(self.lower) - 3), 1) if asked is None else asked
+        count = len(self.lower)
+        if self.most_corners < FEW * 2**count or self.loads.rows * self.loads.columns > MOST_NUMBERS:
+            return 0
+        return BOXES * self.most_corners // max(4 ** (count - 3), 1) if asked is None else asked
+
+    @property
+    def most_corners(self) -> int:
+        """As many as their rows allow."""
+        return int(min(MOST_CORNERS, ROWS / max(self.loads.rows, 1)))
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         """Least objective on every box, and the side worth halving."""
@@ -156,7 +168,7 @@ class DesignBoxes:
         if any(known) and not all(known):
             # multipliers of other mounts are enough where all designs are worse by far
             found = self._mixed(even, over, [each or _next(places, known, k) for k, each in enumerate(known)])
-            if found[0] >= self.value or len(self._corners) >= MOST_CORNERS:
+            if found[0] >= self.value or len(self._corners) >= self.most_corners:
                 return found
         bound, side = self._mixed(even, over, [self.corner(place) for place in places])
         return (bound, side) if found is None or bound >= found[0] else (found[0], side)
@@ -315,4 +327,7 @@ class _Designing(Bounded):
 def designed_bound(boxes: DesignBoxes, room: float) -> Divided:
     """Halve boxes of a problem that `mixes_corners`, until no design is more than `room` better than the best known."""
     division = _Designing(boxes, room)
-    return division.run(division.bounded([(boxes.lower, boxes.upper)])[0], boxes.most_boxes)
+    most = boxes.most_boxes
+    if not most:
+        return Divided(0.0, 0)
+    return division.run(division.bounded([(boxes.lower, boxes.upper)])[0], most)

@@ -90,6 +90,23 @@ class MountedLoads:
         self.root = mass_root(mounting_in(problem.engine).block)
         self._still: dict[Measure, AffineNorm] = {}
 
+    @property
+    def columns(self) -> int:
+        """Of the unbalances, and one for what is given, in three directions."""
+        return 3 * (1 + sum(domain.width for domain in self.domains))
+
+    @property
+    def rows(self) -> int:
+        """Of all that is asked on mounts."""
+        asked = self.problem
+        measures = [*(t.measure for t in asked.load_terms), *(limit.measure for limit in asked.load_limits)]
+        places = [mount.name for mount in self.problem.engine.mounts]
+        return sum(
+            self.samples * len(measure.places(places)) * int(np.count_nonzero(measure.shares(self.problem.points)))
+            for measure in measures
+            if measure.on_mounts
+        )
+
     @cached_property
     def orders(self) -> Orders:
         """Those that are loaded."""
@@ -192,11 +209,11 @@ def coarser(problem: AffineProblem, times: int) -> AffineProblem:
     """The same at every so many of its samples."""
 
     def fewer(norm: AffineNorm) -> AffineNorm:
-        steps = norm.grid.steps - norm.grid.bends
-        if times == 1 or steps % times or norm.grid.bends:
+        # masses have no samples, and few have none to spare
+        if norm.grid.steps != problem.samples or problem.samples % times:
             return norm
         kept = np.arange(0, len(norm.grid.weights), times)
-        grid = replace(norm.grid, weights=norm.grid.weights[kept] * times, steps=steps // times)
+        grid = replace(norm.grid, weights=norm.grid.weights[kept] * times, steps=norm.grid.steps // times)
         return replace(norm, constant=norm.constant[kept], slope=norm.slope[kept], grid=grid)
 
     terms, limits = (tuple((number, fewer(norm)) for number, norm in each) for each in (problem.terms, problem.limits))

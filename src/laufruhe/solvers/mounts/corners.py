@@ -14,8 +14,8 @@ from laufruhe.prove.mounts.mounted_loads import coarser
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import on_grid
 
-TIMES = (8, 2, 1)
-"""Times as few samples, in the order in which they are tried."""
+ROWS, LEAST_SAMPLES = (1000, 3000), 24
+"""Rows of all norms at fewer samples, in the order in which they are tried; and samples that are left at the least."""
 ENOUGH = 1e-5
 """Gap with which multipliers of a corner are good enough."""
 ROOM = 0.02
@@ -37,7 +37,7 @@ def best_at(problem: AffineProblem) -> tuple[Array, Multipliers]:
 def _wider(problem: AffineProblem) -> tuple[tuple[float, AffineNorm], ...]:
     """Limits that some unbalances keep with room, so that their prices stay small."""
     shares = tuple((1.0 / most, norm) for most, norm in problem.limits)
-    coarse = coarser(replace(problem, terms=shares, limits=(), groups=tuple(range(len(shares)))), TIMES[0])
+    coarse = coarser(replace(problem, terms=shares, limits=(), groups=tuple(range(len(shares)))), _times(problem)[0])
     x = solve_cones(coarse).x
     times = ROOM + max(weight * norm.value(problem.start if x is None else x) for weight, norm in shares)
     return tuple((times * most, norm) for most, norm in problem.limits)
@@ -46,17 +46,25 @@ def _wider(problem: AffineProblem) -> tuple[tuple[float, AffineNorm], ...]:
 def _best(problem: AffineProblem) -> tuple[Array | None, Bound]:
     """Best unbalances, none where the limits are not kept, and their bound."""
     x, best = None, lower_bound(problem, _none(problem))
-    for times in TIMES:
+    for times in _times(problem):
         coarse = coarser(problem, times)
         found = solve_cones(coarse)
         if found.x is None:
             return None, best
         x, best = found.x, best_bound(problem, found.x, on_grid(coarse, problem, found.multipliers))
-        if times > 1 and any(norm.norm.is_largest for _, norm in problem.terms):
+        if times > 1 and _few_count(problem):
             x, best = _peaks(problem, x, best)
         if problem.objective(x) - best.value <= ENOUGH * best.value:
             break
     return x, best
+
+
+def _times(problem: AffineProblem) -> list[int]:
+    """How many times as few samples are tried, most first: cones of all would take longer than many corners."""
+    rows = sum(len(norm.grid.weights) for _, norm in (*problem.terms, *problem.limits))
+    whole = [k for k in range(1, problem.samples // LEAST_SAMPLES + 1) if problem.samples % k == 0] or [1]
+    found = {min((k for k in whole if rows <= most * k), default=whole[-1]) for most in ROWS}
+    return sorted(found, reverse=True)
 
 
 def _none(problem: AffineProblem) -> Multipliers:
@@ -67,14 +75,17 @@ def _none(problem: AffineProblem) -> Multipliers:
     return Multipliers(terms, limits)
 
 
+def _few_count(problem: AffineProblem) -> bool:
+    """Whether all but few rows have no part in the objective, and limits have few."""
+    whole = sum(len(norm.grid.weights) for _, norm in problem.limits)
+    return all(norm.norm.is_largest for _, norm in problem.terms) and whole <= ROWS[-1]
+
+
 def _peaks(problem: AffineProblem, x: Array, best: Bound) -> tuple[Array, Bound]:
     """The same at all samples, by rows alone that come near the peaks: the others have no part in them (P10)."""
     kept = [np.zeros(0, dtype=np.intp) for _ in problem.terms]
     for _ in range(ROUNDS):
-        kept = [
-            np.union1d(rows, _near(norm, x)) if norm.norm.is_largest else np.arange(len(norm.grid.weights))
-            for rows, (_, norm) in zip(kept, problem.terms, strict=True)
-        ]
+        kept = [np.union1d(rows, _near(norm, x)) for rows, (_, norm) in zip(kept, problem.terms, strict=True)]
         few = [(weight, _rows_of(norm, rows)) for rows, (weight, norm) in zip(kept, problem.terms, strict=True)]
         found = solve_cones(replace(problem, terms=tuple(few)))
         if found.x is None:
