@@ -175,10 +175,8 @@ class DesignBoxes:
 
     def _mixed(self, even: _Even, over: list[Array], corners: Sequence[Corner]) -> tuple[float, int]:
         """Bound by multipliers of all corners, and the side that takes most of it."""
-        orders = self.loads.orders
         near = np.mean([corner.columns for corner in corners], axis=0)
-        still = orders.loads[:, :1] + np.einsum("q,wqi->wi", near, orders.loads[:, 1:])[:, None]
-        met = _Met(even, np.concatenate([still, orders.loads[:, 1:]], axis=1))
+        met = self._met(even, near)
         ends = np.array([d.ends for d in self.loads.domains for _ in range(d.width)]).reshape(-1, 2)
         reach = np.append(1.0, np.abs(ends - near[:, None]).max(axis=1))
         told, rests = zip(*(self._told(corner.pairing, met, near) for corner in corners), strict=True)
@@ -186,11 +184,23 @@ class DesignBoxes:
         if not np.isfinite(rest).all():
             return 0.0, int(np.argmax(even.pull(np.ones_like(self._felt))))
         mixes = np.einsum("vkp,kcp->vc", mixed(even.count), np.array(told), optimize=True)
-        least = np.array([line[0] + self._least(line[1:], near) for line in mixes])
+        least = np.array([line[0] + self.least(line[1:], near) for line in mixes])
         # shares of corners add up to one, so that no more is left than of the worst
         least = priced(least, over) - rest.sum(axis=1).max()
         pull = _bent(least.reshape((4,) * even.count)) + even.shares.T @ rest[rest.sum(axis=1).argmax()]
         return max(float(least.min()), 0.0), int(np.argmax(pull))
+
+    def said(self, pairing: Pairing, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
+        """Of a corner in a box about its unbalances: these, and what `_told` gives."""
+        loop = mount_loop(self.loads.problem, self.loads.orders.omegas, lower, upper)
+        near = self.corner(lower).columns
+        return near, *self._told(pairing, self._met(_Even.of(loop, len(lower)), near), near)
+
+    def _met(self, even: _Even, near: Array) -> _Met:
+        """What loads of unbalances about these meet."""
+        orders = self.loads.orders
+        still = orders.loads[:, :1] + np.einsum("q,wqi->wi", near, orders.loads[:, 1:])[:, None]
+        return _Met(even, np.concatenate([still, orders.loads[:, 1:]], axis=1))
 
     def _told(self, pairing: Pairing | None, met: _Met, near: Array) -> tuple[Array, Array]:
         """By (1, s, s s') and columns what multipliers say, (1 + columns, p); and the rest, (w, 1 + columns)."""
@@ -204,8 +214,8 @@ class DesignBoxes:
                 found, rest = found + own, rest + left
         return found, rest
 
-    def _least(self, slopes: Array, near: Array) -> float:
-        """min g . (u - near) over the sets."""
+    def least(self, slopes: Array, near: Array) -> float:
+        """min g . (u - near) over the sets of unbalances."""
         return float(sum(domain.least(slopes) for domain in self.loads.domains) - slopes @ near)
 
 
