@@ -40,8 +40,10 @@ MOST_OPEN = 5
 """Open numbers of mounts, whose corners and coefficients are 2 and 4 to their power."""
 MOST_CORNERS, ROWS = 1200, 7e6
 """Corners whose multipliers are sought, and rows of all of them."""
-BOXES = 2
+BOXES = 4
 """Boxes of three numbers or fewer, for each corner."""
+WORTH = 0.7
+"""Of a gain, under which the series of an order ends soon enough for multipliers to tell anything."""
 FEW = 2
 """Times as many corners as a box has are worth beginning with."""
 NO_PRICE = 1e-8
@@ -159,16 +161,18 @@ class DesignBoxes:
             return math.inf, 0
         loop = mount_loop(self.loads.problem, self.loads.orders.omegas, lower, upper)
         even = _Even.of(loop, len(lower))
-        if not even.ends[self._felt].all():
-            # nothing is known before the series of all orders end
+        if not (even.most[self._felt] < WORTH).all():
+            # little is known before the series of all orders end
             return 0.0, int(np.argmax(even.pull(self._felt) + EVEN * (upper - lower) / (self.upper - self.lower)))
         places = [np.where(end < 0.0, lower, upper) for end in corners_of(len(lower))]
         known = [self._corners.get(tuple(place.tolist())) for place in places]
-        found = None
+        found, is_over = None, len(self._corners) >= self.most_corners
+        if is_over and not any(known):
+            return 0.0, int(np.argmax((upper - lower) / (self.upper - self.lower)))
         if any(known) and not all(known):
             # multipliers of other mounts are enough where all designs are worse by far
             found = self._mixed(even, over, [each or _next(places, known, k) for k, each in enumerate(known)])
-            if found[0] >= self.value or len(self._corners) >= self.most_corners:
+            if found[0] >= self.value or is_over:
                 return found
         bound, side = self._mixed(even, over, [self.corner(place) for place in places])
         return (bound, side) if found is None or bound >= found[0] else (found[0], side)
@@ -274,7 +278,7 @@ class _Even:
 
     def pull(self, felt: Mask) -> Array:
         """By how much each number keeps the series of these orders from ending, (n,)."""
-        return np.asarray(self.sizes[felt & ~self.ends].max(axis=0, initial=0.0))
+        return np.asarray(self.sizes[felt & ~(self.most < WORTH)].max(axis=0, initial=0.0))
 
 
 class _Met:

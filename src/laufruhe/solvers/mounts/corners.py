@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ import numpy as np
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.numerics.norms import Grid, lengths
-from laufruhe.prove.certificate import Bound, Multipliers, best_bound, lower_bound
+from laufruhe.prove.certificate import Bound, Multipliers, best_bound, lower_bound, spread
 from laufruhe.prove.mounts.mounted_loads import coarser
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import on_grid
@@ -18,8 +19,8 @@ ROWS, LEAST_SAMPLES = (1000, 3000), 24
 """Rows of all norms at fewer samples, in the order in which they are tried; and samples that are left at the least."""
 ENOUGH = 1e-5
 """Gap with which multipliers of a corner are good enough."""
-ROOM = 0.02
-"""Share of a limit by which it is wider than any unbalances need it."""
+ROOM, STEEPEST = 0.02, 20.0
+"""Share of a limit by which it is wider than any unbalances need it; what all of a limit is worth that none keep."""
 NEAR, ROUNDS = 0.98, 3
 """Share of a peak from which rows may become one, and how often such rows are chosen."""
 
@@ -29,9 +30,12 @@ def best_at(problem: AffineProblem) -> tuple[Array, Multipliers]:
     x, best = _best(problem)
     if x is not None:
         return x, best.multipliers
+    against = best.multipliers.limits
     if all(most > 0.0 for most, _ in problem.limits):
         x, best = _best(replace(problem, limits=_wider(problem)))
-    return problem.start if x is None else x, best.multipliers
+    if x is None:
+        return problem.start, best.multipliers
+    return x, _with(problem, best.multipliers, against, problem.objective(x))
 
 
 def _wider(problem: AffineProblem) -> tuple[tuple[float, AffineNorm], ...]:
@@ -50,13 +54,26 @@ def _best(problem: AffineProblem) -> tuple[Array | None, Bound]:
         coarse = coarser(problem, times)
         found = solve_cones(coarse)
         if found.x is None:
-            return None, best
+            limits = spread(problem, on_grid(coarse, problem, replace(found.multipliers, terms=()))).limits
+            return None, replace(best, multipliers=replace(best.multipliers, limits=limits))
         x, best = found.x, best_bound(problem, found.x, on_grid(coarse, problem, found.multipliers))
         if times > 1 and _few_count(problem):
             x, best = _peaks(problem, x, best)
         if problem.objective(x) - best.value <= ENOUGH * best.value:
             break
     return x, best
+
+
+def _with(problem: AffineProblem, found: Multipliers, against: Sequence[Array], value: float) -> Multipliers:
+    """Multipliers with as much of those by which limits contradict each other as makes such mounts bad designs."""
+    proof = lower_bound(replace(problem, terms=()), Multipliers((), tuple(against)))
+    prices = proof.multipliers.shadow_prices(problem)
+    whole = sum(price * most for price, (most, _) in zip(prices, problem.limits, strict=True))
+    if not proof.value > 0.0:
+        return found
+    times = min(value / proof.value, STEEPEST * value / whole)
+    rows = zip(found.limits, proof.multipliers.limits, strict=True)
+    return replace(found, limits=tuple(z + times * other for z, other in rows))
 
 
 def _times(problem: AffineProblem) -> list[int]:
