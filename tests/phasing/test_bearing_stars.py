@@ -163,7 +163,8 @@ def test_two_rods_on_a_pin_are_decided_order_by_order() -> None:
         assert star.order_count == 4
         for order in star.firing_orders:
             fired = {**given, "throws": throws, "firing_order": list(order.order)}
-            one = laufruhe.solve(problem_of({**without, "engine": fired}))
+            # at as many angles as the whole was told at
+            one = laufruhe.solve(problem_of({**without, "engine": fired}).at(result.problem.fidelity))
             values[order.order] = one.final.value(one.problem.objective[0].measure)
     assert len(values) == 8
     assert result.objective.value == pytest.approx(min(values.values()), rel=1e-9)
