@@ -157,15 +157,26 @@ def series(
     moved = np.matmul(inverse, np.matmul(columns[:, None], inside))
     gain = np.matmul(np.swapaxes(columns, -2, -1)[:, None], moved)
     met = np.matmul(motion[..., None, :], columns[:, None])[..., 0, :]
+    balance, even, most = balanced(gain)
+    rest = rest_of(even, most, np.abs(met) * balance)
+    return Expansion(centres, halves, sides, motion, moved, gain, met, balance, rest)
+
+
+def balanced(gain: Any) -> tuple[Array, ComplexArray, Array]:
+    """T with which what goes through a channel is about what comes back, T G T^-1, and what its norm is not over."""
     heights, widths = np.linalg.norm(gain, axis=-1), np.linalg.norm(gain, axis=-2)
-    balanced = (heights > 0.0) & (widths > 0.0)
-    balance = np.sqrt(np.where(balanced, widths, 1.0) / np.where(balanced, heights, 1.0))
+    met = (heights > 0.0) & (widths > 0.0)
+    balance = np.sqrt(np.where(met, widths, 1.0) / np.where(met, heights, 1.0))
     even = gain * (balance[..., None] / balance[..., None, :])
-    most, hit = norm_over(even), np.abs(met) * balance
+    return balance, even, norm_over(even)
+
+
+def rest_of(even: ComplexArray, most: Array, hit: Array) -> Array:
+    """Bound of g / (1 - g) |T G S z0| from |T z0|, (..., m) to (...); infinite where the series need not end."""
     second = np.minimum((np.linalg.norm(even, axis=-2) * hit).sum(axis=-1), most * np.linalg.norm(hit, axis=-1))
     share = np.where(most < 1.0, most / np.where(most < 1.0, 1.0 - most, 1.0), np.inf)
-    rest = np.where(second > 0.0, share * np.where(second > 0.0, second, 1.0), np.where(most < 1.0, 0.0, np.inf))
-    return Expansion(centres, halves, sides, motion, moved, gain, met, balance, rest)
+    rest = share * np.where(second > 0.0, second, 1.0)
+    return np.asarray(np.where(second > 0.0, rest, np.where(most < 1.0, 0.0, np.inf)))
 
 
 def mapped(at: Expansion, value: Any, turned: Any = None) -> Answer:

@@ -30,7 +30,7 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import NEARLY, Bounded, Box, Divided
 from laufruhe.prove.certificate import Multipliers
-from laufruhe.prove.mounts.box_series import norm_over
+from laufruhe.prove.mounts.box_series import balanced, rest_of
 from laufruhe.prove.mounts.mount_loops import Loop, is_looped, mount_loop
 from laufruhe.prove.mounts.mounted_loads import MountedLoads, Pairing
 from laufruhe.prove.mounts.rest_limits import RestLimits, priced
@@ -248,21 +248,12 @@ class _Even:
     @classmethod
     def of(cls, loop: Loop, count: int) -> _Even:
         """Of a loop."""
-        heights, widths = np.linalg.norm(loop.gain, axis=-1), np.linalg.norm(loop.gain, axis=-2)
-        balanced = (heights > 0.0) & (widths > 0.0)
-        balance = np.sqrt(np.where(balanced, widths, 1.0) / np.where(balanced, heights, 1.0))
-        gain = loop.gain * (balance[..., None] / balance[:, None, :])
-        return cls(loop, count, balance, gain, norm_over(gain))
+        return cls(loop, count, *balanced(loop.gain))
 
     @property
     def own(self) -> Array:
         """One where a channel is of a number, shape (m, n)."""
         return np.asarray((self.loop.own[:, None] == np.arange(self.count)).astype(float))
-
-    @property
-    def ends(self) -> Mask:
-        """Whether the series of an order ends all over the box, shape (w,)."""
-        return np.asarray(self.most < 1.0)
 
     @property
     def sizes(self) -> Array:
@@ -288,10 +279,8 @@ class _Met:
         self.loop, self.loads, self.count, self._own = even.loop, loads, even.count, even.own
         self._met, self._balance = np.einsum("wmi,wci->wcm", self.loop.met, loads, optimize=True), even.balance
         hit = np.abs(self._met) * even.balance[:, None]
-        columns, rows = np.linalg.norm(even.gain, axis=-2), np.linalg.norm(hit, axis=-1)
-        second = np.minimum(np.einsum("wm,wcm->wc", columns, hit), even.most[:, None] * rows)
-        share = np.where(even.ends, even.most / (1.0 - even.most), np.inf)
-        self._rest = np.where(second > 0.0, share[:, None] * second, 0.0)
+        # what a column does not load stays at rest
+        self._rest = np.where(hit.any(axis=-1), rest_of(even.gain[:, None], even.most[:, None], hit), 0.0)
 
     def of(self, duals: ComplexArray, maps: tuple[ComplexArray, ComplexArray]) -> tuple[Array, Array]:
         """Sums over orders of Z* f: by (1, s, s s') and columns, and what the rest of orders and columns may add."""
