@@ -185,7 +185,7 @@ class DesignBoxes:
         reach = np.append(1.0, np.abs(ends - near[:, None]).max(axis=1))
         told, rests = zip(*(self._told(corner.pairing, met, near) for corner in corners), strict=True)
         rest = np.array(rests) @ reach
-        if not np.isfinite(rest).all():
+        if not (np.isfinite(rest).all() and np.isfinite(told).all()):
             return 0.0, int(np.argmax(even.pull(np.ones_like(self._felt))))
         mixes = np.einsum("vkp,kcp->vc", mixed(even.count), np.array(told), optimize=True)
         least = np.array([line[0] + self.least(line[1:], near) for line in mixes])
