@@ -277,6 +277,15 @@ def common_base(orders: Sequence[Fraction]) -> Fraction:
     return reduce(_common, orders)
 
 
+def in_one_base(spectra: Sequence[Spectrum], *bases: Fraction) -> tuple[Fraction, NDArray[np.complex128]]:
+    """The lowest order of spectra, and of `bases`, and the coefficients counted in it, shape (spectra, n, ...)."""
+    base = common_base([*bases, *(spectrum.base for spectrum in spectra)])
+    series = [spectrum.rebased(base).coefficients for spectrum in spectra]
+    whole = max(map(len, series))
+    sides = ((0, 0),) * (series[0].ndim - 1)
+    return base, np.array([np.pad(part, ((0, whole - len(part)), *sides)) for part in series])
+
+
 def base_of(orders: Sequence[float]) -> Fraction:
     """The largest lowest order of those that turn; one where none does."""
     return common_base([as_order(order) for order in orders if order > 0.0] or [Fraction(1)])

@@ -14,7 +14,7 @@ import numpy as np
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 from laufruhe.numerics.namespaces import NUMBERS
-from laufruhe.numerics.spectrum import Spectrum, common_base
+from laufruhe.numerics.spectrum import Spectrum, in_one_base
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem.channels import mounting_in
@@ -113,10 +113,8 @@ class MountedLoads:
         moved = moved_wrench(NUMBERS, mounting_in(self.problem.engine).block.centre_of_gravity).T @ self.root.T
         found: list[tuple[int, int, float, float, ComplexArray]] = []
         for p, (point, (bare, slopes)) in enumerate(zip(self.problem.points, self._model.wrenches(), strict=True)):
-            base = common_base([bare.base, *(slope.base for slope in slopes)])
-            series = [each.rebased(base).coefficients for each in (bare, *slopes)]
-            whole = max(map(len, series))
-            loads = np.array([np.pad(part, ((0, whole - len(part)), (0, 0))) for part in series]) @ moved
+            base, series = in_one_base([bare, *slopes])
+            loads = series @ moved
             size = np.abs(loads).max(axis=(0, 2), initial=0.0)
             for k in np.flatnonzero(size > NOTHING * size.max(initial=0.0)):
                 number, place = float(k) * float(base), int(k) * base / self._model.base

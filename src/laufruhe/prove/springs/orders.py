@@ -11,7 +11,7 @@ import numpy as np
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.namespaces import NUMBERS
-from laufruhe.numerics.spectrum import common_base
+from laufruhe.numerics.spectrum import in_one_base
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, over
@@ -144,11 +144,9 @@ def asked(
     for p, (point, (bare, slopes)) in enumerate(zip(problem.points, model.wrenches(), strict=True)):
         if shares[p] == 0.0:
             continue
-        felt, step = selected(measure, signals[p], near.engine).coefficients, common_base([base, bare.base])
-        step = common_base([step, *(slope.base for slope in slopes)])
-        series = [spectrum.rebased(step).coefficients for spectrum in (bare, *slopes)]
-        whole = max(map(len, series))
-        loads = np.array([np.pad(part, ((0, whole - len(part)), (0, 0))) for part in series]) @ moved.T
+        felt = selected(measure, signals[p], near.engine).coefficients
+        step, series = in_one_base([bare, *slopes], base)
+        loads, whole = series @ moved.T, series.shape[1]
         loads[0] += np.einsum("q,qki->ki", columns[1], loads[1:])
         loads[1:] = np.einsum("cq,qki->cki", columns[0].of_domains, loads[1:])
         size = np.abs(loads @ parts[0].root.T).sum(axis=0).max(axis=1)

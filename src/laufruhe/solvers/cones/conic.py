@@ -77,11 +77,11 @@ def _by_few_rows(problem: AffineProblem, held: tuple[Array, Array] | None) -> Co
     """
     peaks = [norm.norm.is_largest and len(norm.grid.weights) > FEW_ROWS for _, norm in problem.limits]
     kept = [
-        np.union1d(0, _near(most, norm, problem.start, NEAR_LIMIT)) if peak else np.arange(len(norm.grid.weights))
+        np.union1d(0, rows_near(most, norm, problem.start, NEAR_LIMIT)) if peak else np.arange(len(norm.grid.weights))
         for peak, (most, norm) in zip(peaks, problem.limits, strict=True)
     ]
     for _ in range(ROUNDS if any(peaks) else 0):
-        limits = [(maximum, _rows_of(norm, rows)) for (maximum, norm), rows in zip(problem.limits, kept, strict=True)]
+        limits = [(maximum, rows_of(norm, rows)) for (maximum, norm), rows in zip(problem.limits, kept, strict=True)]
         found = _solved(replace(problem, limits=tuple(limits)), held)
         whole = [np.zeros_like(norm.constant) for _, norm in problem.limits]
         for z, rows, own in zip(whole, kept, found.multipliers.limits, strict=False):
@@ -89,20 +89,20 @@ def _by_few_rows(problem: AffineProblem, held: tuple[Array, Array] | None) -> Co
         found = replace(found, multipliers=replace(found.multipliers, limits=tuple(whole)))
         if found.x is None:
             return found
-        broken = [_near(maximum, norm, found.x, 1.0 + FEASIBLE) for maximum, norm in problem.limits]
+        broken = [rows_near(maximum, norm, found.x, 1.0 + FEASIBLE) for maximum, norm in problem.limits]
         if all(np.isin(over, rows).all() for over, rows in zip(broken, kept, strict=True)):
             return found
-        near = [_near(maximum, norm, found.x, NEAR_LIMIT) for maximum, norm in problem.limits]
+        near = [rows_near(maximum, norm, found.x, NEAR_LIMIT) for maximum, norm in problem.limits]
         kept = [np.union1d(rows, more) if peak else rows for peak, rows, more in zip(peaks, kept, near, strict=True)]
     return _solved(problem, held)
 
 
-def _near(maximum: float, norm: AffineNorm, x: Array, share: float) -> NDArray[np.intp]:
-    """Rows that are longer than a share of a limit."""
+def rows_near(maximum: float, norm: AffineNorm, x: Array, share: float) -> NDArray[np.intp]:
+    """Rows that are longer than a share of a limit, or of a peak."""
     return np.flatnonzero(lengths(norm.rows(x)) > share * maximum)
 
 
-def _rows_of(norm: AffineNorm, rows: NDArray[np.intp]) -> AffineNorm:
+def rows_of(norm: AffineNorm, rows: NDArray[np.intp]) -> AffineNorm:
     """Some of its rows."""
     return replace(
         norm, constant=norm.constant[rows], slope=norm.slope[rows], grid=Grid(norm.grid.weights[rows], len(rows))

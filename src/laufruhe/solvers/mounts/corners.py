@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
-from laufruhe.numerics.arrays import Array, Indices
-from laufruhe.numerics.norms import Grid, lengths
+from laufruhe.numerics.arrays import Array
 from laufruhe.prove.certificate import Bound, Multipliers, best_bound, lower_bound, spread
 from laufruhe.prove.mounts.mounted_loads import coarser
-from laufruhe.solvers.cones.conic import solve_cones
+from laufruhe.solvers.cones.conic import rows_near, rows_of, solve_cones
 from laufruhe.solvers.cones.equations import on_grid
 
 ROWS, LEAST_SAMPLES = (1000, 3000), 24
@@ -102,8 +101,11 @@ def _peaks(problem: AffineProblem, x: Array, best: Bound) -> tuple[Array, Bound]
     """The same at all samples, by rows alone that come near the peaks: the others have no part in them (P10)."""
     kept = [np.zeros(0, dtype=np.intp) for _ in problem.terms]
     for _ in range(ROUNDS):
-        kept = [np.union1d(rows, _near(norm, x)) for rows, (_, norm) in zip(kept, problem.terms, strict=True)]
-        few = [(weight, _rows_of(norm, rows)) for rows, (weight, norm) in zip(kept, problem.terms, strict=True)]
+        kept = [
+            np.union1d(rows, rows_near(norm.value(x), norm, x, NEAR))
+            for rows, (_, norm) in zip(kept, problem.terms, strict=True)
+        ]
+        few = [(weight, rows_of(norm, rows)) for rows, (weight, norm) in zip(kept, problem.terms, strict=True)]
         found = solve_cones(replace(problem, terms=tuple(few)))
         if found.x is None:
             break
@@ -117,14 +119,3 @@ def _peaks(problem: AffineProblem, x: Array, best: Bound) -> tuple[Array, Bound]
             break
         x = found.x
     return x, best
-
-
-def _near(norm: AffineNorm, x: Array) -> Indices:
-    """Rows that come near the peak."""
-    size = lengths(norm.rows(x))
-    return np.flatnonzero(size >= NEAR * size.max())
-
-
-def _rows_of(norm: AffineNorm, rows: Indices) -> AffineNorm:
-    grid = Grid(norm.grid.weights[rows], len(rows))
-    return replace(norm, constant=norm.constant[rows], slope=norm.slope[rows], grid=grid)
