@@ -1,4 +1,4 @@
-"""What the source is made of, measured on its syntax: lengths, imports, circles, chains of questions.
+"""What the source is made of, measured on its syntax: imports, circles, chains of questions.
 
 Every measure is a set of names of what breaks a rule. `python tests/structure/source_shape.py` prints them, and
 with `--prune` takes out of `exceptions.toml` what no longer breaks its rule (it never adds one).
@@ -15,8 +15,6 @@ from pathlib import Path
 SOURCE = Path(__file__).parents[2] / "src"
 EXCEPTIONS = Path(__file__).with_name("exceptions.toml")
 ROOT = "laufruhe"
-FILE_LINES = 350
-FUNCTION_LINES = 45
 # Libraries that cost tens of milliseconds to load, and modules that load one, may be imported where they are
 # needed. The commands may import anything late, so that `--help` answers at once, and so may the package itself.
 HEAVY = {
@@ -157,20 +155,6 @@ def circles(graph: dict[str, set[str]]) -> list[set[str]]:
     return [component for component in sets if len(component) > 1]
 
 
-def long_files() -> set[str]:
-    lengths = {path: path.read_text(encoding="utf-8").count("\n") for path in SOURCE.rglob("*.py")}
-    return {module_name(path) for path, lines in lengths.items() if lines > FILE_LINES}
-
-
-def long_functions(known: Trees) -> set[str]:
-    return {
-        f"{module}.{name}"
-        for module, tree in known.items()
-        for name, node in functions(tree)
-        if (node.end_lineno or node.lineno) - node.lineno + 1 > FUNCTION_LINES
-    }
-
-
 def loading(known: Trees) -> set[str]:
     """Modules that load a heavy library when they are imported, by themselves or by what they import."""
     top = {
@@ -251,8 +235,6 @@ def measured() -> dict[str, set[str]]:
     """What breaks each rule today."""
     known = trees()
     return {
-        "long_files": long_files(),
-        "long_functions": long_functions(known),
         "late_imports": late_imports(known),
         "circles": {module for circle in circles(own_imports(known)) for module in circle},
         "questions_of_norm": questions_of(known, NORMS),
