@@ -14,12 +14,12 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import CRANKSHAFT, Cycle, Engine, OperatingPoint, SliderCrank, Torsion
+from laufruhe.machine import CRANKSHAFT, Absorber, Cycle, Engine, OperatingPoint, SliderCrank, Torsion
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.numerics.turns import as_turn, phasors
@@ -31,6 +31,72 @@ Factors: TypeAlias = Callable[[Torsion, Array, float], ComplexArray]
 
 _SINGULAR = 1e-13
 _FREE = 1e-9
+_NONE = 1e-13
+
+
+class Resonance(Protocol):
+    """A speed or an order that natural modes are of."""
+
+    def numbers(self, chain: Torsion) -> Array:
+        """Return a number of every mode, rising, shape (modes,)."""
+
+    def inertia(self, chain: Torsion) -> Array:
+        """Return the inertia of discs and rings [kg m2], shape (discs and rings, discs and rings)."""
+
+    def share(self, absorber: Absorber) -> float | None:
+        """Return the inertia that a disc feels of one of its ring, None where it is no constant."""
+
+
+@dataclass(frozen=True)
+class AtSpeed:
+    """Natural frequencies [Hz] about a speed [rad/s], which is the spring of a pendulum (V4, V11)."""
+
+    speed: float
+
+    def modes(self, chain: Torsion) -> TorsionalModes:
+        """Return them."""
+        return _modes(chain, self.inertia(chain), [absorber.stiffness_at(self.speed) for absorber in chain.absorbers])
+
+    def numbers(self, chain: Torsion) -> Array:
+        """Return the natural frequencies [Hz]."""
+        return self.modes(chain).frequencies
+
+    def inertia(self, chain: Torsion) -> Array:
+        """Return each its own [kg m2]."""
+        return np.diag(inertias(chain))
+
+    def share(self, absorber: Absorber) -> float | None:
+        """Return one; a pendulum has a spring that grows with its inertia."""
+        return None if absorber.order else 1.0
+
+
+@dataclass(frozen=True)
+class InOrder:
+    """Speeds [rad/s] at which an order meets a natural mode: a pendulum is an inertia J / (1 - h^2/n^2) (V15)."""
+
+    order: float
+
+    def modes(self, chain: Torsion) -> TorsionalModes:
+        """Return the modes met."""
+        return _modes(chain, self.inertia(chain), [absorber.stiffness for absorber in chain.absorbers])
+
+    def numbers(self, chain: Torsion) -> Array:
+        """Return the critical speeds [rad/s] (V6)."""
+        return np.asarray(math.tau * self.modes(chain).frequencies / self.order)
+
+    def inertia(self, chain: Torsion) -> Array:
+        """Return J - (n/h)^2 J of a pendulum between its ring and its disc [kg m2] (V15)."""
+        pulls = [(chain.index(a.on), k, complex(a.inertia * (a.order / self.order) ** 2)) for k, a in _rings(chain)]
+        return np.asarray(np.diag(inertias(chain)) - _linked(chain, pulls).real)
+
+    def share(self, absorber: Absorber) -> float | None:
+        """Return 1 / (1 - h^2/n^2) of a pendulum, nothing where its disc stands still."""
+        if not absorber.order:
+            return 1.0
+        if absorber.stiffness:
+            return None
+        rest = 1.0 - (self.order / absorber.order) ** 2
+        return 1.0 / rest if rest else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,20 +119,40 @@ class TorsionalModes:
 
 
 def natural_modes(chain: Torsion, speed: float = 0.0) -> TorsionalModes:
-    """Of the undamped chain with its rings; a pendulum's is that of a speed [rad/s] (V4)."""
-    inertia, stiffness = inertias(chain), _stiffness(chain, speed).real
-    root = np.sqrt(inertia)
-    squares, shapes = np.linalg.eigh(stiffness / np.outer(root, root))
-    shapes = shapes / root[:, None]
-    # one rigid turn, and one more for each ring that nothing but a fluid holds
-    free = 1 + sum(absorber.stiffness_at(speed) == 0.0 for absorber in chain.absorbers)
-    squares, shapes = squares[free:], shapes[:, free:]
+    """Return the undamped modes about a speed [rad/s], which is the spring of a pendulum (V4)."""
+    return AtSpeed(speed).modes(chain)
+
+
+def critical_modes(chain: Torsion, order: float) -> TorsionalModes:
+    """Return the undamped modes that an order meets, each at its own speed (V15)."""
+    return InOrder(order).modes(chain)
+
+
+def _modes(chain: Torsion, inertia: Array, held: Sequence[float]) -> TorsionalModes:
+    """Solve K q = (2 pi f)^2 J q for the twists of all links, of which some have no stiffness (V4)."""
+    ends = [(k, k + 1) for k in range(len(chain.sections))] + [(chain.index(a.on), k) for k, a in _rings(chain)]
+    stiff = np.array([*(section.stiffness for section in chain.sections), *held])
+    twists = np.zeros((len(ends) + 1, len(inertia)))
+    for row, (a, b) in zip(twists, ends, strict=False):
+        row[a], row[b] = 1.0, -1.0
+    # nothing outside turns it: links pull nothing on the whole
+    twists[-1] = inertia.sum(axis=0)
+    angles = np.linalg.inv(twists)[:, :-1]
+    mass, stands = angles.T @ inertia @ angles, stiff > 0.0
+    # a link without stiffness twists until it carries no torque
+    loose = np.linalg.solve(mass[np.ix_(~stands, ~stands)], mass[np.ix_(~stands, stands)])
+    root = np.sqrt(stiff[stands])
+    own = mass[np.ix_(stands, stands)] - mass[np.ix_(stands, ~stands)] @ loose
+    inverse, shapes = np.linalg.eigh(own / np.outer(root, root))
+    # an inertia that is negative in its order has no frequency
+    real = inverse > _NONE * np.abs(inverse).max()
+    shapes = shapes[:, real][:, ::-1] / root[:, None]
+    shapes = angles[:, stands] @ shapes - angles[:, ~stands] @ (loose @ shapes)
     count = len(chain.discs)
-    size = shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
-    shapes = shapes / size
+    shapes = shapes / shapes[np.abs(shapes).argmax(axis=0), np.arange(shapes.shape[1])]
     # upright at the front
     shapes = shapes * np.where(shapes[0] < -_FREE, -1.0, 1.0)
-    return TorsionalModes(np.sqrt(np.maximum(squares, 0.0)) / math.tau, shapes[:count], shapes[count:])
+    return TorsionalModes(1.0 / np.sqrt(inverse[real][::-1]) / math.tau, shapes[:count], shapes[count:])
 
 
 def vector_sums(engine: Engine, orders: Sequence[float], modes: TorsionalModes) -> Array:
@@ -291,7 +377,7 @@ def inertias(chain: Torsion) -> Array:
 def _stiffness(chain: Torsion, speed: float) -> ComplexArray:
     """K + i H of discs and rings (V3, V11)."""
     links = [(k, k + 1, s.stiffness * complex(1.0, s.loss_factor)) for k, s in enumerate(chain.sections)]
-    for k, a in enumerate(chain.absorbers, len(chain.discs)):
+    for k, a in _rings(chain):
         links.append((chain.index(a.on), k, a.stiffness_at(speed) + 1j * a.stiffness * a.loss_factor))
     return _linked(chain, links)
 
@@ -299,11 +385,14 @@ def _stiffness(chain: Torsion, speed: float) -> ComplexArray:
 def _damping(chain: Torsion, speed: float) -> Array:
     """C of discs and rings (V3, V10)."""
     links = [(k, k + 1, complex(s.damping)) for k, s in enumerate(chain.sections)]
-    links += [
-        (chain.index(a.on), k, complex(a.damping_at(speed))) for k, a in enumerate(chain.absorbers, len(chain.discs))
-    ]
+    links += [(chain.index(a.on), k, complex(a.damping_at(speed))) for k, a in _rings(chain)]
     against_block = [disc.damping for disc in chain.discs] + [0.0] * len(chain.absorbers)
     return np.asarray(_linked(chain, links).real + np.diag(against_block))
+
+
+def _rings(chain: Torsion) -> list[tuple[int, Absorber]]:
+    """List absorbers with the index of each ring behind the discs."""
+    return list(enumerate(chain.absorbers, len(chain.discs)))
 
 
 def _linked(chain: Torsion, links: Sequence[tuple[int, int, complex]]) -> ComplexArray:

@@ -15,6 +15,7 @@ from laufruhe.numerics.roots import parted
 from laufruhe.physics.torsion import (
     TorsionalModes,
     chain_of,
+    critical_modes,
     critical_speed,
     has_torsion,
     main_orders,
@@ -45,7 +46,7 @@ class Critical:
     speed
         Of the crank [rad/s].
     mode
-        1 is the lowest.
+        Among those that the order meets, 1 is the lowest.
     vector_sum
         Of this order and mode (V6).
     is_main
@@ -79,8 +80,8 @@ class TorsionFacts:
     ----------
     modes
         At the highest operating point, for the sake of pendulums.
-    orders, sums
-        All up to the highest that counts, and their vector sums, shape (orders, modes).
+    orders, met, sums
+        All up to the highest that counts, the modes that each meets, and their vector sums.
     main
         Main orders among them.
     criticals
@@ -89,7 +90,8 @@ class TorsionFacts:
 
     modes: TorsionalModes
     orders: tuple[float, ...]
-    sums: Array
+    met: tuple[TorsionalModes, ...]
+    sums: tuple[Array, ...]
     main: tuple[float, ...]
     criticals: tuple[Critical, ...]
 
@@ -113,16 +115,17 @@ def facts_of(design: Evaluation, low: float, high: float) -> TorsionFacts:
     fastest = max((loads.point for loads in design.loads), key=lambda point: point.speed)
     modes, turns = natural_modes(chain, fastest.speed), engine.cycle.turns
     orders = tuple(k / turns for k in range(1, int(HIGHEST * turns) + 1))
-    sums, main = vector_sums(engine, orders, modes), main_orders(engine, HIGHEST)
-    found = []
-    for m, frequency in enumerate(modes.frequencies):
-        for k, order in enumerate(orders):
+    met = tuple(critical_modes(chain, order) for order in orders)
+    sums = tuple(vector_sums(engine, [order], own)[0] for order, own in zip(orders, met, strict=True))
+    main, found = main_orders(engine, HIGHEST), []
+    for order, own, weights in zip(orders, met, sums, strict=True):
+        for m, (frequency, weight) in enumerate(zip(own.frequencies, weights, strict=True)):
             speed = critical_speed(float(frequency), order)
             if low <= speed <= high:
                 torque = _torque_there(design, replace(fastest, speed=speed), order)
-                found.append(Critical(speed, order, m + 1, float(sums[k, m]), order in main, torque))
+                found.append(Critical(speed, order, m + 1, float(weight), order in main, torque))
     found.sort(key=lambda each: -np.inf if each.torque is None else -each.torque)
-    return TorsionFacts(modes, orders, sums, main, tuple(found))
+    return TorsionFacts(modes, orders, met, sums, main, tuple(found))
 
 
 def _torque_there(design: Evaluation, point: OperatingPoint, order: float) -> float | None:

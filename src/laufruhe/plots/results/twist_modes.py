@@ -70,14 +70,15 @@ def _speeds(axes: Axes, result: Result, facts: TorsionFacts, high: float) -> Non
         axes.plot([0.0, high * RPM], [0.0, order * high / math.tau], **look, zorder=1)
     named = [order for order in facts.orders if order in facts.main or (order == int(order) and order <= 6)]
     _orders(axes, named, high, reach)
-    largest = float(facts.sums.max()) or 1.0
+    largest = max(float(own.max(initial=0.0)) for own in facts.sums) or 1.0
     for m, frequency in enumerate(shown):
         axes.axhline(frequency, color=COLOURS[m], linewidth=1.3)
-        for k, order in enumerate(facts.orders):
+    for order, met, sums in zip(facts.orders, facts.met, facts.sums, strict=True):
+        for colour, frequency, each in zip(COLOURS, met.frequencies.tolist(), sums.tolist(), strict=False):
             speed = math.tau * frequency / order
             if speed <= high:
-                size = LARGEST * math.sqrt(float(facts.sums[k, m]) / largest)
-                axes.plot(speed * RPM, frequency, "o", color=COLOURS[m], markersize=size, zorder=5, alpha=0.85)
+                size = LARGEST * math.sqrt(each / largest)
+                axes.plot(speed * RPM, frequency, "o", color=colour, markersize=size, zorder=5, alpha=0.85)
     axes.set(xlim=(0.0, high * RPM), ylim=(0.0, reach), xlabel="crank speed [rpm]", ylabel="frequency [Hz]")
     # over the names of orders
     mark_points(axes, result, lift=0.24)

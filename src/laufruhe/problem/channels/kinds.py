@@ -17,7 +17,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.linear_run import Response
 from laufruhe.physics.mount_numbers import AxisResidual, Band
 from laufruhe.physics.strength import Factor
-from laufruhe.physics.torsion import Factors, unit_factors
+from laufruhe.physics.torsion import Factors, Resonance, unit_factors
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import PointLoads
@@ -111,7 +111,7 @@ class Channel:
     open_frequency
         Whether the frequency wanted may lie anywhere in a band.
     of_modes
-        Whether it is of natural frequencies of the crankshaft, which rise with stiffness and fall with inertia.
+        Speeds and orders that it counts natural modes of the crankshaft at, if it is of these.
     places
         Names of the places that it is measured at, by which a file may narrow it; none where that is the block.
     span
@@ -131,7 +131,7 @@ class Channel:
     of_run: Callable[[Response], NDArray[np.float64]] | None = None
     of_engine: Callable[[Engine], float] | None = None
     of_torque: bool = False
-    of_modes: bool = False
+    of_modes: Callable[[Asked, Answered], Sequence[Resonance]] | None = None
     of_constant_stiffness: bool = False
     of_shares: bool = False
     of_cases: Callable[[Any], Any] | None = None

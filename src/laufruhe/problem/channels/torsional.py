@@ -38,17 +38,29 @@ def _points(measure: Asked, evaluation: Answered) -> list[PointLoads]:
     return [at for at in evaluation.loads if measure.points is None or at.point.name in measure.points]
 
 
-def _frequencies(measure: Asked, evaluation: Answered) -> Sequence[float]:
-    """Of every speed that counts: a pendulum's is another at each."""
-    chain = torsion.chain_of(evaluation.engine)
+def _at_speeds(measure: Asked, evaluation: Answered) -> Sequence[torsion.Resonance]:
+    """List the speeds that count: a pendulum has another spring at each."""
     speeds = dict.fromkeys(at.point.speed for at in _points(measure, evaluation))
-    return [float(f) for speed in speeds for f in torsion.natural_modes(chain, speed).frequencies]
+    return [torsion.AtSpeed(speed) for speed in speeds]
 
 
-def _critical_speeds(measure: Asked, evaluation: Answered) -> Sequence[float]:
+def _in_orders(measure: Asked, evaluation: Answered) -> Sequence[torsion.Resonance]:
+    """List the orders that count: a pendulum has another inertia in each."""
     orders = measure.orders or torsion.main_orders(evaluation.engine, HIGHEST)
-    frequencies = _frequencies(measure, evaluation)
-    return [torsion.critical_speed(f, order) for order in orders if order > 0.0 for f in frequencies]
+    return [torsion.InOrder(order) for order in orders if order > 0.0]
+
+
+def _of_modes(
+    name: str, unit: str, keys: tuple[str, ...], resonances: Callable[[Asked, Answered], Sequence[torsion.Resonance]]
+) -> TorsionChannel:
+    """Return the channel of numbers that natural modes have."""
+
+    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
+        chain = torsion.chain_of(evaluation.engine)
+        return [float(x) for own in resonances(measure, evaluation) for x in own.numbers(chain)]
+
+    sides = ("min", "max", "outside")
+    return TorsionChannel(name, unit, keys, sides=sides, values=values, of_modes=resonances)
 
 
 def _heat(measure: Asked, evaluation: Answered) -> Sequence[float]:
@@ -62,14 +74,8 @@ SHAFT_TORQUE = _of_shafts("shaft torque", "N m", torsion.shaft_torque, torsion.s
 SHAFT_STRESS = _of_shafts(
     "shaft stress", "Pa", torsion.shaft_stress, torsion.stress_factors, _names_of_stressed, Needs.DIAMETERS
 )
-TORSIONAL_FREQUENCIES = TorsionChannel(
-    "torsional frequencies", "Hz", ("operating_points",), sides=("min", "max", "outside"), values=_frequencies,
-    of_modes=True,
-)  # fmt: skip
-CRITICAL_SPEEDS = TorsionChannel(
-    "critical speeds", "rad/s", ("operating_points", "orders"), sides=("min", "max", "outside"),
-    values=_critical_speeds,
-)  # fmt: skip
+TORSIONAL_FREQUENCIES = _of_modes("torsional frequencies", "Hz", ("operating_points",), _at_speeds)
+CRITICAL_SPEEDS = _of_modes("critical speeds", "rad/s", ("operating_points", "orders"), _in_orders)
 ABSORBER_HEAT = TorsionChannel("absorber heat", "W", ("operating_points",), values=_heat, of_loads=True)
 
 TORSIONAL = (SHAFT_TWIST, SHAFT_TORQUE, SHAFT_STRESS, TORSIONAL_FREQUENCIES, CRITICAL_SPEEDS, ABSORBER_HEAT)

@@ -21,7 +21,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Flywheel, Torsion
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 from laufruhe.physics.reduced_inertia import turning_inertia
-from laufruhe.physics.torsion import dynamic_stiffness, inertias, natural_modes, receptances, throw_torques
+from laufruhe.physics.torsion import Resonance, dynamic_stiffness, inertias, receptances, throw_torques
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
@@ -102,7 +102,11 @@ class TwistBoxes:
         self._constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
         self._terms = [(t.weight, t.measure) for t in problem.objective if _is_square(t.measure)]
         self._limits = [(limit.maximum, limit.measure) for limit in problem.limits if _is_square(limit.measure)]
-        self._numbers = [limit for limit in problem.limits if limit.measure.channel.of_modes]
+        self._numbers = [
+            (limit, resonance)
+            for limit in problem.limits if limit.measure.channel.of_modes is not None
+            for resonance in limit.measure.channel.of_modes(limit.measure, evaluation)
+        ]  # fmt: skip
         self._turning = [(t.weight, _OfInertia(t.measure, evaluation)) for t in problem.objective if _turns(t.measure)]
         self._uneven = [(x.maximum, _OfInertia(x.measure, evaluation)) for x in problem.limits if _turns(x.measure)]
         self._samples = evaluation.samples
@@ -133,7 +137,7 @@ class TwistBoxes:
     def _bound(self, lower: Array, upper: Array) -> tuple[float, int]:
         all_of = np.maximum(self.coordinates.upper - self.coordinates.lower, 1e-300)
         wide = (upper - lower) / all_of
-        if any(self._breaks(limit, lower, upper) for limit in self._numbers):
+        if any(self._breaks(limit, resonance, lower, upper) for limit, resonance in self._numbers):
             return math.inf, int(np.argmax(wide))
         centre, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
         chains = [self.coordinates.chain(x) for x in (lower, centre, upper)]
@@ -250,20 +254,18 @@ class TwistBoxes:
         rest = np.array([[float(np.linalg.norm(here - 0.5 * (high + low)))]])
         return Answer(here[None, None], slopes[None, None], rest, np.zeros((1, 1, len(slopes))))
 
-    def _breaks(self, limit: Limit, lower: Array, upper: Array) -> bool:
-        """Whether natural frequencies break a limit all over a box: they rise with stiffness and fall with inertia."""
-        ends = self.coordinates.ends(lower, upper)
+    def _breaks(self, limit: Limit, resonance: Resonance, lower: Array, upper: Array) -> bool:
+        """Tell if modes break a limit all over a box: they rise with stiffness and fall with inertia (V15)."""
+        ends = self.coordinates.ends(lower, upper, resonance)
         if ends is None:
             return False
-        for loads in (lines.loads for lines in self._lines if limit.measure.counts_point(lines.loads.point)):
-            low, high = (natural_modes(chain, loads.point.speed).frequencies for chain in ends)
-            if low[-1] > limit.maximum * (1.0 + SLACK) or high[0] < limit.minimum * (1.0 - SLACK):
-                return True
-            if limit.outside is not None:
-                a, b = limit.outside[0] * (1.0 + SLACK), limit.outside[1] * (1.0 - SLACK)
-                if np.any((low > a) & (high < b)):
-                    return True
-        return False
+        low, high = (resonance.numbers(chain) for chain in ends)
+        # counted from the highest; the low corner may have fewer
+        low, high = low[::-1], high[::-1][: len(low)]
+        broken = (low > limit.maximum * (1.0 + SLACK)) | (high < limit.minimum * (1.0 - SLACK))
+        if limit.outside is not None:
+            broken |= (low > limit.outside[0] * (1.0 + SLACK)) & (high < limit.outside[1] * (1.0 - SLACK))
+        return bool(np.any(broken))
 
 
 def _apart(sections: int, angles: int) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from laufruhe.machine import Section, Torsion
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.torsion import chain_of
+from laufruhe.physics.torsion import Resonance, chain_of
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.problem import Problem
 
@@ -66,15 +66,19 @@ class TwistCoordinates:
         """Of a point."""
         return chain_of(self.problem.design(self.decisions(coordinates).tolist()))
 
-    def ends(self, lower: Array, upper: Array) -> tuple[Torsion, Torsion] | None:
-        """Of a box the chains of the lowest and of the highest natural frequencies; None where no corner is known."""
+    def ends(self, lower: Array, upper: Array, resonance: Resonance) -> tuple[Torsion, Torsion] | None:
+        """Return the chains of the lowest and the highest modes in a box, None where no corner is known (V15)."""
         absorbers = {absorber.name: absorber for absorber in self._chain.absorbers}
         falls = np.zeros(len(lower), dtype=bool)
-        for k, ((part, number), *_) in enumerate(self._keys):
-            absorber = absorbers.get(part)
-            free = absorber is not None and number == "stiffness" and lower[k] == 0.0
-            # the spring of a pendulum grows with its inertia, and a ring that turns free has no frequency
-            if free or (absorber is not None and number == "inertia" and absorber.order > 0.0):
+        for k, keys in enumerate(self._keys):
+            shares = [resonance.share(absorbers[part]) if part in absorbers else 1.0 for part, _ in keys]
+            if keys[0][1] != "inertia":
+                continue
+            known = [share for share in shares if share is not None]
+            if len(known) < len(shares) or min(known) < 0.0 < max(known):
                 return None
-            falls[k] = number == "inertia"
-        return self.chain(np.where(falls, upper, lower)), self.chain(np.where(falls, lower, upper))
+            falls[k] = max(known) > 0.0
+        low, high = self.chain(np.where(falls, upper, lower)), self.chain(np.where(falls, lower, upper))
+        # an inertia that changes its sign in between has poles there
+        signs = [np.sum(np.linalg.eigvalsh(resonance.inertia(chain)) > 0.0) for chain in (low, high)]
+        return (low, high) if signs[0] == signs[1] else None
