@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 LANES := -n auto --maxprocesses 8 --dist worksteal
 STAMP := $(VENV)/.installed
 
-.PHONY: help solve study test test-fast test-long lanes attack matrix faults benchmarks proofs speed pictures docs lint format clean distclean
+.PHONY: help solve study test test-fast test-long lanes attack matrix mutants faults benchmarks proofs speed pictures docs lint format clean distclean
 
 help:
 	@echo "make solve      design the balance of PROBLEM ($(PROBLEM))"
@@ -18,6 +18,7 @@ help:
 	@echo "make lanes      which tests are too slow for the fast lane, measured; writes tests/slow.txt"
 	@echo "make attack     random problems against an independent model, ATTACK='--number 100'"
 	@echo "make matrix     every kind of decision, measure and layout together, an hour and more; MATRIX='--share 0.1'"
+	@echo "make mutants    300 one-line changes of the source, each against the tests that call it; writes results/mutants/"
 	@echo "make lint       style, types, direction of imports"
 	@echo "make format     put the source into the project's style"
 	@echo "make faults     100,000 damaged files, which writes results/faults/; half an hour and more"
@@ -73,6 +74,13 @@ matrix: export OMP_NUM_THREADS = 1
 
 matrix: $(STAMP)
 	$(BIN)/python tests/matrix/whole.py $(MATRIX)
+
+# One-line changes of the source that no test sees; writes results/mutants/README.md.
+mutants: export OMP_NUM_THREADS = 1
+
+mutants: $(STAMP)
+	$(BIN)/python tests/mutants/run_mutants.py map
+	$(BIN)/python tests/mutants/run_mutants.py run --page $(MUTANTS)
 
 # Scripts that write results/benchmarks/, one after the other, none for longer than a quarter of an hour.
 benchmarks: export OMP_NUM_THREADS = 1

@@ -1,0 +1,140 @@
+"""Mutants of the source: each changes one operator, number or choice on one line."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+SOURCE = Path(__file__).resolve().parents[2] / "src"
+ROOMS = ("physics", "load_models", "prove", "solvers", "machine")
+TOLERANCE = 1e-3
+COMPARISONS = {
+    ast.Lt: ("<", ">"), ast.Gt: (">", "<"), ast.LtE: ("<=", ">="), ast.GtE: (">=", "<="), ast.Eq: ("==", "!="),
+    ast.NotEq: ("!=", "=="), ast.Is: ("is", "is not"), ast.IsNot: ("is not", "is"), ast.In: ("in", "not in"),
+    ast.NotIn: ("not in", "in"),
+}  # fmt: skip
+ARITHMETIC = {ast.Add: ("+", "-"), ast.Sub: ("-", "+"), ast.Mult: ("*", "/"), ast.Div: ("/", "*")}
+LOGIC = {ast.And: ("and", "or"), ast.Or: ("or", "and")}
+EXTREMES = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "argmin": "argmax",
+            "argmax": "argmin", "floor": "ceil", "ceil": "floor", "any": "all", "all": "any"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """One changed line of a file below `src`.
+
+    Attributes
+    ----------
+    file
+        Path relative to `src`.
+    function
+        Name and first line of the innermost function that holds the line.
+    line
+        Number of the line, from 1.
+    before, after
+        The line without and with the change.
+    """
+
+    file: str
+    function: tuple[str, int]
+    line: int
+    before: str
+    after: str
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}: {self.before.strip()}  ->  {self.after.strip()}"
+
+
+def mutants_of(path: Path) -> list[Mutant]:
+    """Return every mutant of a file."""
+    text = path.read_text(encoding="utf-8")
+    lines = text.splitlines()
+    found = []
+    for function, node in _nodes(ast.parse(text)):
+        for line, start, end, new in _changes(node, lines):
+            old = lines[line - 1]
+            found.append(Mutant(str(path.relative_to(SOURCE)), function, line, old, f"{old[:start]}{new}{old[end:]}"))
+    return list(dict.fromkeys(found))
+
+
+@cache
+def all_mutants() -> tuple[Mutant, ...]:
+    """Return every mutant of the rooms, in the order of files and lines."""
+    files = [file for room in ROOMS for file in sorted((SOURCE / "laufruhe" / room).rglob("*.py"))]
+    return tuple(mutant for file in files for mutant in mutants_of(file))
+
+
+def drawn(number: int, seed: int) -> list[Mutant]:
+    """Return a random sample of all mutants, the same for the same seed and source."""
+    everything = all_mutants()
+    rng = np.random.default_rng(seed)
+    return [everything[k] for k in rng.permutation(len(everything))[:number]]
+
+
+def _nodes(tree: ast.AST, function: tuple[str, int] | None = None) -> Iterator[tuple[tuple[str, int], ast.AST]]:
+    """Yield expressions inside functions that are no annotation, message or docstring."""
+    for field, value in ast.iter_fields(tree):
+        if field in ("annotation", "returns", "decorator_list") or isinstance(tree, ast.Raise | ast.JoinedStr):
+            continue
+        for child in value if isinstance(value, list) else [value]:
+            if not isinstance(child, ast.AST) or isinstance(child, ast.Raise | ast.JoinedStr):
+                continue
+            inner = function
+            if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
+                inner = (child.name, min([child.lineno, *(d.lineno for d in child.decorator_list)]))
+            if inner is not None:
+                yield inner, child
+            yield from _nodes(child, inner)
+
+
+def _changes(node: ast.AST, lines: Sequence[str]) -> Iterator[tuple[int, int, int, str]]:
+    """Yield line, first and last column and the new text of each change of one node."""
+    match node:
+        case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in COMPARISONS:
+            yield from _between(left, right, *COMPARISONS[type(op)], lines)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in ARITHMETIC and not _is_neutral(op, left, right):
+            yield from _between(left, right, *ARITHMETIC[type(op)], lines)
+        case ast.BoolOp(op=op, values=[left, right, *_]):
+            yield from _between(left, right, *LOGIC[type(op)], lines)
+        case ast.UnaryOp(op=ast.USub(), operand=operand) if not isinstance(operand, ast.Constant):
+            yield from _prefix(node, operand, "-")
+        case ast.UnaryOp(op=ast.Not(), operand=operand):
+            yield from _prefix(node, operand, "not ")
+        case ast.Call(func=ast.Name(id=name) as func) if name in EXTREMES:
+            yield func.lineno, func.col_offset, func.col_offset + len(name), EXTREMES[name]
+        case ast.Call(func=ast.Attribute(attr=name) as func) if name in EXTREMES and func.end_col_offset is not None:
+            if func.end_lineno is not None:
+                yield func.end_lineno, func.end_col_offset - len(name), func.end_col_offset, EXTREMES[name]
+        case ast.Constant(value=value) if isinstance(value, int | float) and not isinstance(value, bool):
+            # a tolerance twice as large is none that a test has to see
+            if node.end_col_offset is not None and not 0.0 < value < TOLERANCE:
+                new = repr(value + 1) if isinstance(value, int) else repr(2.0 * value if value else 1.0)
+                yield node.lineno, node.col_offset, node.end_col_offset, new
+
+
+def _is_neutral(op: ast.operator, *operands: ast.expr) -> bool:
+    """Return whether another operator joins texts, or changes nothing beside a factor of one."""
+    values = [operand.value for operand in operands if isinstance(operand, ast.Constant)]
+    texts = any(isinstance(value, str) for value in values) or any(isinstance(o, ast.JoinedStr) for o in operands)
+    return texts or (isinstance(op, ast.Mult | ast.Div) and 1 in values[-1:])
+
+
+def _prefix(node: ast.expr, operand: ast.expr, old: str) -> Iterator[tuple[int, int, int, str]]:
+    if node.lineno == operand.lineno:
+        yield node.lineno, node.col_offset, node.col_offset + len(old), ""
+
+
+def _between(
+    left: ast.expr, right: ast.expr, old: str, new: str, lines: Sequence[str]
+) -> Iterator[tuple[int, int, int, str]]:
+    """Yield the operator's place between two operands on one line."""
+    if left.end_lineno != right.lineno or left.end_col_offset is None or not lines[right.lineno - 1].isascii():
+        return
+    start = lines[right.lineno - 1].find(old, left.end_col_offset, right.col_offset)
+    if start >= 0:
+        yield right.lineno, start, start + len(old), new

@@ -1,0 +1,57 @@
+"""Mutants change one line, stay Python, and are the same for the same seed."""
+
+import ast
+import difflib
+
+import pytest
+
+from mutants.single_lines import ROOMS, SOURCE, drawn, mutants_of
+
+
+def test_a_mutant_is_one_other_line_that_python_reads() -> None:
+    source = SOURCE / "laufruhe" / "physics" / "mount_forces.py"
+    lines = source.read_text(encoding="utf-8").splitlines()
+    found = mutants_of(source)
+    assert len({(m.line, m.after) for m in found}) == len(found) > 20
+    for mutant in found:
+        changed = [*lines[: mutant.line - 1], mutant.after, *lines[mutant.line :]]
+        assert lines[mutant.line - 1] == mutant.before != mutant.after
+        ast.parse("\n".join(changed))
+        assert sum(line.startswith("+ ") for line in difflib.ndiff(lines, changed)) == 1
+
+
+def test_every_kind_of_change_is_made(tmp_path, monkeypatch) -> None:
+    text = "def f(a, b):\n    if a < b and not a:\n        return -a + min(a, 0.5)\n    return a is None, 2 * b\n"
+    (tmp_path / "one.py").write_text(text)
+    monkeypatch.setattr("mutants.single_lines.SOURCE", tmp_path)
+    assert [m.after.strip() for m in mutants_of(tmp_path / "one.py")] == [
+        "if a < b or not a:",
+        "if a > b and not a:",
+        "if a < b and a:",
+        "return -a - min(a, 0.5)",
+        "return a + min(a, 0.5)",
+        "return -a + max(a, 0.5)",
+        "return -a + min(a, 1.0)",
+        "return a is not None, 2 * b",
+        "return a is None, 2 / b",
+        "return a is None, 3 * b",
+    ]
+
+
+def test_messages_annotations_and_texts_are_left_alone(tmp_path, monkeypatch) -> None:
+    text = '''def f(a: int = 0) -> "1 + 1":
+    """1 < 2."""
+    if a:
+        raise ValueError(f"{a + 1} < 3")
+    return f"{a - 1}" + "x"
+'''
+    (tmp_path / "one.py").write_text(text)
+    monkeypatch.setattr("mutants.single_lines.SOURCE", tmp_path)
+    assert [m.after.strip() for m in mutants_of(tmp_path / "one.py")] == ['def f(a: int = 1) -> "1 + 1":']
+
+
+@pytest.mark.slow
+def test_a_sample_is_the_same_for_its_seed_and_covers_the_rooms(monkeypatch) -> None:
+    first, again, other = drawn(200, 7), drawn(200, 7), drawn(200, 8)
+    assert first == again != other
+    assert {mutant.file.split("/")[1] for mutant in first} == set(ROOMS)
