@@ -16,7 +16,7 @@ from laufruhe.numerics.budget import passed
 from laufruhe.numerics.workers import TimeIsOver, WorkersGone, count_of, each, executor_for, given
 from laufruhe.studies.part import Record
 from laufruhe.studies.reader import StudyFile
-from laufruhe.studies.scenes import Scenes, program
+from laufruhe.studies.scenes import Scenes
 from laufruhe.studies.stores import Records, Task, stores_of
 
 # a worker imports everything anew: two seconds, so it has to save more
@@ -63,6 +63,8 @@ def run(
         with closing(answers(list(todo.values()), scenes, jobs)) as found:
             for count, answer in enumerate(found, 1):
                 mark = names[answer.task]
+                if answer.mark != mark:
+                    raise _other_files(answer, todo[mark])
                 with _making_room():
                     store[mark].keep(mark, answer.seconds, answer.record)
                 say(whole - len(todo) + count, whole)
@@ -87,22 +89,31 @@ def _making_room() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of a task, and how long it took on one core [s]."""
+    """What became of a task, and how long it took on one core [s].
+
+    Attributes
+    ----------
+    mark
+        Fingerprint of the task where it was answered, once it was answered.
+    host
+        Machine that answered.
+    """
 
     task: int
+    mark: str
+    host: str
     record: Record
     seconds: float
 
 
 @dataclass(frozen=True)
 class _Piece:
-    """Several tasks for one worker, and all that it needs to know: scenes, where they are named from, what it runs."""
+    """Several tasks for one worker, and all that it needs to know: scenes, and where they are named from."""
 
     numbers: Sequence[int]
     tasks: Sequence[Task]
     scenes: Scenes
     folder: Path
-    program: str
 
 
 def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[Answer, None, None]:
@@ -131,19 +142,27 @@ def _over() -> SolverError:
     return TimeIsOver("the time limit is over; finished points are kept, the same command goes on")
 
 
+def _other_files(answer: Answer, task: Task) -> SolverError:
+    """Return the error of an answer that depends on other files or another program than its task."""
+    where = f"on {answer.host}" if given() is not None else "while it was worked at"
+    rule = f"'{task[1]}' had other files, another Laufruhe or other libraries {where}, so its answer is not kept"
+    return SolverError(f"{rule}; have the same everywhere, and the same command goes on")
+
+
 def _answer(k: int, task: Task, scenes: Scenes) -> Answer:
     started = time.perf_counter()
     part, point = task
     with scenes.blamed(point):
         record = part.answer(point, scenes)
-    return Answer(k, record, time.perf_counter() - started)
+    seconds = time.perf_counter() - started
+    return Answer(k, scenes.fingerprint(point, part.settings()), socket.gethostname(), record, seconds)
 
 
 def _shared(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -> Iterator[Answer]:
     """Tasks from the first on, as many in a piece as are worth handing out, told by those that are done."""
     done, spent = 0, 0.0
     worth = NEAR if given() is None else FAR
-    folder, own = Path.cwd(), program()
+    folder = Path.cwd()
 
     def pieces() -> Iterator[_Piece]:
         start = first
@@ -151,7 +170,7 @@ def _shared(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -> Ite
             fair = (len(tasks) - start) // (SHARES * count_of(executor))
             size = max(min(int(worth * done / spent) if spent > 0.0 else 1, fair), 1)
             numbers = range(start, min(start + size, len(tasks)))
-            yield _Piece(numbers, [tasks[k] for k in numbers], scenes, folder, own)
+            yield _Piece(numbers, [tasks[k] for k in numbers], scenes, folder)
             start = numbers.stop
 
     with executor_for(jobs) as executor:
@@ -169,9 +188,7 @@ def _shared(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -> Ite
 
 
 def _served(piece: _Piece) -> list[Answer]:
-    """Answers to all tasks of a piece, by a worker that runs the same program."""
-    if program() != piece.program:
-        raise SolverError(f"the worker on {socket.gethostname()} runs another Laufruhe; install the same everywhere")
+    """Return the answers to all tasks of a piece."""
     if Path.cwd() != piece.folder:
         piece.scenes.folder = piece.folder / piece.scenes.folder
     return [_answer(k, task, piece.scenes) for k, task in zip(piece.numbers, piece.tasks, strict=True)]

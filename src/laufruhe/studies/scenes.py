@@ -5,20 +5,21 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from laufruhe.errors import Complaint, InputError, ModelError, refused
 from laufruhe.files.complaints import beside, in_file, nearest
+from laufruhe.files.nested import texts_in
 from laufruhe.files.phasing import without_shafts
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.files.study_tables import CaseTable, changed
 from laufruhe.machine import Role
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.equal_power import at_equal_power
+from laufruhe.studies.program import program
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -41,14 +42,6 @@ class Point:
 
     def __str__(self) -> str:
         return ", ".join([self.case.name, *(f"{path} = {value}" for path, value in self.changes.items())])
-
-
-@cache
-def program() -> str:
-    """Version and source of this package: another one may answer otherwise."""
-    source = sorted(Path(__file__).parents[1].rglob("*.py"))
-    found = hashlib.sha256(b"".join(path.read_bytes() for path in source))
-    return found.hexdigest()
 
 
 class Scenes:
@@ -121,18 +114,28 @@ class Scenes:
             raise InputError(str(path), (Complaint.of(error, where, f'"{point}"'),)) from None
 
     def fingerprint(self, point: Point, settings: Mapping[str, Any]) -> str:
-        """Of everything that a point hangs on: scene, files that it names, what is asked, and this package."""
+        """Return a hash of everything that a point depends on: scene, files that the scene names, settings, program.
+
+        Every text of the scene that names a file counts, so that no key has to be known here.
+        """
         tables = self.tables(point)
         case = point.case.model_dump(exclude={"name", "sweep"})
         span = [point.case.name, *point.span] if point.span is not None else None
         about = [settings, case, point.shafts, span, tables, program()]
         found = hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode())
-        gas = tables.get("gas")
-        named = gas.get("file") if isinstance(gas, dict) else None
-        if isinstance(named, str):
-            trace = (self.folder / point.case.problem).parent / named
-            found.update(trace.read_bytes() if trace.is_file() else b"")
+        folder = (self.folder / point.case.problem).parent
+        for text in sorted({text for _, text in texts_in(tables)}):
+            found.update(_content_of(folder / text))
         return found.hexdigest()[:32]
+
+
+def _content_of(path: Path) -> bytes:
+    """Return a hash of a file; empty where there is none."""
+    with suppress(OSError, ValueError):
+        if path.is_file():
+            with path.open("rb") as stream:
+                return hashlib.file_digest(stream, "sha256").digest()
+    return b""
 
 
 def shafts_of(problem: Problem) -> tuple[str, ...]:

@@ -1,0 +1,21 @@
+"""Python and the libraries that numbers come from."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import PackageNotFoundError, version
+
+PACKAGES = ("numpy", "scipy", "cvxpy", "clarabel", "casadi", "pyscipopt")
+
+
+def version_of(package: str) -> str:
+    """Return the version that is installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not installed"
+
+
+def library_versions() -> dict[str, str]:
+    """Return the versions of Python and of the libraries, by name."""
+    return {"python": platform.python_version(), **{name: version_of(name) for name in PACKAGES}}

@@ -1,0 +1,162 @@
+"""Points of a study are never those of other files, and stay those of the same files."""
+
+from __future__ import annotations
+
+import ast
+import shutil
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from typer.testing import CliRunner
+
+from laufruhe.cli import app
+from laufruhe.errors import SolverError
+from laufruhe.files.study_tables import CaseTable
+from laufruhe.studies import program, runner
+from laufruhe.studies import reader as study_files
+from laufruhe.studies.scenes import Point, Scenes
+
+PROBLEMS = Path(__file__).parents[2] / "problems"
+INPUTS = Path(__file__).parent / "inputs"
+FUEL, ENGINE, STUDY = "car-four-fuel.csv", "car-four-willans.toml", "scenes-of-car-four.toml"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    for path in (INPUTS / STUDY, PROBLEMS / FUEL, PROBLEMS / ENGINE):
+        shutil.copy(path, tmp_path)
+    return tmp_path
+
+
+def thirstier(path: Path) -> None:
+    """Add 1 kg/h to each measured consumption."""
+    lines = path.read_text(encoding="utf-8").splitlines()
+    rows = [line.rpartition(",") for line in lines[2:]]
+    more = [f"{begin},{float(fuel) + 1.0:.6g}" for begin, _, fuel in rows]
+    path.write_text("\n".join([*lines[:2], *more]) + "\n", encoding="utf-8")
+
+
+def of_the_first_draw(folder: Path) -> float:
+    answer = CliRunner().invoke(app, ["study", str(folder / STUDY), "--out", str(folder / "out")])
+    assert answer.exit_code == 0, answer.output
+    with xr.open_dataset(folder / "out/scenes.nc") as data:
+        return float(data["objective"].values[0, 0])
+
+
+@pytest.mark.slow
+def test_a_changed_measurement_changes_the_points(folder: Path) -> None:
+    before = of_the_first_draw(folder)
+    assert before == pytest.approx(572.48, abs=0.01)
+    thirstier(folder / FUEL)
+    assert of_the_first_draw(folder) == pytest.approx(605.74, abs=0.01)
+    shutil.copy(PROBLEMS / FUEL, folder)
+    assert of_the_first_draw(folder) == before
+
+
+@pytest.mark.parametrize(
+    "tables",
+    [
+        {"friction": {"file": "rows.csv"}},
+        {"gas": {"model": "trace", "file": "rows.csv"}},
+        {"gas": {"files": ["other.csv", "rows.csv"]}},
+        {"mounts": {"elements": [{"name": "a", "dynamic_stiffness": {"axis": "z", "file": "rows.csv"}}]}},
+        {"assembly": {"parts": {"file": "rows.csv"}}},
+    ],
+)
+def test_every_file_that_a_scene_names_counts(tables: dict[str, object], tmp_path: Path) -> None:
+    point, rows = Point(CaseTable(name="a", problem="a.toml"), base=tables), tmp_path / "rows.csv"
+
+    def mark() -> str:
+        return Scenes(tmp_path).fingerprint(point, {})
+
+    absent = mark()
+    rows.write_text("1,2\n", encoding="utf-8")
+    first = mark()
+    rows.write_text("1,3\n", encoding="utf-8")
+    changed = mark()
+    rows.write_text("1,2\n", encoding="utf-8")
+    assert mark() == first
+    assert len({absent, first, changed}) == 3
+
+
+@pytest.mark.parametrize("text", ["a\x00b", "x" * 5000, "", ".", "/dev/zero", "\ud800"])
+def test_texts_that_name_no_file_do_no_harm(text: str, tmp_path: Path) -> None:
+    point = Point(CaseTable(name="a", problem="a.toml"), base={"title": text})
+    assert Scenes(tmp_path).fingerprint(point, {}) == Scenes(tmp_path).fingerprint(point, {})
+
+
+@pytest.mark.slow
+def test_a_file_that_changes_under_way_is_told_and_nothing_of_it_kept(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solved = runner._answer
+
+    def changed_meanwhile(*words: object) -> runner.Answer:
+        thirstier(folder / FUEL)
+        return solved(*words)  # type: ignore[arg-type]
+
+    study, kept = study_files.load_study(folder / STUDY), folder / "kept/points.jsonl"
+    with monkeypatch.context() as patched:
+        patched.setattr(runner, "_answer", changed_meanwhile)
+        with pytest.raises(SolverError, match="had other files") as caught:
+            runner.run(study, folder, kept)
+    assert len(str(caught.value).splitlines()) == 1
+    assert not kept.exists()
+
+
+@pytest.mark.slow
+def test_comments_and_docstrings_are_no_part_of_the_program() -> None:
+    """The syntax tree has no comments: what is left of each file has the tree of the file without its docstrings."""
+    for path in sorted((PROBLEMS.parent / "src").rglob("*.py")):
+        source = path.read_text(encoding="utf-8")
+        assert ast.dump(ast.parse(program.statements(source))) == without_docstrings(source), path
+
+
+def without_docstrings(source: str) -> str:
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(body := getattr(node, "body", None), list):
+            node.body = [ast.Expr(ast.Constant(...)) if _is_text(one) else one for one in body]  # type: ignore[attr-defined]
+    return ast.dump(tree)
+
+
+def _is_text(node: ast.AST) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("x = 1", "x = 1  # why"),
+        ("def f():\n    return '#'", "# a\n\ndef f():\n    # b\n    return '#'"),
+        ('def f():\n    """Do."""\n    return 1', 'def f():\n    """Do it.\n\n    At once."""\n    return 1'),
+    ],
+)
+def test_words_change_no_program(old: str, new: str) -> None:
+    assert program.statements(old + "\n").strip() == program.statements(new + "\n").strip()
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("x = 1", "x = 2"),
+        ("x = '# a'", "x = '# b'"),
+        ("f(\n    'a'\n)", "f(\n    'b'\n)"),
+        ("if a:\n    b\nc", "if a:\n    b\n    c"),
+        ('x = \\\n"""a"""', 'x = \\\n"""b"""'),
+        ('"""a""".b', '"""c""".b'),
+        ('x = f"{a}#"', 'x = f"{b}#"'),
+    ],
+)
+def test_what_is_done_does(old: str, new: str) -> None:
+    assert program.statements(old) != program.statements(new)
+
+
+@pytest.mark.slow
+def test_another_library_is_another_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = program.program()
+    monkeypatch.setattr(program, "library_versions", lambda: {"clarabel": "0.0.1"})
+    program.program.cache_clear()
+    assert program.program() != own
+    program.program.cache_clear()
