@@ -226,10 +226,11 @@ class Watched:
 
     def _standing(self, step: Step) -> Iterator[str]:
         from laufruhe.present.numbers import figure
+        from laufruhe.prove.certificate import USELESS
 
         if math.isfinite(step.value):
             yield f"best {figure(step.value, self._unit)}"
-        if math.isfinite(step.bound):
+        if math.isfinite(step.bound) and step.bound > 0.0:
             yield f"bound {figure(step.bound, self._unit)}"
-        if math.isfinite(step.gap):
+        if step.gap < USELESS:
             yield f"gap {100.0 * step.gap:.2g} %"

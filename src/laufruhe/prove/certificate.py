@@ -59,6 +59,8 @@ class Reach(StrEnum):
     ASIDE = "holds, and is not made to meet the design"
 
 
+USELESS = 0.99
+"""Gap from which a bound says nothing that a user can act on."""
 NEAR = 0.05
 """Gap at which a bound that need not close is called a proof within its gap."""
 
@@ -102,6 +104,11 @@ class Certificate:
     gap: float
     kkt_residual: float
     method: str
+
+    @property
+    def is_useful(self) -> bool:
+        """Whether the bound is more than a hundredth of the value, or closes."""
+        return self.kind is Proof.GLOBAL or self.gap < USELESS
 
 
 @dataclass(frozen=True, eq=False)

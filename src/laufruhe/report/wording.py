@@ -15,6 +15,7 @@ from laufruhe.solvers.stars.ranking import RankedStar
 
 # A change that would be printed as 0.0 %.
 UNFELT = 5e-4
+NO_BOUND = "no useful bound yet"
 LOOSE = 1e-3
 """Residual of the optimality conditions from which they are not said to hold."""
 
@@ -115,6 +116,8 @@ def _told_apart(result: Result, best: RankedStar, rival: RankedStar) -> list[tup
 def _proven(certificate: Certificate | None) -> str:
     if certificate is None:
         return "not proven"
+    if certificate.kind is not Proof.NONE and not certificate.is_useful:
+        return NO_BOUND
     words = {
         "global": "the proven optimum",
         "global within gap": f"proven to within {percent_of(max(certificate.gap, 0.0))} of the optimum",
@@ -140,13 +143,15 @@ def explained(result: Result) -> str:
         return "Nothing was decided, so there is nothing to prove."
     if result.status is Status.FAILED:
         bound = figure(c.lower_bound, o.unit, 6)
-        least = f"No design within the bounds and limits has less than {bound}. " if c.lower_bound > 0.0 else ""
+        least = f"No design within the bounds and limits has less than {bound}. " if c.is_useful else ""
         return f"{least}The design found breaks a limit, so that nothing is proven of it."
-    if c.kind is Proof.LOCAL:
+    if c.kind is Proof.LOCAL or not c.is_useful:
+        bound = (
+            f"No design is below {figure(c.lower_bound, o.unit, 6)}; designs between the two values are not ruled out."
+        )
         return (
             f"The best of the local optima found ({c.method}), with {figure(o.value, o.unit, 6)}. "
-            f"For this design {_conditions(c.kkt_residual)}. "
-            f"No design is below {figure(c.lower_bound, o.unit, 6)}; designs between the two values are not ruled out."
+            f"For this design {_conditions(c.kkt_residual)}. {bound if c.is_useful else NO_BOUND.capitalize() + '.'}"
         )
     gap = f"a gap of {percent_of(c.gap)}" if c.gap > 0.0 else "which leaves no gap"
     origin = "was not taken from the solver but computed from the exact model"

@@ -28,6 +28,7 @@ from laufruhe.solvers.cones.unbalances import beyond_mounts
 from laufruhe.solvers.in_order import solve_in_order
 from laufruhe.solvers.mounts.convex import is_convex
 from laufruhe.solvers.reachable import with_reachable
+from laufruhe.solvers.relaxed import solve_relaxed
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.rooms import surely_broken, with_room
 from laufruhe.solvers.told_limits import solve_told, told_excess
@@ -311,4 +312,26 @@ def _by_what_is_open(problem: Problem) -> Result:
     conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and not kinds & {_S, _T, _F, Kind.SIZE} else ()
     if conflict:
         return none_within(problem, evaluate_start(problem), conflict, {})
-    return method.decided(problem)
+    closing = _closing(problem, kinds, method)
+    if closing is None:
+        return method.decided(problem)
+    other, fewer = closing
+    return solve_relaxed(problem, fewer, other.decided, method.decided)
+
+
+def _closing(problem: Problem, kinds: frozenset[Kind], method: Method) -> tuple[Method, Problem] | None:
+    """Return a method whose bound closes on what it knows of what is asked, and the problem of that alone."""
+    if method.reach is Reach.WHOLE or not problem.search.proves:
+        return None
+    for other in METHODS:
+        if other.reach is not Reach.WHOLE or not kinds <= other.decides:
+            continue
+        free = problem.changed(limits=())
+        terms = tuple(term for term in problem.objective if other.suits(free.changed(objective=(term,))))
+        # what is left out of a sum has to be no less than zero
+        left = [term.measure for term in problem.objective if term not in terms]
+        if terms and all(measure.is_load or measure.is_mounting for measure in left):
+            fewer = free.changed(objective=terms)
+            limits = tuple(limit for limit in problem.limits if other.suits(fewer.changed(limits=(limit,))))
+            return other, fewer.changed(limits=limits)
+    return None

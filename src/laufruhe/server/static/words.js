@@ -1,6 +1,9 @@
 // What the page says of the optimum: what is proven, what is being computed, and why there is none.
 import { byId, element } from "./parts.js";
 
+/** Gap from which a bound says nothing that a user can act on. */
+const USELESS = 0.99;
+
 /**
  * @param {any} answer
  */
@@ -21,10 +24,11 @@ function words(answer) {
   if (!own) return [answer.message || given(answer)];
   const lead = [element("strong", {}, `Optimum ${own.text}`), ` ${own.name}, `];
   const share = `${(100 * own.gap).toPrecision(2)} %`;
-  const bound = `no design has less than ${own.boundText}`;
+  const useful = own.gap < USELESS;
+  const bound = useful ? `no design has less than ${own.boundText}` : "no useful bound yet";
   if (answer.status === "optimal") return [...lead, element("span", { class: "proven" }, `proven: ${bound}`)];
   const local = own.proof === "local" ? ", a local optimum" : "";
-  const found = answer.stage === "settled" ? `found; ${bound} (gap ${share}${local})` : `at ${share} from its bound so far${but}: ${bound}; being proven`;
+  const found = answer.stage === "settled" ? `found; ${bound} (${useful ? `gap ${share}${local}` : "a local optimum"})` : useful ? `at ${share} from its bound so far${but}: ${bound}; being proven` : `${bound}${but}; being proven`;
   return [...lead, element("span", { class: "pending" }, found)];
 }
 

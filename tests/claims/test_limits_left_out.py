@@ -1,0 +1,93 @@
+"""Limits that no closing method knows are left out for the bound, and the bound holds."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from laufruhe.report.wording import explained, headline
+
+INPUTS = Path(__file__).parent / "inputs"
+
+
+@pytest.fixture(scope="module")
+def problem() -> Problem:
+    return laufruhe.load(INPUTS / "transmissibility-beside-weights.toml")
+
+
+def _least(problem: Problem, count: int = 400) -> float:
+    """Objective of the best of evenly spaced weights that keep the limits, by the exact model."""
+    (decision,) = problem.decisions
+    values = []
+    for value in np.linspace(decision.lower, decision.upper, count):
+        found = evaluate(problem, problem.design([float(value)]))
+        if found.excess(problem.limits) <= 0.0:
+            values.append(objective_value(problem, found))
+    return min(values)
+
+
+@pytest.mark.slow
+def test_a_limit_with_room_takes_nothing_from_the_proof(problem: Problem) -> None:
+    found = laufruhe.solve(problem)
+    assert found.certificate is not None
+    assert found.objective is not None
+    assert found.certificate.kind is Proof.GLOBAL
+    assert found.certificate.gap < 1e-4
+    assert found.objective.value == pytest.approx(38.3224, rel=1e-5)
+    assert found.certificate.lower_bound <= _least(problem) * (1.0 + 1e-9)
+    assert [limit.name for limit in found.limits] == [limit.name for limit in problem.limits]
+
+
+@pytest.mark.slow
+def test_a_limit_that_holds_leaves_the_bound_without_it(problem: Problem) -> None:
+    free = laufruhe.solve(problem.changed(limits=()))
+    (limit,) = problem.limits
+    reached = evaluate(problem, free.final.engine).value(limit.measure)
+    low = min(
+        evaluate(problem, problem.design([float(value)])).value(limit.measure)
+        for value in np.linspace(problem.decisions[0].lower, problem.decisions[0].upper, 200)
+    )
+    tight = problem.changed(limits=(replace(limit, maximum=0.5 * (reached + low)),))
+    found = laufruhe.solve(tight)
+    assert low < reached
+    assert found.certificate is not None
+    assert found.objective is not None
+    assert free.objective is not None
+    assert found.certificate.lower_bound == pytest.approx(free.objective.value, rel=1e-4)
+    assert found.certificate.lower_bound <= _least(tight)
+    assert found.final.excess(tight.limits) <= 1e-5
+    assert "without 1 limit" in found.certificate.method
+
+
+@pytest.mark.slow
+def test_a_term_that_no_closing_method_knows_takes_its_own_share_alone(problem: Problem) -> None:
+    (limit,), (term,) = problem.limits, problem.objective
+    both = problem.changed(objective=(term, Term(Measure(limit.measure.channel, orders=(1.0,)), 3.0)), limits=())
+    found, alone = laufruhe.solve(both), laufruhe.solve(problem.changed(limits=()))
+    assert found.certificate is not None
+    assert alone.objective is not None
+    assert found.objective is not None
+    assert found.certificate.lower_bound == pytest.approx(alone.objective.value, rel=1e-4)
+    assert found.certificate.lower_bound <= _least(both)
+    assert found.objective.value <= _least(both) * (1.0 + 1e-6)
+
+
+@pytest.mark.slow
+def test_a_bound_of_nothing_is_told_as_none(problem: Problem) -> None:
+    found = laufruhe.solve(problem)
+    assert found.certificate is not None
+    empty = replace(found, certificate=replace(found.certificate, kind=Proof.WITHIN_GAP, lower_bound=0.0, gap=1.0))
+    local = replace(found, certificate=replace(found.certificate, kind=Proof.LOCAL, lower_bound=0.0, gap=1.0))
+    for each in (empty, local):
+        text = f"{headline(each)} {explained(each)}"
+        assert "no useful bound yet" in headline(each)
+        assert "No useful bound yet." in explained(each)
+        assert "100 %" not in text
+        assert "less than 0" not in text
+        assert "below 0" not in text
