@@ -13,6 +13,8 @@ if TYPE_CHECKING:
 
 LONGEST = 100
 """Characters of a number with its unit."""
+MOST_FACTORS = 12
+"""Names in one unit."""
 _QUANTITY = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .-]*)?\s*$")
 DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+(?![\d,.])")
 """What a number looks like where commas divide it."""
@@ -20,6 +22,10 @@ THOUSANDS = re.compile(r"^\s*[+-]?[1-9]\d{0,2},\d{3}(?!\d)")
 """What it looks like where a comma may as well divide thousands."""
 # kp/cm2 as it is typed for kp/cm^2; H2O keeps its figure
 _POWER = re.compile(r"(?<=[a-z])([23])\b")
+_NAME = r"(?!\d)(?:(?![⁰¹²³⁴-⁹])[\w°%])+"
+_POWERED = rf"{_NAME}(?:⁻?[⁰¹²³⁴-⁹]| ?(?:\^|\*\*) ?-?[0-9](?:\.[0-9]{{1,3}})?)?"
+_PRODUCT = re.compile(rf"{_POWERED}(?:(?: ?[*/.] ?| +){_POWERED}){{,{MOST_FACTORS - 1}}}")
+"""What a unit looks like: names and powers below ten, one behind the other. The registry evaluates anything."""
 _OF_ANGLES = ("rad", "rad/s", "N m/rad", "N m s/rad")
 # full names that speak of an angle
 _TURNING = re.compile("radian|degree|turn|revolution|arcminute|arcsecond|grad")
@@ -79,6 +85,9 @@ def _factor(unit: str, wanted: str) -> float:
 
 
 def _by_registry(unit: str, wanted: str, other: UnitError) -> float:
+    unknown = UnitError(f"unit '{unit}' is not known; {_in_units(wanted)}")
+    if _PRODUCT.fullmatch(unit) is None:
+        raise unknown
     registry = _registry()
     try:
         parsed = registry.parse_units(unit)
@@ -90,7 +99,7 @@ def _by_registry(unit: str, wanted: str, other: UnitError) -> float:
         # the registry and the tokenizer below it raise a dozen kinds for what is no unit
         if type(error).__name__ == "DimensionalityError":
             raise other from None
-        raise UnitError(f"unit '{unit}' is not known; {_in_units(wanted)}") from None
+        raise unknown from None
     if (_TURNING.search(str(parsed)) is not None) != (wanted in _OF_ANGLES):
         # a radian has no dimension, so 50 Hz would pass for 50 rad/s and 15 deg for a ratio
         raise other

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import laufruhe.units
 from laufruhe.units import COMMON, UnitError, _by_registry, dimension_name, example, parse, shown
 
 GRAVITY = 9.80665
@@ -55,10 +57,31 @@ class TestParse:
             ("5. m", "m", 5.0),
             ("+5 m", "m", 5.0),
             ("25 µm", "m", 25e-6),
+            ("1 kp/cm²", "Pa", 1e4 * GRAVITY),
+            ("1 N/mm²", "Pa", 1e6),
         ],
     )
     def test_units_of_the_field(self, text: str, unit: str, value: float) -> None:
         assert parse(text, unit) == pytest.approx(value, rel=1e-13, abs=0.0)
+
+    @pytest.mark.parametrize(
+        "unit",
+        ["m**9**9**9**9", "m*9**9**9", "m*m**-9**9**9", "m^99999999999", "m^1e9", "m^-1^-1", "m m" + " m" * 11, "m/0",
+         "m*1e400", "m//m", "m%**m", "m^2^-1", "m**10", "m²⁹", "m2⁹⁹⁹⁹⁹⁹", "m²³**9", "m - m", "m" + "*m" * 48],
+    )  # fmt: skip
+    def test_no_unit_is_computed(self, unit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        """The registry would evaluate any expression: these do not end, or count as a unit by chance."""
+        monkeypatch.setattr(laufruhe.units, "_registry", None)
+        with pytest.raises(UnitError, match=re.escape(f"unit '{unit}' is not known")):
+            parse(f"1 {unit}", "m")
+
+    @pytest.mark.parametrize(
+        ("text", "value"),
+        [("1 mm^2/m", 1e-6), ("1 mm²/m", 1e-6), ("1 m ** 2 * mm ^ -1", 1e3), ("2 m^2.0 mm^-1", 2e3),
+         ("1 m*m*m*m/m/m/m", 1.0),          ("1 m^9 / km^8", 1e-24), ("1 m" + " m/m" * 5, 1.0)],
+    )  # fmt: skip
+    def test_products_and_powers(self, text: str, value: float) -> None:
+        assert parse(text, "m") == pytest.approx(value, rel=1e-12)
 
     @pytest.mark.parametrize(
         ("text", "unit", "rule"),

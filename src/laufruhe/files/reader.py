@@ -39,6 +39,7 @@ from laufruhe.files.run_up import run_of
 from laufruhe.files.running_gear import size_decisions, weighed
 from laufruhe.files.scene import Scene
 from laufruhe.files.tolerances import over_of, parted, tolerances_of, with_numbers
+from laufruhe.files.toml_depth import line_deeper_than
 from laufruhe.files.toml_faults import toml_complaint
 from laufruhe.files.torsion import torsion_of
 from laufruhe.machine import Cycle, Engine, SliderCrank
@@ -50,7 +51,7 @@ from laufruhe.problem.problem import Problem, Search
 from laufruhe.problem.tolerance import Drawing, Tolerances
 from laufruhe.problem.tolerance import Path as Place
 
-DEEPEST, MOST_ENTRIES, MOST_BYTES = 16, 1000, 10_000_000
+DEEPEST, MOST_ENTRIES, MOST_BYTES = 16, 1000, 1_000_000
 """Of a file: tables within tables, entries of one list or table, and bytes."""
 LARGEST = 2**63 - 1
 STDIN, UNNAMED = Path("-"), Path("problem")
@@ -227,16 +228,19 @@ def _parsed(content: bytes, path: Path) -> dict[str, Any]:
     if len(content) > MOST_BYTES:
         raise _unreadable(path, f"is larger than {MOST_BYTES // 1_000_000} MB", "a problem takes a few kB")
     try:
-        return tomllib.loads(content.decode("utf-8-sig"))
+        text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise _unreadable(path, f"is no UTF-8 text (byte {error.start + 1})", "save it as UTF-8") from None
+    deep = line_deeper_than(DEEPEST, text)
+    if deep is not None:
+        raise refused(f"line {deep}", "", f"is nested more than {DEEPEST} deep", "flatten it", path)
+    try:
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(str(path), (toml_complaint(content, error),)) from None
     except ValueError:
         # the one that is no TOMLDecodeError
         raise _unreadable(path, "holds a whole number of thousands of digits", "write it shorter") from None
-    except RecursionError:
-        raise _unreadable(path, "is nested too deeply", "flatten it") from None
 
 
 def is_study(path: Path) -> bool:
