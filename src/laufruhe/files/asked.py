@@ -145,8 +145,11 @@ def limit_name(entry: Mapping[str, Any]) -> str | None:
         return table.name
     channel, norm = MEASURES[table.limit]
     at = next((getattr(table, key) for key in PLACES if getattr(table, key)), None)
-    points, motions = as_tuple(table.operating_points), as_tuple(table.motions)
-    return Measure(channel, norm, as_tuple(at), points, None, as_tuple(table.orders), None, motions).name
+    found = Measure(
+        channel, norm, as_tuple(at), as_tuple(table.operating_points), orders=as_tuple(table.orders),
+        motions=as_tuple(table.motions), alternating=bool(table.alternating),
+    )  # fmt: skip
+    return found.name
 
 
 def _side(text: str | float | None, measure: Measure, where: str) -> float | None:

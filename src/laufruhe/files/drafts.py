@@ -47,6 +47,7 @@ positions = [
 {balance}
 [objective]
 minimise = "mean mount force"   # or "maximum mount force", "rms shaking force" ...
+alternating = true              # without the steady reaction to the mean torque, which no weight can balance
 
 # [[constraints]]
 # limit = "maximum mount force"

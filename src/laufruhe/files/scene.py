@@ -77,6 +77,9 @@ class QuantityTable(Table):
     )
     operating_points: list[str] | None = None
     orders: list[f.NonNegative] | None = None
+    alternating: bool | None = f.told(
+        "Whether the mean of a load over the cycle is left out: the steady reaction to the mean torque is then no part."
+    )
     direction_weights: f.Three[f.NonNegative] | None = None
     load_cases: list[str] | None = f.told("Load cases that count, by name; all by default.")
     motions: list[Motion] | None = f.told("Motions that should have a mode of their own; all by default.")
@@ -111,7 +114,7 @@ class Scene:
             channel, norm, self._places(channel, table, at), as_tuple(table.operating_points), as_tuple(of),
             as_tuple(table.orders), None if weights is None else (weights[0], weights[1], weights[2]),
             as_tuple(table.motions), (0.0, math.inf) if table.frequency is None else Open.of(table.frequency).bounds,
-            1.0 if table.wanted is None else table.wanted, as_tuple(table.load_cases),
+            1.0 if table.wanted is None else table.wanted, as_tuple(table.load_cases), bool(table.alternating),
         )  # fmt: skip
         if found.is_mass:
             self._counts(found, of, at)
@@ -149,6 +152,9 @@ class Scene:
                 rule = f"is open, and {channel} is of one frequency"
                 raise Refused(f"{at}.frequency", None, rule, f"{remedy}, or ask for the raw torque-roll residual")
         self._orders(table.orders, f"{at}.orders")
+        if table.alternating and 0.0 in (table.orders or ()):
+            rule = "holds 0, which alternating leaves out"
+            raise Refused(f"{at}.orders", table.orders, rule, "take 0 out, or alternating")
 
     def _places(self, channel: Channel, table: QuantityTable, at: str) -> tuple[str, ...] | None:
         """Names of the places that count; all where none are named."""

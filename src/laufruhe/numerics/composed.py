@@ -72,6 +72,11 @@ class Mapped(Composed):
         found = self.source.series
         return self if found is self.source else Mapped(found, self.linear)
 
+    @property
+    def without_mean(self) -> Spectrum:
+        """The signal less its mean over the period."""
+        return Mapped(self.source.without_mean, self.linear)
+
     def over(self, base: Fraction) -> Spectrum:
         """Its source over another period."""
         return Mapped(self.source.over(base), self.linear)
@@ -103,6 +108,11 @@ class Held(Spectrum):
     def series(self) -> Spectrum:
         """Its orders alone."""
         return self if self.corners is None else held(super().series)
+
+    @cached_property
+    def without_mean(self) -> Spectrum:
+        """The signal less its mean over the period."""
+        return held(super().without_mean)
 
     def over(self, base: Fraction) -> Spectrum:
         """The same over another period of its own."""
@@ -167,6 +177,11 @@ class Summed(Composed):
         """Orders of both alone."""
         found = self.held.series, self.own.series
         return self if found == self.parts else Summed(*found)
+
+    @property
+    def without_mean(self) -> Spectrum:
+        """Both less their means over the period."""
+        return Summed(self.held.without_mean, self.own.without_mean)
 
     def over(self, base: Fraction) -> Spectrum:
         """Both over another period."""

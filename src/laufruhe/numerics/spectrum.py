@@ -131,6 +131,11 @@ class Spectrum:
         counted = orders_equal(self.orders, orders).reshape(-1, *(1,) * (self.coefficients.ndim - 1))
         return Spectrum(self.base, np.where(counted, self.coefficients, 0.0))
 
+    @property
+    def without_mean(self) -> Spectrum:
+        """The signal less its mean over the period (M7); its corners stay, for they have none."""
+        return self.holding(np.concatenate([np.zeros_like(self.coefficients[:1]), self.coefficients[1:]]))
+
     def sample(self, samples: int) -> NDArray[np.float64]:
         """Values at `samples` equal steps over one period 2 pi / b, shape (samples, ...).
 

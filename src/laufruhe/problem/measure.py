@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -50,6 +50,8 @@ class Measure:
         Names of the load cases that count; all when None.
     wanted
         Share of a motion in a mode of its own that is enough.
+    alternating
+        Whether the mean of a load over the cycle is left out (M7).
     """
 
     channel: Channel
@@ -63,11 +65,13 @@ class Measure:
     frequency: tuple[float, float] = (0.0, math.inf)
     wanted: float = 1.0
     cases: tuple[str, ...] | None = None
+    alternating: bool = False
 
     @property
     def name(self) -> str:
         """As a report prints it."""
-        text = f"{self.norm.name} {self.channel}" if self.is_load else str(self.channel)
+        part = "alternating " if self.alternating else ""
+        text = f"{self.norm.name} {part}{self.channel}" if self.is_load else str(self.channel)
         if self.orders is not None:
             text += " of order " + ", ".join(f"{order:g}" for order in self.orders)
         if self.motions is not None:
@@ -156,9 +160,18 @@ class Measure:
 
     def counted(self, orders: Sequence[float] | Array) -> NDArray[np.bool_]:
         """Which orders of crank speed count, shape of `orders`."""
-        if self.orders is None:
-            return np.ones(np.shape(orders), dtype=bool)
-        return orders_equal(orders, self.orders)
+        counts = np.ones(np.shape(orders), dtype=bool) if self.orders is None else orders_equal(orders, self.orders)
+        return counts & ~orders_equal(orders, 0.0) if self.alternating else counts
+
+    @property
+    def counts_mean(self) -> bool:
+        """Whether the mean of a load over the cycle is a part of it."""
+        return self.is_load and bool(self.counted([0.0])[0])
+
+    @property
+    def of_all_orders(self) -> Measure:
+        """The measure of the whole load, its mean included."""
+        return replace(self, orders=None, alternating=False)
 
     def signal(self, loads: PointLoads, engine: Engine) -> Spectrum:
         """What counts of a load at an operating point, shape (n, places, d)."""
@@ -305,7 +318,9 @@ def selected(measure: Measure, signal: Spectrum, engine: Engine) -> Spectrum:
         signal = signal.each(lambda values: values * np.array(measure.direction_weights))
     if measure.load.adds_up:
         signal = signal.each(lambda values: values * values.shape[1])
-    return signal if measure.orders is None else signal.only(measure.orders)
+    if measure.orders is not None:
+        signal = signal.only(measure.orders)
+    return signal.without_mean if measure.alternating else signal
 
 
 def _roles(measure: Measure) -> tuple[Role, ...]:

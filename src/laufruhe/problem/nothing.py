@@ -51,7 +51,7 @@ def nothing_of(problem: Problem, engine: Engine | None = None) -> float:
 
 def _of_all_orders(measure: Measure) -> Measure:
     """What is measured of some orders, of all."""
-    return measure if not measure.is_load else replace(measure, orders=None)
+    return measure if not measure.is_load else measure.of_all_orders
 
 
 def _lossy(spring: Mount) -> Mount:

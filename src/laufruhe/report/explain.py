@@ -6,7 +6,10 @@ from dataclasses import asdict
 
 from laufruhe.fidelity.automatic import Choice
 from laufruhe.present.numbers import trimmed
+from laufruhe.present.static_load import static_sentence
+from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.static_load import static_part
 from laufruhe.report.strict_json import strict
 
 
@@ -29,6 +32,7 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
         *(f"  {text}" for text in choice.kept),
         "Left out:",
         *(_line(part.what, part.why, part.share) for part in choice.left_out),
+        *_static(problem),
         "Cost:",
         f"  {pruned} of {whole} samples of force components{fewer}",
         f"  another design is evaluated in {milliseconds[0]:.3f} ms, exactly in {milliseconds[1]:.3f} ms",
@@ -38,6 +42,7 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
 
 def as_json(problem: Problem, choice: Choice, tolerance: float, milliseconds: tuple[float, float]) -> str:
     """The same for scripts."""
+    part = static_part(problem, evaluate_start(problem)) if problem.load_terms else None
     return strict({
         "problem": problem.name,
         "tolerance": tolerance,
@@ -45,9 +50,15 @@ def as_json(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
         "fidelity": asdict(choice.fidelity),
         "kept": list(choice.kept),
         "left_out": [{"what": part.what, "why": part.why, "share": part.share} for part in choice.left_out],
+        "static": None if part is None else {"static": part.static, "alternating": part.alternating},
         "numbers": {"kept": choice.numbers[0], "exact": choice.numbers[1]},
         "milliseconds": {"kept": milliseconds[0], "exact": milliseconds[1]},
     })  # fmt: skip
+
+
+def _static(problem: Problem) -> list[str]:
+    sentence = static_sentence(problem, evaluate_start(problem)) if problem.load_terms else ""
+    return ["Static:", f"  {sentence}"] if sentence else []
 
 
 def _line(what: str, why: str, share: float) -> str:

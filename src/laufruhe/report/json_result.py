@@ -23,6 +23,7 @@ from laufruhe.present.torsion import barred_ranges, is_twisted, speed_range
 from laufruhe.present.torsion import facts_of as torsion_of
 from laufruhe.problem.channels import LoadChannel, mounting_in
 from laufruhe.problem.evaluation import Evaluation, measured, over, samples_of
+from laufruhe.problem.static_load import static_part
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
@@ -107,7 +108,9 @@ def _running(result: Result) -> Record:
 def _objective(result: Result) -> Record | None:
     """Null where nothing is minimised; without a design its value alone is."""
     if result.objective is not None:
-        return _of(result.objective, "name value unit initial reduction")
+        part = static_part(result.problem, result.final)
+        means = {} if part is None else {"static": part.static, "alternating": part.alternating}
+        return {**_of(result.objective, "name value unit initial reduction"), **means}
     given = ObjectiveValue.given(result.problem, result.initial)
     return None if given is None else {**_of(given, "name value unit initial"), "value": None, "reduction": None}
 

@@ -9,6 +9,8 @@ from dataclasses import asdict
 from laufruhe.fidelity.knobs import NO_GAS, TWO_ORDER
 from laufruhe.fidelity.mount_knobs import RIGID
 from laufruhe.present.numbers import DASH, figure
+from laufruhe.present.static_load import static_sentence
+from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.report.document import Block, Bullets, Code, Document, Illustration, Paragraph
 from laufruhe.report.grid import Grid
 from laufruhe.report.strict_json import strict
@@ -75,7 +77,8 @@ def trade_document(found: Trade, picture: str | None, command: str) -> Document:
     mounts = OF_MOUNTS if problem.mount_decisions and problem.load_terms else ""
     searched = OF_STARS if compares_stars(problem) else LOCAL if is_local(problem) else ""
     blocks.append(Paragraph(COLUMNS + searched + mounts, marked=True))
-    blocks.extend(Paragraph(line) for line in (*found.left_out, *_beyond(found)))
+    static = static_sentence(problem, evaluate_start(problem)) if problem.load_terms else ""
+    blocks.extend(Paragraph(line) for line in (*([static] if static else []), *found.left_out, *_beyond(found)))
     return Document(f"{TITLE}: {problem.title}", (*blocks, Code(command)))
 
 

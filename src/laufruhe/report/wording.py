@@ -7,6 +7,7 @@ import math
 from laufruhe.numerics.turns import as_turn, within
 from laufruhe.present.measures import breaks_a_limit, changed, has_firing
 from laufruhe.present.numbers import figure, number, percent, trimmed
+from laufruhe.present.static_load import static_sentence
 from laufruhe.problem.plausibility import together
 from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.report.sections.reach import sentences
@@ -47,7 +48,8 @@ def headline(result: Result) -> str:
 
 def told(result: Result) -> list[str]:
     """What is said below the headline: what limits can reach, when cylinders fire, and why its star is the best."""
-    return [sentence for sentence in (*sentences(result), fired(result), why_star(result)) if sentence]
+    static = "" if result.objective is None else static_sentence(result.problem, result.final)
+    return [sentence for sentence in (*sentences(result), static, fired(result), why_star(result)) if sentence]
 
 
 def fidelity_of(result: Result) -> str:

@@ -32,8 +32,10 @@ from laufruhe.errors import SolverError
 from laufruhe.numerics.norms import NORMS
 from laufruhe.present.numbers import percent
 from laufruhe.problem import channels
+from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.static_load import with_alternating_loads, with_whole_loads
 from laufruhe.solvers import solve
 from laufruhe.studies.scenes import shafts_of
 from laufruhe.studies.text import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
@@ -50,7 +52,8 @@ class FrontPoint(NamedTuple):
     """The least objective under a limit on the mass of the shafts, what no design within it falls below, and the gap.
 
     Mass used on the shafts [kg], and the fall of the objective per kilogram more [SI / kg]; that is zero where the
-    limit does not bind, and at no mass at all, where the solver's price has nothing to vary.
+    limit does not bind, and at no mass at all, where the solver's price has nothing to vary. The counterpart is the
+    objective of the same design with its static part where it is alternating, else without.
     """
 
     force: float
@@ -58,6 +61,7 @@ class FrontPoint(NamedTuple):
     gap: float
     mass: float
     price: float
+    counterpart: float
 
 
 def best(problem: Problem, mass_limit: float = math.inf) -> FrontPoint:
@@ -71,7 +75,10 @@ def best(problem: Problem, mass_limit: float = math.inf) -> FrontPoint:
     value, proof = result.objective.value, result.certificate
     mass = result.final.value(MASS_ON_SHAFTS) if shafts_of(problem) else 0.0
     price = next((limit.shadow_price for limit in result.limits if limit.name == LIMIT_NAME), 0.0)
-    return FrontPoint(value, proof.lower_bound if proof else value, proof.gap if proof else 0.0, mass, price)
+    bound, gap = (proof.lower_bound, proof.gap) if proof else (value, 0.0)
+    other = with_alternating_loads(problem)
+    other = with_whole_loads(problem) if other.objective == problem.objective else other
+    return FrontPoint(value, bound, gap, mass, price, objective_value(other, result.final))
 
 
 def front(problem: Problem, mass_limits: Sequence[float]) -> list[FrontPoint]:

@@ -26,7 +26,7 @@ OfWheel: TypeAlias = Callable[[Flywheel], float]
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 UNFELT = frozenset({Kind.FLYWHEEL, Kind.TORSION})
 """At an even speed no load on block or bearings feels the flywheel, nor how the crankshaft twists."""
-ON_BLOCK = ("operating_points", "orders")
+ON_BLOCK = ("operating_points", "orders", "alternating")
 AT_SECTIONS, AT_WEBS = ((*ON_BLOCK, at) for at in ("sections", "webs"))
 AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
     (*ON_BLOCK, "direction_weights", at) for at in ("mounts", "bearings", "cylinders")

@@ -16,7 +16,7 @@ from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.static_cases import settled
 from laufruhe.problem.asking import Answered, Asked
-from laufruhe.problem.channels.kinds import ON_BLOCK, MountChannel, Needs
+from laufruhe.problem.channels.kinds import MountChannel, Needs
 
 
 def mounting_in(engine: Engine) -> ElasticMounting:
@@ -89,7 +89,9 @@ def _of_cases(name: str, unit: str, part: Callable[[Any], Any]) -> MountChannel:
 
 STATIC_TRAVEL = _of_cases("static travel", "m", lambda found: found.travel)
 STATIC_FORCE = _of_cases("static mount force", "N", lambda found: found.force)
-TRANSMISSIBILITY = MountChannel("transmissibility", "", ON_BLOCK, values=_transmissibility, of_loads=True)
+TRANSMISSIBILITY = MountChannel(
+    "transmissibility", "", ("operating_points", "orders"), values=_transmissibility, of_loads=True
+)
 SAG = MountChannel(
     "static sag", "m", sides=("min", "max"), values=_of_mounting(lambda mounting, _: mount_numbers.sag(mounting))
 )

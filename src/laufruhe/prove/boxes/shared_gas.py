@@ -191,7 +191,7 @@ class SharedGasBoxes:
             mounting = mounting_of(engine, fidelity)
         forces = mounting.forces(wrench, point.speed) if mounting is not None else None
         loads = PointLoads(point, wrench, forces, None, engine, fidelity)
-        signal = selected(replace(measure, orders=None), measure.load.signal(loads), engine)
+        signal = selected(measure.of_all_orders, measure.load.signal(loads), engine)
         return lengths(signal.coefficients[1].real)
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
@@ -245,7 +245,10 @@ class SharedGasBoxes:
                 sum(w * float(np.mean(k**2)) * s for w, k, s in zip(shares, gains, squares, strict=True) if w)
             )
         tops = [
-            math.sqrt(2.0 * len(measure.orders) * square) if measure.orders is not None else float(each.max())
+            math.sqrt(2.0 * len(measure.orders) * square)
+            if measure.orders is not None
+            # without its mean a change is at most its largest value and its mean together
+            else float(each.max() + measure.alternating * each.mean())
             for each, square in zip(changes, squares, strict=True)
         ]
         twice = norm.value(Grid(np.ones(2), 2), np.array([[1.0], [-1.0]]))

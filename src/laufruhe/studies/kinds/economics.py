@@ -17,6 +17,7 @@ from laufruhe.files.fields import Name, Table
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.present.numbers import percent
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.static_load import with_alternating_loads
 from laufruhe.studies import picture as p
 from laufruhe.studies.equal_power import check_comparable
 from laufruhe.studies.part import Part, Record, variable
@@ -41,6 +42,7 @@ _FREE = {
     "optimum": ("force", "least objective whatever the shafts weigh", "{}"),
     "optimum_bound": ("lower_bound", "what no design falls below, whatever the shafts weigh", "{}"),
     "optimum_mass": ("mass", "mass on the shafts at the least objective", "kg"),
+    "optimum_counterpart": ("counterpart", "objective of that design with its static part, or without", "{}"),
 }
 
 
@@ -84,6 +86,9 @@ class Economics(Part):
     """Least force over number and mass of shafts, beside the engine with one more cylinder at equal power."""
 
     kind: Literal["economics"]
+    alternating: bool = f.told(
+        "Whether shafts are judged by loads without their mean over the cycle, which no shaft can balance.", True
+    )
     mass_limits: list[f.Mass] = f.needed("Largest masses of the shafts, ascending: the points of the front.")
     builds: list[BuildTable] = Field(min_length=1)
     more_cylinders: list[CaseTable] = Field(
@@ -119,7 +124,7 @@ class Economics(Part):
 
     def settings(self) -> dict[str, Any]:
         """Of a front, the masses alone: names and claims change nothing in it."""
-        return {"kind": self.kind, "mass_limits": self.mass_limits}
+        return {"kind": self.kind, "mass_limits": self.mass_limits, "alternating": self.alternating}
 
     def points(self, scenes: Scenes) -> list[Point]:
         """The plain engine, every build, and every engine with more cylinders rebuilt at equal power."""
@@ -145,6 +150,7 @@ class Economics(Part):
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """The front of one engine."""
         problem = scenes.problem(point)
+        problem = with_alternating_loads(problem) if self.alternating else problem
         try:
             points = front(problem, self.mass_limits)
         except SolverError as error:
@@ -177,6 +183,7 @@ class Economics(Part):
             "claimed_where": ("build", [claim.where for claim in claims]),
         }
         data = xr.Dataset(values, coords, self.about(objective=records[0]["objective"]))
+        data.attrs["counterpart"] = "with its static part" if self.alternating else "alternating part"
         return data.assign(efficient=_efficient(data))
 
     @staticmethod
@@ -185,7 +192,7 @@ class Economics(Part):
         judged = {worth.build: worth for worth in worths(data)}
         unit, plain = data["optimum"].attrs["units"], float(data["optimum"].isel(build=0))
         head = ["engine", "shafts", "mass on them [kg]", f"{data.attrs['objective']} [{unit}]", f"lower bound [{unit}]",
-                "beside plain", "worth building"]  # fmt: skip
+                f"{data.attrs['counterpart']} [{unit}]", "beside plain", "worth building"]  # fmt: skip
         rows = []
         for name in data["build"].values:
             row = data.sel(build=name)
@@ -193,7 +200,7 @@ class Economics(Part):
             label = f"{name}, no shafts, equal power" if str(row["standing"].item()) == NEXT else str(name)
             cells = [label, str(int(row["shafts"])), f"{float(row['optimum_mass']):.2f}", number(force)]
             change = NOTHING if force == plain else percent(force / plain - 1.0)
-            cells += [number(float(row["optimum_bound"]), 6), change]
+            cells += [number(float(row["optimum_bound"]), 6), number(float(row["optimum_counterpart"])), change]
             rows.append([*cells, f"{'**yes**' if worth.worth else 'no'}: {worth.why}" if worth else NOTHING])
         return [Rows(head, rows), *said([v for own in verdicts(data).values() for v in own]), *_front_rows(data)]
 

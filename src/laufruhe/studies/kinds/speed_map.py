@@ -20,7 +20,7 @@ from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.elastic_mounts import ResonanceError
-from laufruhe.problem.channels import ON_BLOCK, LoadChannel, mounting_in
+from laufruhe.problem.channels import LoadChannel, mounting_in
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure, selected
 from laufruhe.problem.problem import Problem
@@ -113,7 +113,8 @@ class SpeedMap(Part):
                 measure = scene.measure(table.quantity, table, f"measures[{k}].quantity")
                 where = f"measures[{k}].limit"
                 asked[measure] = math.inf if table.limit is None else measured(table.limit, measure.unit, where)
-        return {replace(m, points=None): limit for m, limit in asked.items() if set(ON_BLOCK) <= set(m.channel.keys)}
+        narrowed = {"operating_points", "orders"}
+        return {replace(m, points=None): limit for m, limit in asked.items() if narrowed <= set(m.channel.keys)}
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """Values, limits and orders of every design at every speed."""
