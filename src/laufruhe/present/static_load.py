@@ -22,6 +22,6 @@ def static_sentence(problem: Problem, evaluation: Evaluation) -> str:
         )
     share = trimmed(100.0 * part.static / part.value, 2)
     return (
-        f"The steady reaction to the mean torque alone makes {alone} ({share} %), which nothing that turns can balance. "
-        f"Without that mean the objective is {rest} (alternating = true)."
+        f"The steady reaction to the mean torque alone makes {alone} ({share} %), which nothing that turns can "
+        f"balance. Without that mean the objective is {rest} (alternating = true)."
     )
