@@ -5,7 +5,7 @@ from __future__ import annotations
 from laufruhe.present.numbers import figure, trimmed
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.static_load import static_part
+from laufruhe.problem.static_load import static_part, with_alternating_loads
 
 
 def static_sentence(problem: Problem, evaluation: Evaluation) -> str:
@@ -14,14 +14,17 @@ def static_sentence(problem: Problem, evaluation: Evaluation) -> str:
     if part is None:
         return ""
     unit = problem.objective_unit or ""
-    alone, rest = figure(part.static, unit), figure(part.alternating, unit)
+    alone, rest, whole = (figure(value, unit) for value in (part.static, part.alternating, part.whole))
+    if with_alternating_loads(problem).objective == problem.objective:
+        return f"Left out is the steady reaction to the mean torque, {alone} alone; with it the objective is {whole}."
+    lead = f"The steady reaction to the mean torque alone makes {alone}"
     if part.is_floor:
         return (
-            f"The steady reaction to the mean torque alone makes {alone}: nothing that turns can bring the objective "
-            f"below it. Without that mean it is {rest}; alternating = true minimises this."
+            f"{lead}: nothing that turns can bring the objective below it. Without that mean it is {rest}; "
+            "alternating = true minimises this."
         )
-    share = trimmed(100.0 * part.static / part.value, 2)
+    share = trimmed(100.0 * part.static / part.whole, 2)
     return (
-        f"The steady reaction to the mean torque alone makes {alone} ({share} %), which nothing that turns can "
-        f"balance. Without that mean the objective is {rest} (alternating = true)."
+        f"{lead} ({share} %), which nothing that turns can balance. "
+        f"Without that mean the objective is {rest} (alternating = true)."
     )

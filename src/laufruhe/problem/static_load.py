@@ -13,35 +13,35 @@ NEGLIGIBLE = 1e-3
 
 @dataclass(frozen=True)
 class StaticPart:
-    """An objective as it is, of its mean loads alone, and without them.
+    """An objective of whole loads, of their means alone, and without these.
 
     Attributes
     ----------
-    value
-        The objective [SI].
+    whole
+        The objective of the loads as they are [SI].
     static
-        The objective if only the means over the cycle acted; no sum of parts, since lengths do not add up.
+        The objective if only the means over the cycle acted; no share of a sum, since lengths do not add up.
     alternating
         The objective if all but the means acted.
     """
 
-    value: float
+    whole: float
     static: float
     alternating: float
 
     @property
     def is_floor(self) -> bool:
-        """Whether the objective is as small as its static part lets it be: a norm is never under that of the mean."""
-        return self.value <= self.static * (1.0 + NEGLIGIBLE)
+        """Whether the whole is as small as its static part lets it be: a norm is never under that of the mean."""
+        return self.whole <= self.static * (1.0 + NEGLIGIBLE)
 
 
 def static_part(problem: Problem, evaluation: Evaluation) -> StaticPart | None:
-    """Return the static part of the objective of a design, or None where it is negligible."""
-    counted = [term for term in problem.objective if term.measure.counts_mean and not term.measure.is_inside]
+    """Return the static part of loads on the block and its mounts in the objective, or None where it is negligible."""
+    whole = with_whole_loads(problem)
+    counted = [term for term in whole.objective if term.measure.counts_mean and not term.measure.is_inside]
     if evaluation.resonance or not counted:
         return None
-
-    value = objective_value(problem, evaluation)
+    value = objective_value(whole, evaluation)
     static = sum(term.weight * evaluation.value(replace(term.measure, orders=(0.0,))) for term in counted)
     if not static > NEGLIGIBLE * value:
         return None
@@ -50,14 +50,17 @@ def static_part(problem: Problem, evaluation: Evaluation) -> StaticPart | None:
 
 def with_alternating_loads(problem: Problem) -> Problem:
     """Return the problem with an objective that leaves out the mean of every load."""
-    terms = (
-        replace(term, measure=replace(term.measure, alternating=True)) if term.measure.counts_mean else term
-        for term in problem.objective
-    )
-    return replace(problem, objective=tuple(terms))
+    return _with_loads(problem, True)
 
 
 def with_whole_loads(problem: Problem) -> Problem:
     """Return the problem with an objective that keeps the mean of every load."""
-    terms = (replace(term, measure=replace(term.measure, alternating=False)) for term in problem.objective)
+    return _with_loads(problem, False)
+
+
+def _with_loads(problem: Problem, alternating: bool) -> Problem:
+    terms = []
+    for term in problem.objective:
+        whole = replace(term.measure, alternating=False)
+        terms.append(replace(term, measure=replace(whole, alternating=alternating and whole.counts_mean)))
     return replace(problem, objective=tuple(terms))

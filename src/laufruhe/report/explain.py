@@ -50,7 +50,7 @@ def as_json(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
         "fidelity": asdict(choice.fidelity),
         "kept": list(choice.kept),
         "left_out": [{"what": part.what, "why": part.why, "share": part.share} for part in choice.left_out],
-        "static": None if part is None else {"static": part.static, "alternating": part.alternating},
+        "static": None if part is None else asdict(part),
         "numbers": {"kept": choice.numbers[0], "exact": choice.numbers[1]},
         "milliseconds": {"kept": milliseconds[0], "exact": milliseconds[1]},
     })  # fmt: skip

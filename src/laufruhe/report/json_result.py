@@ -109,7 +109,7 @@ def _objective(result: Result) -> Record | None:
     """Null where nothing is minimised; without a design its value alone is."""
     if result.objective is not None:
         part = static_part(result.problem, result.final)
-        means = {} if part is None else {"static": part.static, "alternating": part.alternating}
+        means = {} if part is None else asdict(part)
         return {**_of(result.objective, "name value unit initial reduction"), **means}
     given = ObjectiveValue.given(result.problem, result.initial)
     return None if given is None else {**_of(given, "name value unit initial"), "value": None, "reduction": None}
