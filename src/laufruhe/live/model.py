@@ -27,6 +27,7 @@ from laufruhe.numerics.norms import MEAN
 from laufruhe.present.measures import places_of
 from laufruhe.problem.channels import CHANNELS
 from laufruhe.problem.decision import Decision, Domain, Kind, vector_of
+from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
@@ -151,7 +152,7 @@ class _Collected:
     def _shown(
         self, measure: Measure, role: str, name: str, limit: Limit | None = None, weight: float = 1.0
     ) -> list[Shown]:
-        stays = not measure.channel.is_moved_by(self.kinds)
+        stays = not depends(measure.channel, self.kinds, self.model.problem)
         is_affine = measure.is_mass or (measure.is_load and not measure.channel.feels_inertia)
         if not stays and not is_affine:
             self.unmoved.append((name, self.aside))

@@ -20,7 +20,7 @@ from laufruhe.machine import Engine, OperatingPoint, Role, Rotor, SliderCrank
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, orders_equal
-from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel
+from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, MOUNT_TRAVEL, Channel, LoadChannel, MassChannel
 from laufruhe.problem.loads import PointLoads
 
 
@@ -113,8 +113,8 @@ class Measure:
 
     @property
     def on_mounts(self) -> bool:
-        """Whether it is of a signal at the mounts."""
-        return self.is_load and self.load.part is None and not self.load.is_inside
+        """Whether it is of the force or the travel of each mount."""
+        return self.channel in (MOUNT_FORCE, MOUNT_TRAVEL)
 
     @property
     def is_inside(self) -> bool:

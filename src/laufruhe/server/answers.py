@@ -20,6 +20,7 @@ from laufruhe.files.toml_text import toml_text
 from laufruhe.live import decided
 from laufruhe.present.numbers import figure
 from laufruhe.present.pictures import PICTURES
+from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
@@ -157,7 +158,7 @@ def _standing(limit: Limit, value: float, price: float, found: Followed, scene: 
         active = price * limit.maximum > ROUNDING * found.value
         return LimitValue(limit.name, value, limit.maximum, limit.measure.unit, active, price if active else 0.0)
     (given,) = limit_values(scene.problem.changed(limits=(limit,)), scene.given)
-    moves = limit.measure.channel.is_moved_by(kinds_of(scene.problem))
+    moves = depends(limit.measure.channel, kinds_of(scene.problem), scene.problem)
     return replace(given, value=math.nan, active=False, shadow_price=math.nan) if moves else given
 
 

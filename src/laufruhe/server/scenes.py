@@ -11,6 +11,7 @@ from typing import Any
 from laufruhe.errors import ModelError
 from laufruhe.files.asked import EDGES
 from laufruhe.live import live_model
+from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -81,7 +82,9 @@ class Scene:
 
     def _reads(self, limit: Limit) -> bool:
         """Whether a limit stands still, or is one that follows."""
-        return limit in self.problem.load_limits or not limit.measure.channel.is_moved_by(kinds_of(self.problem))
+        return limit in self.problem.load_limits or not depends(
+            limit.measure.channel, kinds_of(self.problem), self.problem
+        )
 
     def simplified(self, is_held: bool) -> Iterator[str]:
         """What of the whole problem is left out while sliders move: a bound holds for the rest alone."""

@@ -11,6 +11,7 @@ from functools import partial
 
 from laufruhe.errors import ModelError
 from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -36,11 +37,11 @@ def _groups(problem: Problem) -> list[Kinds]:
 def is_apart(problem: Problem) -> bool:
     """Whether a flywheel or the crankshaft is open beside other numbers, and nothing asked is moved by two of them."""
     groups = [group for group in _groups(problem) if group]
-    return len(groups) > 1 and all(len(_movers(measure, groups)) <= 1 for measure in problem.measures)
+    return len(groups) > 1 and all(len(_movers(measure, groups, problem)) <= 1 for measure in problem.measures)
 
 
-def _movers(measure: Measure, groups: list[Kinds]) -> list[Kinds]:
-    return [group for group in groups if group and measure.channel.is_moved_by(group)]
+def _movers(measure: Measure, groups: list[Kinds], problem: Problem) -> list[Kinds]:
+    return [group for group in groups if group and depends(measure.channel, group, problem)]
 
 
 def solve_apart(problem: Problem, solve: Solve) -> Result:
@@ -97,7 +98,7 @@ def _part(problem: Problem, groups: list[Kinds], group: Kinds) -> Problem:
     """What is open, wanted and forbidden of one group; what none moves belongs to the last."""
 
     def is_own(measure: Measure) -> bool:
-        return (_movers(measure, groups) or [groups[-1]])[0] == group
+        return (_movers(measure, groups, problem) or [groups[-1]])[0] == group
 
     return problem.changed(
         decisions=tuple(d for d in problem.decisions if d.kind in group),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,10 +13,30 @@ from typing import Any
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.load_models.run_look import asks_runs
 from laufruhe.numerics.budget import limited, passed
+from laufruhe.numerics.norms import Norm
 from laufruhe.numerics.processes import called
 from laufruhe.numerics.progress import Listener, listening, tell
+from laufruhe.problem.channels import (
+    ABSORBER_HEAT,
+    ENVELOPE_RADIUS,
+    FLYWHEEL_INERTIA,
+    IRREGULARITY,
+    MOUNT_FORCE,
+    MOUNT_TRAVEL,
+    OF_BLOCK,
+    OF_FLYWHEEL,
+    OF_MOUNTING,
+    OF_RUNS,
+    OF_SIZES,
+    SHAFT_CLEARANCE,
+    SHAFT_DISTANCE,
+    TORSIONAL,
+    Channel,
+)
 from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import Dependence, dependence, depends
 from laufruhe.problem.evaluation import objective_value
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
@@ -38,6 +58,14 @@ LIBRARIES = ("casadi", "clarabel", "cvxpy", "pyscipopt")
 CUT_SHORT = "stopped at the time limit"
 
 
+def _is_convex(norm: Norm) -> bool:
+    return norm.is_convex
+
+
+def _is_pointwise(norm: Norm) -> bool:
+    return norm.is_convex and norm.is_pointwise
+
+
 @dataclass(frozen=True)
 class Method:
     """A way of deciding.
@@ -46,24 +74,57 @@ class Method:
     ----------
     name
         In words.
-    decides
-        Kinds that it can have open together.
-    suits
-        Whether what is asked suits it.
+    needs
+        Kinds that it can have open together, and how what is asked may depend on each of them; NONE is always allowed.
     reach
         What its bounds can prove.
     home
         The function below `laufruhe.solvers` that finds the design, proven as far as it is.
     judges_fidelity
         Whether the fidelity is chosen again where the design needs a better one than that given (F11).
+    knows
+        Channels that it has formulas of its own for, however they depend on what is open, but not UNKNOWN.
+    norms
+        Return whether it suits a norm of a load, by what that claims.
+    also
+        Return whether other facts of a problem suit it.
     """
 
     name: str
-    decides: frozenset[Kind]
-    suits: Callable[[Problem], bool]
+    needs: Mapping[Kind, Collection[Dependence]]
     reach: Reach
     home: str
     judges_fidelity: bool = False
+    knows: frozenset[Channel] = frozenset()
+    norms: Callable[[Norm], bool] = _is_convex
+    also: Callable[[Problem], bool] = lambda _: True
+
+    @property
+    def decides(self) -> frozenset[Kind]:
+        """Kinds that it can have open together."""
+        return frozenset(self.needs)
+
+    def suits(self, problem: Problem) -> bool:
+        """Return whether it decides all that is open and asked of a problem."""
+        kinds = kinds_of(problem)
+        return (
+            kinds <= self.decides
+            and all(self._names(m, kinds, problem) for m in problem.measures)
+            and self.also(problem)
+        )
+
+    def _names(self, measure: Measure, kinds: Collection[Kind], problem: Problem) -> bool:
+        """Return whether a measure depends on these kinds in a way that the method allows."""
+        if measure in problem.known_rows:
+            return all(Dependence.AFFINE in self.needs[kind] for kind in kinds)
+        if measure.is_load and not self.norms(measure.norm):
+            return False
+        for kind in kinds:
+            found = dependence(measure.channel, kind, problem)
+            own = measure.channel in self.knows and found is not Dependence.UNKNOWN
+            if not (own or found is Dependence.NONE or found in self.needs[kind]):
+                return False
+        return True
 
     def decided(self, problem: Problem) -> Result:
         """The design, accurate as far as that is looked at; what decides is imported when it first does."""
@@ -139,7 +200,7 @@ def _asks_places(problem: Problem) -> bool:
 
 def _adds_points(problem: Problem) -> bool:
     """Whether no norm takes operating points as groups: boxes, stars and smooth programs know none such."""
-    return not any(measure.is_load and measure.norm.joins_points for measure in problem.measures)
+    return all(measure.norm.is_pointwise or not measure.is_load for measure in problem.measures)
 
 
 def _asks_stars(problem: Problem) -> bool:
@@ -166,34 +227,51 @@ def _asks_loads(problem: Problem) -> bool:
 
 
 _U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.FLYWHEEL
-_T = Kind.TORSION
+_T, _Z, _Q = Kind.TORSION, Kind.SIZE, Kind.PISTON
+_AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependence.SHIFT,)
+# of stars and choices of shafts: masses are those of the shafts that are built
+_BUILT = (Dependence.SHIFT, Dependence.AFFINE)
+_OF_MOUNTS = frozenset({MOUNT_FORCE, MOUNT_TRAVEL, *OF_MOUNTING, *OF_RUNS})
+_OF_SIZES = frozenset(channel for channel in OF_SIZES if channel.of_engine is not None)
+_OF_SHARED_GAS = frozenset({MOUNT_FORCE, *OF_BLOCK})
+_TOLD_APART = frozenset({IRREGULARITY, ABSORBER_HEAT})
 _CONES, _JOINT = "cones.unbalances:solve_sharply", "mounts.nonlinear:solve_joint"
 METHODS: tuple[Method, ...] = (
-    Method("evaluation", frozenset(), lambda _: True, Reach.WHOLE, "conclusion:state"),
-    Method("boxes of the flywheel", frozenset({_F}), lambda p: all(m.channel.is_flywheel for m in p.measures),
-           Reach.WHOLE, "boxes.flywheel:solve_flywheel"),
-    Method("boxes of discs and shafts", frozenset({_T}), _adds_points, Reach.NEAR, "boxes.torsion:solve_torsion", True),
-    Method("boxes of sizes", frozenset({Kind.SIZE, _U}), _asks_sizes, Reach.WHOLE, "boxes.sizes:solve_sizes", True),
-    Method("second-order cones", frozenset({_U, Kind.SHARE}), _asks_loads, Reach.WHOLE, _CONES, True),
-    Method("second-order cones of pistons", frozenset({_U, Kind.PISTON}), _feels_pistons, Reach.WHOLE, _CONES, True),
-    Method("boxes of leads", frozenset({_U, Kind.LEAD}), _asks_led, Reach.WHOLE, "boxes.leads:solve_leads", True),
-    Method("boxes of leads between shared chambers", frozenset({Kind.LEAD}), _asks_shared, Reach.WHOLE,
-           "boxes.shared_leads:solve_shared_leads", True),
-    Method("cones over boxes of places", frozenset({_U, _P}), _asks_places, Reach.WHOLE, "boxes.places:solve_places",
-           True),
-    Method("stars, each with cones", frozenset({_S, _U}), _asks_stars, Reach.WHOLE, "stars.phasing:solve_phasing",
-           True),
-    Method("stars, each with boxes of sizes", frozenset({_S, _U, Kind.SIZE}), _asks_sizes, Reach.WHOLE,
-           "stars.sizes:solve_star_sizes", True),
-    Method("linear matrix inequalities", frozenset({_K}), is_convex, Reach.WHOLE, "mounts.convex:solve_convex_mounts"),
-    Method("smooth program, boxes of stiffness", frozenset({_K}), _adds_points, Reach.NEAR, _JOINT),
-    Method("smooth program", frozenset({_U, _K, _M}), _adds_points, Reach.ASIDE, _JOINT),
-    Method("flywheel, crankshaft and the rest apart", frozenset(Kind) - {_S}, is_apart, Reach.ASIDE,
-           "methods:solve_each_apart"),
-    Method("local programs of sizes and mounts", frozenset({Kind.SIZE, _U, _K, _M}), _asks_mounted_sizes, Reach.ASIDE,
-           "mounts.sizes:solve_mounted_sizes"),
-    Method("stars, each with a smooth program", frozenset({_S, _U, _K, _M}), _asks_stars_on_mounts, Reach.ASIDE,
-           "mounts.stars:solve_star_mounts"),
+    Method("evaluation", {}, Reach.WHOLE, "conclusion:state", norms=lambda _: True),
+    Method("boxes of the flywheel", {_F: ()}, Reach.WHOLE, "boxes.flywheel:solve_flywheel",
+           knows=frozenset(OF_FLYWHEEL), also=lambda p: all(m.channel.is_flywheel for m in p.measures)),
+    Method("boxes of discs and shafts", {_T: ()}, Reach.NEAR, "boxes.torsion:solve_torsion", True,
+           frozenset({*TORSIONAL, IRREGULARITY, FLYWHEEL_INERTIA}), _is_pointwise, _adds_points),
+    Method("boxes of sizes", {_Z: _MASSES, _U: _AFFINE}, Reach.WHOLE, "boxes.sizes:solve_sizes", True, _OF_SIZES,
+           also=_asks_sizes),
+    Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, Reach.WHOLE, _CONES, True, also=_asks_loads),
+    Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, Reach.WHOLE, _CONES, True,
+           also=_feels_pistons),
+    Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, Reach.WHOLE, "boxes.leads:solve_leads", True,
+           frozenset({IRREGULARITY}), _is_pointwise, _asks_led),
+    Method("boxes of leads between shared chambers", {Kind.LEAD: ()}, Reach.WHOLE,
+           "boxes.shared_leads:solve_shared_leads", True, _OF_SHARED_GAS, _is_pointwise, _asks_shared),
+    Method("cones over boxes of places", {_U: _AFFINE, _P: (Dependence.BIAFFINE,)}, Reach.WHOLE,
+           "boxes.places:solve_places", True, frozenset({SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS}),
+           _is_pointwise, _asks_places),
+    Method("stars, each with cones", {_S: _BUILT, _U: _AFFINE}, Reach.WHOLE, "stars.phasing:solve_phasing", True,
+           _TOLD_APART, _is_pointwise, _asks_stars),
+    Method("stars, each with boxes of sizes", {_S: _BUILT, _U: _AFFINE, _Z: _MASSES}, Reach.WHOLE,
+           "stars.sizes:solve_star_sizes", True, _OF_SIZES, also=_asks_sizes),
+    Method("linear matrix inequalities", {_K: ()}, Reach.WHOLE, "mounts.convex:solve_convex_mounts",
+           knows=frozenset(OF_MOUNTING), also=is_convex),
+    Method("smooth program, boxes of stiffness", {_K: ()}, Reach.NEAR, _JOINT, False, _OF_MOUNTS, _is_pointwise,
+           _adds_points),
+    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE, _JOINT, False, _OF_MOUNTS, _is_pointwise,
+           _adds_points),
+    Method("flywheel, crankshaft and the rest apart", dict.fromkeys(set(Kind) - {_S}, tuple(Dependence)), Reach.ASIDE,
+           "methods:solve_each_apart", norms=lambda _: True, also=is_apart),
+    Method("local programs of sizes and mounts", {_Z: _MASSES, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
+           "mounts.sizes:solve_mounted_sizes", False, _OF_SIZES | _OF_MOUNTS, also=_asks_mounted_sizes),
+    Method("stars, each with a smooth program", {_S: _BUILT, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
+           "mounts.stars:solve_star_mounts", False, _OF_MOUNTS | _TOLD_APART, _is_pointwise, _asks_stars_on_mounts),
+    Method("local programs of all numbers", dict.fromkeys(set(Kind) - {_S}, tuple(Dependence)), Reach.ASIDE,
+           "general:solve_generally", norms=lambda _: True),
 )  # fmt: skip
 """Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
 
@@ -279,7 +357,7 @@ def _by_what_is_open(problem: Problem) -> Result:
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
     kinds = kinds_of(problem)
-    fixed = [limit for limit in problem.limits if not limit.measure.channel.is_moved_by(kinds)]
+    fixed = [limit for limit in problem.limits if not depends(limit.measure.channel, kinds, problem)]
     if fixed:
         given = evaluate_start(problem)
         # what cannot be evaluated is refused first
@@ -294,7 +372,7 @@ def _by_what_is_open(problem: Problem) -> Result:
         return _by("runs:solve_runs", problem, kinds, _decided)
     if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
         raise ModelError("flywheel is open, and nothing that is asked depends on it; fix it, or ask for its inertia")
-    moving = any(term.measure.channel.is_moved_by(kinds) for term in problem.objective)
+    moving = any(depends(term.measure.channel, kinds, problem) for term in problem.objective)
     if problem.objective and kinds and not moving and problem.phasing is None:
         design = judged(problem, problem.start)
         if design.excess <= KEPT:
@@ -303,7 +381,7 @@ def _by_what_is_open(problem: Problem) -> Result:
     words = " and ".join(kind.name.lower() for kind in sorted(kinds))
     if kinds and not problem.objective:
         raise ModelError(f"{words} is open and nothing is minimised; add [objective] or [mounts]")
-    method = next((m for m in METHODS if kinds <= m.decides and m.suits(problem)), None)
+    method = next((m for m in METHODS if m.suits(problem)), None)
     if method is None:
         asked = ", ".join(dict.fromkeys(measure.name for measure in problem.measures))
         raise ModelError(f"no method decides {words} together for {asked}; fix one of them, or ask for less")

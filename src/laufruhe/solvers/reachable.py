@@ -16,6 +16,7 @@ from laufruhe.errors import LaufruheError
 from laufruhe.numerics.budget import in_time, left, limited, passed
 from laufruhe.numerics.progress import tell, within
 from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import finely, objective_value
 from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.nothing import nothing_of
@@ -134,7 +135,7 @@ def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], found: Resu
         told = replace(nothing, side=side, limit=edge)
         if passed():
             return _Answer(replace(told, why=LONG))
-        if not measure.channel.is_moved_by(kinds):
+        if not depends(measure.channel, kinds, problem):
             known = {own.name: own.value for own in found.limits}
             value = math.nan if found.initial.resonance else known.get(limit.name, math.nan)
             return _Answer(replace(told, value=value, why="nothing that is open changes it"))
@@ -163,7 +164,7 @@ def _asking(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, 
     if problem.phasing is not None:
         return asked
     felt = [measure.channel for measure in asked.measures]
-    moving = tuple(d for d in asked.decisions if any(channel.is_moved_by({d.kind}) for channel in felt))
+    moving = tuple(d for d in asked.decisions if any(depends(channel, {d.kind}, asked) for channel in felt))
     return asked.changed(decisions=moving)
 
 

@@ -28,7 +28,7 @@ class Maximum(Norm):
 
     name = "maximum"
     refinement = 8
-    is_largest = True
+    is_largest = is_convex = of_row_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """max_k |v_k|."""

@@ -34,7 +34,7 @@ class Mean(Norm):
 
     name = "mean"
     averages = True
-    sums_lengths = True
+    sums_lengths = is_convex = of_row_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """sum_k w_k |v_k|."""

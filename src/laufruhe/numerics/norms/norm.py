@@ -100,6 +100,8 @@ def only(kind: type[Norm]) -> Norm:
 class Norm(ABC):
     """A norm of rows v_k, shape (k, d), on a grid.
 
+    A class claims what it is; a fact that it does not claim is used by no method and by no bound.
+
     Attributes
     ----------
     name
@@ -114,11 +116,17 @@ class Norm(ABC):
         Whether the norm is linear in the lengths of the rows.
     is_largest
         Whether it is the length of the longest row, so that under a limit each row keeps it by itself.
+    is_largest_mean
+        Whether it is the largest, over operating points, of the mean length of their rows.
+    is_diameter
+        Whether it is the largest diameter of the balls that hold the signals: at most twice the longest row.
+    is_convex
+        Whether its cones and its dual norm hold: it is at least <Z, V> for every Z of dual norm one.
     of_row_lengths
-        Whether nothing but the lengths of the rows matters, wherever they stand.
-    joins_points
-        Whether it is more than a weighted sum, or the largest, of what every row alone says: operating points count
-        as groups.
+        Whether nothing but the lengths of the rows matters, wherever they stand, and it never falls with one of them.
+    is_pointwise
+        Whether it is a weighted sum, a root of weighted squares, or the largest of what rows or signals alone have:
+        operating points do not count as groups.
     """
 
     name: ClassVar[str]
@@ -127,8 +135,11 @@ class Norm(ABC):
     is_euclidean: ClassVar[bool] = False
     sums_lengths: ClassVar[bool] = False
     is_largest: ClassVar[bool] = False
-    of_row_lengths: ClassVar[bool] = True
-    joins_points: ClassVar[bool] = False
+    is_largest_mean: ClassVar[bool] = False
+    is_diameter: ClassVar[bool] = False
+    is_convex: ClassVar[bool] = False
+    of_row_lengths: ClassVar[bool] = False
+    is_pointwise: ClassVar[bool] = False
 
     def __repr__(self) -> str:
         return f"<{self.name}>"

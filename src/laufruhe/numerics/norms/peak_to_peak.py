@@ -34,7 +34,7 @@ class PeakToPeak(Norm):
 
     name = "peak to peak"
     refinement = 8
-    of_row_lengths = False
+    is_diameter = is_convex = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """The largest diameter."""

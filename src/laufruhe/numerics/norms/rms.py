@@ -17,7 +17,7 @@ class RootMeanSquare(Norm):
     """The Euclidean norm of weighted rows."""
 
     name = "rms"
-    is_euclidean = True
+    is_euclidean = is_convex = of_row_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """sqrt(sum_k w_k |v_k|^2)."""

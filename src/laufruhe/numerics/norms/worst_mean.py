@@ -23,8 +23,7 @@ class WorstMean(Norm):
 
     name = "worst mean"
     averages = True
-    of_row_lengths = False
-    joins_points = True
+    is_largest_mean = is_convex = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """max_p mean_p |v_k|."""

@@ -27,7 +27,7 @@ from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.apexes import OF_APEXES
-from laufruhe.problem.channels.flywheel import OF_FLYWHEEL
+from laufruhe.problem.channels.flywheel import FLYWHEEL_INERTIA, IRREGULARITY, OF_FLYWHEEL
 from laufruhe.problem.channels.kinds import (
     AT_MOUNTS,
     OF_MOUNTS,
@@ -67,24 +67,38 @@ from laufruhe.problem.channels.sizes import (
     Where,
     inside,
 )
-from laufruhe.problem.channels.torsional import TORSIONAL
+from laufruhe.problem.channels.torsional import ABSORBER_HEAT, TORSIONAL
 from laufruhe.problem.loads import PointLoads
 
 __all__ = [
+    "ABSORBER_HEAT",
     "DECOUPLING",
     "DECOUPLING_SHORTFALL",
+    "ENVELOPE_RADIUS",
+    "FLYWHEEL_INERTIA",
     "FREQUENCIES",
+    "IRREGULARITY",
+    "MOUNT_FORCE",
+    "MOUNT_TRAVEL",
+    "OF_BLOCK",
+    "OF_FLYWHEEL",
+    "OF_MOUNTING",
     "OF_MOUNTS",
+    "OF_RUNS",
+    "OF_SIZES",
     "ON_BLOCK",
     "RAW_TORQUE_ROLL",
     "RUN_FORCE",
     "RUN_TRAVEL",
     "RUN_TWIST",
     "SAG",
+    "SHAFT_CLEARANCE",
+    "SHAFT_DISTANCE",
     "STATIC_FORCE",
     "STATIC_TRAVEL",
     "STORED_WORK",
     "TORQUE_ROLL",
+    "TORSIONAL",
     "TOTAL_STIFFNESS",
     "TRANSMISSIBILITY",
     "Channel",
@@ -147,6 +161,7 @@ ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6), lever=1)
 ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4))
 SURGING_FORCE = _on_block("surging force", "N", slice(1, 2), lever=0)
 SWAYING_COUPLE = _on_block("swaying couple", "N m", slice(5, 6), lever=1)
+OF_BLOCK = (SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT, SURGING_FORCE, SWAYING_COUPLE)
 MAIN_BEARING_FORCE = inside("main-bearing force", "N", AT_EACH_BEARING, main_bearing_forces)
 MAIN_BEARING_PRESSURE = inside("main-bearing pressure", "Pa", AT_EACH_BEARING, main_bearing_forces, bearing_factors)
 HAMMER_BLOW = inside("hammer blow", "N", OF_EACH_BEARING, hammer_blows)
@@ -171,7 +186,7 @@ ENVELOPE_RADIUS = _of_places("envelope radius", ("max",), lambda m, a, b: reache
 CHANNELS: Mapping[str, Channel] = {
     channel.name: channel
     for channel in (
-        MOUNT_FORCE, MOUNT_TRAVEL, SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT, SURGING_FORCE, SWAYING_COUPLE,
+        MOUNT_FORCE, MOUNT_TRAVEL, *OF_BLOCK,
         HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,
         SIDE_FORCE, FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS,
         ADDED_MASS, *OF_MOUNTING, *OF_RUNS, *OF_APEXES, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES,

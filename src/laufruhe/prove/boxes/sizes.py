@@ -88,7 +88,7 @@ class SizeBoxes:
     def _number(self, measure: Measure, sense: float) -> Number:
         if measure.channel.of_engine is not None:
             return Number(measure, sense, self._ways(lambda x: np.array([sense * self.model.value(measure, x)])))
-        if not measure.norm.of_row_lengths or measure.norm.joins_points or sense < 0.0:
+        if not measure.norm.of_row_lengths or sense < 0.0:
             raise ValueError(f"{measure.name} is not bounded on boxes of sizes")
         pieces = self.model.pieces(measure)
 

@@ -102,7 +102,7 @@ def _sampled(model: BoxModel, quantity: Measure, answer: Answer, lines: Lines, p
     waves = np.hstack([turns.real, -turns.imag])
     parts = value.reshape(boxes, len(own), mounts, 3).swapaxes(2, 3).reshape(boxes, len(own), -1)
     rows = np.matmul(waves, np.concatenate([parts.real, parts.imag], axis=1)).reshape(boxes, samples, 3, mounts)
-    if quantity.norm.sums_lengths or quantity.norm.joins_points:
+    if quantity.norm.sums_lengths or quantity.norm.is_largest_mean:
         size = _lengths(rows)
         along = rows / np.where(size > 0.0, size, 1.0)[:, :, None]
         share = 1.0 / (samples * mounts)
@@ -115,7 +115,7 @@ def _sampled(model: BoxModel, quantity: Measure, answer: Answer, lines: Lines, p
         return Under(share * size.sum(axis=(1, 2)), slope, root_of(squares, rest), root_of(squares, bends))
     # a signal reaches as far as its longest row; of a peak to peak as its row farthest from another
     box, first, times = np.arange(boxes), np.zeros((boxes, 3, mounts)), 1.0
-    if not quantity.norm.of_row_lengths:
+    if quantity.norm.is_diameter:
         start = _lengths(rows - rows.mean(axis=1, keepdims=True)).argmax(axis=1)
         first = rows[box[:, None], start, :, np.arange(mounts)].swapaxes(1, 2)
         times = 2.0

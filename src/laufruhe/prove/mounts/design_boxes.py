@@ -33,6 +33,7 @@ from laufruhe.prove.certificate import Multipliers
 from laufruhe.prove.mounts.box_series import balanced, rest_of
 from laufruhe.prove.mounts.mount_loops import Loop, is_looped, mount_loop
 from laufruhe.prove.mounts.mounted_loads import MountedLoads, Pairing
+from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.rest_limits import RestLimits, priced
 from laufruhe.prove.mounts.subdivision import EVEN
 
@@ -74,7 +75,12 @@ class Corner:
 def mixes_corners(problem: Problem) -> bool:
     """Whether all that is open are unbalances and few numbers of mounts, and all that is asked are loads."""
     terms, decisions = problem.load_terms, problem.mount_decisions
-    if problem.mount_terms or len(terms) < len(problem.objective) or len(decisions) > MOST_OPEN:
+    if (
+        named_part(problem) is not problem
+        or problem.mount_terms
+        or len(terms) < len(problem.objective)
+        or len(decisions) > MOST_OPEN
+    ):
         return False
     loads = [measure for measure in problem.measures if measure.is_load]
     plain = all(not measure.load.adds_up for measure in loads if measure.on_mounts) and not problem.known_rows

@@ -18,6 +18,7 @@ from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.problem import channels
+from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import at_many
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -28,6 +29,7 @@ from laufruhe.prove.mounts.box_norms import Under, root_under, under
 from laufruhe.prove.mounts.box_numbers import RANGES, SAID, UNDER, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, Lines
 from laufruhe.prove.mounts.box_runs import run_boxes
+from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.ranges import SLACK
 
 # open numbers that are divided without being asked for, and what all boxes may cost together
@@ -104,11 +106,12 @@ class StiffnessBoxes:
 
     def __init__(self, problem: Problem, left_out: float, enough: float = math.inf) -> None:
         self.enough = enough
-        self.problem = problem = at_many(problem)
+        self.problem = problem = at_many(named_part(problem))
         evaluation = evaluate_start(problem)
         self.model = BoxModel(problem, evaluation)
         terms = [term for term in problem.load_terms if term.measure.on_mounts]
-        rest = [term for term in problem.load_terms if not term.measure.on_mounts]
+        kinds = {decision.kind for decision in problem.decisions}
+        rest = [term for term in problem.load_terms if not depends(term.measure.channel, kinds, problem)]
         self.constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
         share = left_out / max(sum(term.weight for term in terms), 1e-300)
         self._terms = [(term.weight, term.measure, *_felt(self.model, term.measure, share)) for term in terms]
@@ -289,4 +292,4 @@ def _felt(model: BoxModel, quantity: Measure, budget: float) -> tuple[Lines, flo
     out = order[together <= budget]
     kept[out] = False
     # a peak to peak is twice a largest length at most
-    return lines.kept(kept), (1.0 if quantity.norm.of_row_lengths else 2.0) * float(felt[out].sum())
+    return lines.kept(kept), (2.0 if quantity.norm.is_diameter else 1.0) * float(felt[out].sum())

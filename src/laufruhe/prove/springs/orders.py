@@ -278,14 +278,14 @@ def heads_of(asked: Asked, parts: Sequence[OpenMounts]) -> list[Head]:
     if norm.is_euclidean:
         return [_root(asked)] if asked.orders else []
     strongest = [_strongest(asked, p, parts) for p in asked.points]
-    if norm.sums_lengths and not norm.joins_points:
+    if norm.sums_lengths:
         return strongest
     if not strongest:
         return []
     unit = max(head.unit for head in strongest)
     loss, factor = max(head.loss for head in strongest), min(head.factor for head in strongest)
     orders = tuple(order for head in strongest for order in head.orders)
-    return [Head(orders, 1.0, unit, loss, not norm.joins_points, factor)]
+    return [Head(orders, 1.0, unit, loss, not norm.is_largest_mean, factor)]
 
 
 def _root(asked: Asked) -> Head:
@@ -306,12 +306,12 @@ def _strongest(asked: Asked, p: int, parts: Sequence[OpenMounts]) -> Head:
     """
     own = asked.of_point(p)
     order, norm = own[0], asked.measure.norm
-    lengths, mean = np.linalg.norm(order.felt, axis=1), norm.sums_lengths or norm.joins_points
-    swing = 1.0 if norm.of_row_lengths or norm.joins_points else 2.0
+    lengths, mean = np.linalg.norm(order.felt, axis=1), norm.sums_lengths or norm.is_largest_mean
+    swing = 2.0 if norm.is_diameter else 1.0
     odd = [other for other in own[1:] if other.place % (2 * order.place) == order.place]
     phases = asked.samples // math.gcd(asked.samples, order.place) if asked.samples else 0
     stays = bool(phases) and asked.samples % (2 * order.place) == 0 and not asked.is_bent
-    if norm.sums_lengths and not norm.joins_points:
+    if norm.sums_lengths:
         return _mean(asked, order, odd, phases if stays else 0)
     loss = sum(
         most_of(asked, other, parts)

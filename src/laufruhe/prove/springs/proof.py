@@ -14,6 +14,7 @@ from laufruhe.problem.evaluation import at_many
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import NEARLY, Box, Divided, Halving, Parts, Waiting, halves
+from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.springs.ends import Aims, ends_ahead
 from laufruhe.prove.springs.open_mounts import is_lifted
 from laufruhe.prove.springs.search import SpringBoxes
@@ -51,6 +52,7 @@ def spring_bound(
     whole
         Whether all that is open is looked at alone.
     """
+    problem = named_part(problem)
     if not is_bounded(problem) or not 0.0 < value < math.inf:
         return Divided(0.0, 0)
     try:

@@ -13,6 +13,7 @@ from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import sides_of
+from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import off_resonance
@@ -86,7 +87,8 @@ class SpringBoxes:
         known = evaluate(problem, problem.design(list(near)))
         terms = [term for term in problem.load_terms if term.measure.on_mounts]
         # loads of the block are those of all mounts, and known where no unbalance is open
-        rest = [] if problem.unbalances else [t for t in problem.load_terms if not t.measure.on_mounts]
+        kinds = {d.kind for d in problem.decisions}
+        rest = [t for t in problem.load_terms if not depends(t.measure.channel, kinds, problem)]
         self._constant = sum(t.weight * known.value(t.measure) for t in rest)
 
         def orders_of(measure: Measure, parts: Sequence[OpenMounts] = self._parts) -> Asked:

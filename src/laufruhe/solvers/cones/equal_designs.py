@@ -14,6 +14,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.norms import MEAN, Grid
 from laufruhe.problem.decision import Domain, columns_of, vector_of
+from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
@@ -51,7 +52,7 @@ def equal_designs(found: Result, limit: Limit) -> tuple[DecisionRange, ...]:
     problem = found.problem
     affine = [decision for decision in problem.decisions if decision.is_affine]
     kinds = {decision.kind for decision in affine}
-    moved = [bound for bound in (*problem.limits, limit) if bound.measure.channel.is_moved_by(kinds)]
+    moved = [bound for bound in (*problem.limits, limit) if depends(bound.measure.channel, kinds, problem)]
     problem = replace(problem, phasing=None, objective=(), limits=tuple(moved))
     numbers = any(bound.measure.channel.is_number for bound in moved)
     if not affine or len(affine) < len(problem.decisions) or len(affine) > MOST_OPEN or numbers or passed():

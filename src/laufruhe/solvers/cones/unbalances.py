@@ -13,6 +13,7 @@ from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.problem.channels import OF_MOUNTS
+from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import FINE, evaluate, finely
 from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.mount_resonance import off_resonance
@@ -37,7 +38,7 @@ NEGLIGIBLE = 1e-6
 
 def beyond_mounts(problem: Problem) -> tuple[str, ...]:
     """Limits that no unbalances keep together, whatever the open mounts are."""
-    limits = tuple(limit for limit in problem.load_limits if not limit.measure.channel.is_moved_by(OF_MOUNTS))
+    limits = tuple(limit for limit in problem.load_limits if not depends(limit.measure.channel, OF_MOUNTS, problem))
     if not limits:
         return ()
     apart = off_resonance(replace(problem.balance, objective=(Term(limits[0].measure),), limits=limits))

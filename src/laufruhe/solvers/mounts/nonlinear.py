@@ -25,6 +25,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach, gap_of, room_of
+from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, decided, nearest_of, none_within, unbalances_of
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_unbalances
@@ -181,7 +182,7 @@ def mounts_bound(problem: Problem, near: Sequence[Value] = ()) -> float:
     whatever the mounts (P4); beside these, forces and travel of the mounts by their springs (E44), next to a design
     whose values are given.
     """
-    found, parts = 0.0, []
+    problem, found, parts = named_part(problem), 0.0, []
     felt, block = (
         tuple(term for term in problem.load_terms if term.measure.on_mounts == on_mounts) for on_mounts in (True, False)
     )

@@ -39,6 +39,7 @@ from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import Kind, domains_of
+from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import off_resonance
@@ -204,7 +205,7 @@ class SmoothProgram:
     def _least(self, measure: Measure, unit: float) -> Any:
         """A measure to be minimised, softened by a share of its unit (N3); a number where nothing moves it."""
         kinds = {d.kind for d in self.problem.decisions} | ({Kind.STAR} if self.moves is not None else set())
-        if not measure.channel.is_moved_by(kinds):
+        if not depends(measure.channel, kinds, self.problem):
             return evaluate(off_resonance(self.problem)).value(measure)
         if measure.is_mounting:
             return self._mount_number(measure)

@@ -1,0 +1,170 @@
+"""How every channel depends on every kind of decision, and on what of a problem that depends.
+
+The table is a list of what is known. A channel that is not in it is UNKNOWN for every kind: no bound counts it as
+affine or as constant, and what asks for it is decided locally. Sampling (`tests/problem/test_dependence.py`) can refute
+an entry and never prove it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from enum import StrEnum
+
+from laufruhe.problem.channels import CHANNELS, Channel
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.problem import Problem
+
+
+class Dependence(StrEnum):
+    """How the signal or number of a channel follows open numbers of one kind while all others are held."""
+
+    NONE = "none"
+    """Constant."""
+    AFFINE = "affine"
+    """Of masses in a plane, whose lengths are added up: these are affine."""
+    BIAFFINE = "affine while unbalances are held"
+    MASSES = "affine in masses that follow, times a factor that goes one way"
+    """Masses follow from sizes; the factor of each place goes one way with each of them (Z2)."""
+    SHIFT = "a sum of parts, each earlier by its own angle"
+    """Parts are throws of a star, or what each geared shaft carries (P13)."""
+    SWING = "a number of a signal that is SHIFT"
+    CONVEX = "convex"
+    MONOTONE_UP = "never falls"
+    MONOTONE_DOWN = "never rises"
+    SMOOTH = "smooth"
+    """Continuous, and nothing more is claimed."""
+    UNKNOWN = "unknown"
+
+
+_LETTERS = {
+    "0": Dependence.NONE,
+    "a": Dependence.AFFINE,
+    "b": Dependence.BIAFFINE,
+    "m": Dependence.MASSES,
+    ">": Dependence.SHIFT,
+    "w": Dependence.SWING,
+    "c": Dependence.CONVEX,
+    "+": Dependence.MONOTONE_UP,
+    "-": Dependence.MONOTONE_DOWN,
+    "s": Dependence.SMOOTH,
+    "?": Dependence.UNKNOWN,
+}
+_COLUMNS = (
+    Kind.UNBALANCE, Kind.SHARE, Kind.PISTON, Kind.PLACE, Kind.SIZE, Kind.LEAD, Kind.STAR, Kind.STIFFNESS, Kind.MOUNT,
+    Kind.FLYWHEEL, Kind.TORSION,
+)  # fmt: skip
+# of an engine on elastic mounts at an even speed; `dependence` says what is different elsewhere
+_TABLE = """
+                                    U S P  x Z L  *  k M  F T
+shaking force                       a a a  b m >  >  0 0  0 0
+rocking couple                      a a a  b m >  >  0 0  0 0
+roll moment                         a a a  b m >  >  0 0  0 0
+surging force                       a a a  b m >  >  0 0  0 0
+swaying couple                      a a a  b m >  >  0 0  0 0
+mount force                         a a a  b m >  >  s s  0 0
+mount travel                        a a a  b m >  >  s s  0 0
+main-bearing force                  a a a  s m >  >  0 0  0 0
+main-bearing pressure               a a a  s m >  >  0 0  0 0
+main-bearing pressure times speed   a a a  s m >  >  0 0  0 0
+hammer blow                         a a a  s m >  >  0 0  0 0
+friction power                      a a a  s m >  >  0 0  0 0
+web stress                          a a a  s m >  >  0 0  0 0
+journal torsion stress              a a a  s m >  >  0 0  0 0
+journal stress                      a a a  s m >  >  0 0  0 0
+crank-pin force                     0 0 a  0 m s  >  0 0  0 0
+crank-pin pressure                  0 0 a  0 m s  >  0 0  0 0
+crank-pin bending stress            a 0 a  0 m s  >  0 0  0 0
+side force                          0 0 a  0 m s  >  0 0  0 0
+rod force                           0 0 a  0 m s  >  0 0  0 0
+rod stress                          0 0 a  0 m s  >  0 0  0 0
+share of the buckling load          0 0 a  0 m s  >  0 0  0 0
+bolt stress                         0 0 a  0 m s  >  0 0  0 0
+piston-pin pressure                 0 0 a  0 m s  >  0 0  0 0
+piston-pin bending stress           0 0 a  0 m s  >  0 0  0 0
+piston-pin deflection               0 0 a  0 m s  >  0 0  0 0
+piston-pin ovality                  0 0 a  0 m s  >  0 0  0 0
+crank torque                        0 0 a  0 m >  >  0 0  0 0
+stored work                         0 0 a  0 m >  >  0 0  0 0
+shaft twist                         0 0 s  0 s 0  >  0 0  0 s
+shaft torque                        0 0 s  0 s 0  >  0 0  0 s
+shaft stress                        0 0 s  0 s 0  >  0 0  0 s
+counterweight mass                  a 0 a  0 0 0  a  0 0  0 0
+balancer mass                       a 0 a  0 0 0  a  0 0  0 0
+added mass                          a 0 a  0 0 0  a  0 0  0 0
+shaft distance                      0 0 0  s 0 0  0  0 0  0 0
+shaft clearance                     0 0 0  s 0 0  0  0 0  0 0
+envelope radius                     0 0 0  c 0 0  0  0 0  0 0
+static sag                          0 0 0  0 0 0  0  c s  0 0
+natural frequencies                 0 0 0  0 0 0  0  + s  0 0
+kinetic-energy decoupling           0 0 0  0 0 0  0  s s  0 0
+decoupling shortfall                0 0 0  0 0 0  0  s s  0 0
+torque-roll residual                0 0 0  0 0 0  0  c s  0 0
+raw torque-roll residual            0 0 0  0 0 0  0  c s  0 0
+total stiffness                     0 0 0  0 0 0  0  a s  0 0
+static travel                       0 0 0  0 0 0  0  s s  0 0
+static mount force                  0 0 0  0 0 0  0  s s  0 0
+transmissibility                    s s s  s s s  s  s s  0 0
+degree of irregularity              0 0 s  0 s w  w  0 0  - -
+flywheel inertia                    0 0 0  0 0 0  0  0 0  + +
+flywheel mass                       0 0 0  0 0 0  0  0 0  + 0
+rim stress                          0 0 0  0 0 0  0  0 0  + 0
+arm stress                          0 0 0  0 s s  0  0 0  + 0
+apex speed                          0 0 0  0 0 0  0  0 0  0 0
+apex acceleration                   0 0 0  0 0 0  0  0 0  0 0
+run-up force                        s s s  s s s  s  s s  s s
+run-up travel                       s s s  s s s  s  s s  s s
+run-up twist                        s s s  s s s  s  s s  s s
+throw clearance                     0 0 0  0 - 0  0  0 0  0 0
+running-gear mass                   0 0 0  0 + 0  0  0 0  0 0
+torsional frequencies               0 0 s  0 s 0  0  0 0  0 s
+critical speeds                     0 0 s  0 s 0  0  0 0  0 s
+absorber heat                       0 0 s  0 s 0  w  0 0  0 s
+"""
+
+
+def _parsed(text: str) -> dict[str, dict[Kind, Dependence]]:
+    found: dict[str, dict[Kind, Dependence]] = {}
+    for line in text.strip().splitlines()[1:]:
+        name, letters = line.split("  ", 1)
+        kinds = zip(_COLUMNS, letters.split(), strict=True)
+        found[name] = {kind: _LETTERS[letter] for kind, letter in kinds}
+    return found
+
+
+TABLE: Mapping[str, Mapping[Kind, Dependence]] = _parsed(_TABLE)
+"""By the name of the channel and the kind of decision."""
+# loads of bearings feel the places of rotors on the shafts that these carry
+_OF_BEARINGS = frozenset(
+    name for name, row in TABLE.items() if CHANNELS[name].is_load and row[Kind.PLACE] is Dependence.SMOOTH
+)
+# what an uneven speed leaves of these is not additive
+_OF_EVEN_SPEED = (Dependence.MASSES, Dependence.SHIFT, Dependence.SWING)
+
+
+def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
+    """Return how a channel depends on one kind of decision of a problem; UNKNOWN where nobody has said."""
+    if CHANNELS.get(channel.name) is not channel:
+        return Dependence.UNKNOWN
+    found = TABLE.get(channel.name, {}).get(kind, Dependence.UNKNOWN)
+    if found in (Dependence.NONE, Dependence.UNKNOWN):
+        return found
+    if kind is Kind.PLACE and channel.name in _OF_BEARINGS and not _moves_carried(problem):
+        return Dependence.NONE
+    if kind is Kind.STIFFNESS and problem.engine.block is None and channel.is_load:
+        # rigid mounts share a force by their places alone
+        return Dependence.NONE
+    if problem.fidelity.is_uneven and found in _OF_EVEN_SPEED and kind is not Kind.STAR:
+        return Dependence.SMOOTH
+    return found
+
+
+def depends(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool:
+    """Return whether a channel may change with decisions of these kinds; what is UNKNOWN may."""
+    return any(dependence(channel, kind, problem) is not Dependence.NONE for kind in kinds)
+
+
+def _moves_carried(problem: Problem) -> bool:
+    """Whether a bearing carries a shaft whose rotors have open places."""
+    carried = {bearing.shaft.name for bearing in problem.engine.bearings}
+    moved = {drive.rotor for decision in problem.decisions for drive in decision.place_drives}
+    return any(rotor.shaft.name in carried for rotor in problem.engine.rotors if rotor.name in moved)

@@ -1,0 +1,45 @@
+"""What bounds of open mounts name as their own; of all else they claim nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from laufruhe.numerics.norms import Norm
+from laufruhe.problem.channels import MOUNT_FORCE, MOUNT_TRAVEL, OF_MOUNTING, OF_RUNS
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import Dependence, dependence
+from laufruhe.problem.measure import Measure
+from laufruhe.problem.problem import Problem
+
+NAMED = frozenset({MOUNT_FORCE, MOUNT_TRAVEL, *OF_MOUNTING, *OF_RUNS})
+"""Channels that have formulas over boxes of mounts."""
+_AFFINE = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
+
+
+def named_part(problem: Problem) -> Problem:
+    """Return a problem without the terms and limits that bounds of mounts do not name.
+
+    Its bound holds for the whole: no term is under zero, and fewer limits allow more designs.
+    """
+    terms = tuple(term for term in problem.objective if is_named(term.measure, problem))
+    limits = tuple(limit for limit in problem.limits if is_named(limit.measure, problem))
+    if len(terms) == len(problem.objective) and len(limits) == len(problem.limits):
+        return problem
+    return replace(problem, objective=terms, limits=limits)
+
+
+def is_named(measure: Measure, problem: Problem) -> bool:
+    """Return whether a measure is constant, affine in unbalances, or has a formula over boxes of mounts."""
+    if measure.is_load and not (measure in problem.known_rows or _is_bounded(measure.norm)):
+        return False
+    for kind in {decision.kind for decision in problem.decisions}:
+        found = dependence(measure.channel, kind, problem)
+        affine = kind in _AFFINE and found is Dependence.AFFINE
+        own = measure.channel in NAMED and found is not Dependence.UNKNOWN
+        if not (found is Dependence.NONE or affine or own):
+            return False
+    return True
+
+
+def _is_bounded(norm: Norm) -> bool:
+    return norm.is_euclidean or norm.sums_lengths or norm.is_largest or norm.is_largest_mean or norm.is_diameter
