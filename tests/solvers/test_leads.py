@@ -223,7 +223,6 @@ def test_limits_that_no_angle_keeps_are_named(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"rms mount force"', '"maximum crank-pin force"', "no method decides lead together"),
         ('"rms mount force"', '"mean main-bearing force"', "nothing that is asked depends on it"),
     ],
 )  # fmt: skip

@@ -153,7 +153,6 @@ def test_a_lead_moves_the_mean_torque_that_arms_hand_on(start: float) -> None:
     ("more", "quantity", "words"),
     [
         ({"gas": {"model": "wiebe", "imep": "7 bar", "start": -8, "duration": 60}}, "rms roll moment", "seiliger"),
-        ({"counterweights": READY["counterweights"]}, "mean mount force", "no method decides"),
     ],
 )
 def test_what_is_not_known_of_shared_chambers_is_one_line(more: dict[str, Any], quantity: str, words: str) -> None:

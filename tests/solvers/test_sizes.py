@@ -285,9 +285,7 @@ def test_stresses_that_nothing_meets_are_named(tmp_path: Path) -> None:
     ("text", "rule"),
     [
         (changed(TEXT, "throws = [0]", 'throws = [{ between = [0, 90] }]'), "with throws that are given|engine.throws"),
-        (changed(TEXT, '"0.5 kg"', '{ between = ["0.1 kg", "1 kg"] }'), "no method decides piston and size together"),
         (TEXT + '[[counterweights]]\nname = "b"\nbalance_factor = 0.5\n', "counts masses that follow from sizes"),
-        (changed(TEXT, "samples = 360", 'crank_inertia = "1 kg m^2"'), "even crank speed|no method"),
         (changed(TEXT, "throws = [0]", 'throws = [0]\n[engine.nothing]'), "nothing"),
         (changed(TEXT, '[objective]', 'bolts = { diameter = { between = ["5 mm", "9 mm"] } }\n[objective]'),
          "running_gear.bolts.diameter is open, and nothing that is asked depends on it"),

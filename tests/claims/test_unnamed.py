@@ -1,0 +1,130 @@
+"""A channel or a norm that no method and no bound names: nothing is claimed of designs that were not looked at."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.numerics.norms import NORMS, Grid, Norm
+from laufruhe.numerics.norms.maximum import Maximum
+from laufruhe.numerics.norms.norm import lengths, only
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.problem import dependence, measure
+from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Needs, kinds
+from laufruhe.problem.channels.kinds import ON_BLOCK, LoadChannel
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import Dependence, depends
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.measure import Limit, Measure
+from laufruhe.prove.certificate import Proof
+from laufruhe.prove.mounts.named import named_part
+from laufruhe.prove.springs.proof import spring_bound
+from laufruhe.solvers import METHODS
+
+SPRINGS = Path(__file__).parent / "inputs" / "resultant-of-joined-springs.toml"
+KNOWN = (134976.827, 41921.457, 103493.121, 320608.48)
+"""Stiffnesses [N/m] that keep all limits, and at which the resultant is 37.21 N."""
+
+
+def _resultant(loads: PointLoads) -> Spectrum:
+    assert loads.mount_forces is not None
+    return loads.mount_forces.each(lambda values: values.sum(axis=1, keepdims=True))
+
+
+RESULTANT = LoadChannel("transmitted force", "N", ON_BLOCK, Needs.MOUNTS, signal=_resultant)
+
+
+class WorstTwentieth(Maximum):
+    """The mean of the largest twentieth of the lengths; it claims nothing."""
+
+    name = "worst twentieth"
+    is_largest = is_convex = of_row_lengths = is_pointwise = False
+
+    def value(self, grid: Grid, rows: np.ndarray) -> float:
+        size = np.sort(lengths(rows))
+        return float(size[-max(len(size) // 20, 1) :].mean())
+
+
+@pytest.fixture
+def resultant(monkeypatch: pytest.MonkeyPatch) -> LoadChannel:
+    monkeypatch.setitem(CHANNELS, RESULTANT.name, RESULTANT)  # type: ignore[arg-type]
+    for norm in NORMS.values():
+        monkeypatch.setitem(measure.MEASURES, f"{norm.name} {RESULTANT}", (RESULTANT, norm))  # type: ignore[arg-type]
+    return RESULTANT
+
+
+@pytest.fixture
+def worst_twentieth(monkeypatch: pytest.MonkeyPatch) -> Norm:
+    norm = only(WorstTwentieth)
+    monkeypatch.setitem(measure.MEASURES, f"{norm.name} {MOUNT_FORCE}", (MOUNT_FORCE, norm))  # type: ignore[arg-type]
+    return norm
+
+
+def declared(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Give the resultant a line of the table, that of the force on each mount."""
+    monkeypatch.setitem(dependence.TABLE, RESULTANT.name, dependence.TABLE[MOUNT_FORCE.name])  # type: ignore[arg-type]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("is_declared", [False, True])
+def test_a_channel_that_no_bound_names_is_decided_locally(
+    is_declared: bool, resultant: LoadChannel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if is_declared:
+        declared(monkeypatch)
+    problem = laufruhe.load(SPRINGS)
+    known = evaluate(problem, problem.design(KNOWN))
+    assert known.excess(problem.limits) <= 0.0
+    exists = objective_value(problem, known)
+    assert exists == pytest.approx(37.2144, rel=1e-4)
+    result = laufruhe.solve(problem)
+    assert result.certificate.kind is Proof.LOCAL
+    assert result.certificate.lower_bound <= exists
+    assert result.objective.value <= exists
+
+
+@pytest.mark.slow
+def test_a_norm_that_claims_nothing_is_decided_locally(worst_twentieth: Norm) -> None:
+    text = SPRINGS.read_text().replace("rms transmitted force", f"{worst_twentieth.name} mount force")
+    problem = laufruhe.load(text)
+    result = laufruhe.solve(problem.changed(search=replace(problem.search, starts=2)))
+    given = objective_value(problem, evaluate(problem, problem.design(KNOWN)))
+    assert result.certificate.kind is Proof.LOCAL
+    assert result.certificate.lower_bound <= min(given, result.objective.value)
+
+
+def test_no_bound_counts_what_it_does_not_name(resultant: LoadChannel, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = laufruhe.load(SPRINGS)
+    assert named_part(problem).objective == ()
+    assert spring_bound(problem, 50.0, 0.01, KNOWN).bound == 0.0
+    limited = replace(problem, limits=(*problem.limits, Limit("resultant", Measure(resultant), maximum=1.0)))
+    assert named_part(limited).limits == problem.limits
+    declared(monkeypatch)
+    assert named_part(limited).limits == problem.limits
+
+
+def test_unknown_is_neither_constant_nor_affine(resultant: LoadChannel, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = laufruhe.load(SPRINGS)
+    for kind in Kind:
+        assert dependence.dependence(resultant, kind, problem) is Dependence.UNKNOWN
+        assert depends(resultant, {kind}, problem)
+    # of the same name, and not the channel that the table is of
+    monkeypatch.setitem(kinds._KNOWN, MOUNT_FORCE.name, MOUNT_FORCE)
+    other = replace(MOUNT_FORCE, signal=_resultant)
+    assert dependence.dependence(other, Kind.TORSION, problem) is Dependence.UNKNOWN
+    assert [method.name for method in METHODS if method.suits(problem)] == [METHODS[-1].name]
+
+
+def test_every_channel_has_its_line() -> None:
+    assert set(dependence.TABLE) == set(CHANNELS)
+
+
+def test_a_norm_claims_nothing_by_default() -> None:
+    facts = {name: value for name, value in vars(Norm).items() if isinstance(value, bool)}
+    assert len(facts) > 5
+    assert not any(facts.values())
