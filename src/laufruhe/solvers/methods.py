@@ -18,11 +18,11 @@ from laufruhe.numerics.processes import called
 from laufruhe.numerics.progress import Listener, listening, tell
 from laufruhe.problem.channels import (
     ABSORBER_HEAT,
+    AT_EACH_MOUNT,
     ENVELOPE_RADIUS,
     FLYWHEEL_INERTIA,
     IRREGULARITY,
     MOUNT_FORCE,
-    MOUNT_TRAVEL,
     OF_BLOCK,
     OF_FLYWHEEL,
     OF_MOUNTING,
@@ -231,7 +231,7 @@ _T, _Z, _Q = Kind.TORSION, Kind.SIZE, Kind.PISTON
 _AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependence.SHIFT,)
 # of stars and choices of shafts: masses are those of the shafts that are built
 _BUILT = (Dependence.SHIFT, Dependence.AFFINE)
-_OF_MOUNTS = frozenset({MOUNT_FORCE, MOUNT_TRAVEL, *OF_MOUNTING, *OF_RUNS})
+_OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *OF_RUNS}
 _OF_SIZES = frozenset(channel for channel in OF_SIZES if channel.of_engine is not None)
 _OF_SHARED_GAS = frozenset({MOUNT_FORCE, *OF_BLOCK})
 _TOLD_APART = frozenset({IRREGULARITY, ABSORBER_HEAT})

@@ -72,6 +72,7 @@ from laufruhe.problem.loads import PointLoads
 
 __all__ = [
     "ABSORBER_HEAT",
+    "AT_EACH_MOUNT",
     "DECOUPLING",
     "DECOUPLING_SHORTFALL",
     "ENVELOPE_RADIUS",
@@ -156,6 +157,8 @@ def _of_places(name: str, sides: tuple[str, ...], span: Callable[[Asked, Engine,
 
 MOUNT_FORCE = _on_mounts("mount force", "N", Needs.MOUNTS, lambda loads: loads.mount_forces)
 MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: loads.mount_travel)
+AT_EACH_MOUNT = frozenset({MOUNT_FORCE, MOUNT_TRAVEL})
+"""What bounds of mounts have formulas for, of the loads."""
 SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3), lever=0)
 ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6), lever=1)
 ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4))

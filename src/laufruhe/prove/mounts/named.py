@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from laufruhe.numerics.norms import Norm
-from laufruhe.problem.channels import MOUNT_FORCE, MOUNT_TRAVEL, OF_MOUNTING, OF_RUNS
+from laufruhe.problem.channels import AT_EACH_MOUNT, OF_MOUNTING, OF_RUNS
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
-NAMED = frozenset({MOUNT_FORCE, MOUNT_TRAVEL, *OF_MOUNTING, *OF_RUNS})
+NAMED = AT_EACH_MOUNT | {*OF_MOUNTING, *OF_RUNS}
 """Channels that have formulas over boxes of mounts."""
 _AFFINE = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
 
