@@ -20,7 +20,7 @@ from laufruhe.machine import Engine, OperatingPoint, Role, Rotor, SliderCrank
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum, orders_equal
-from laufruhe.problem.channels import AT_EACH_MOUNT, CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel
+from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel, is_at_mounts
 from laufruhe.problem.loads import PointLoads
 
 
@@ -114,7 +114,7 @@ class Measure:
     @property
     def on_mounts(self) -> bool:
         """Whether it is of the force or the travel of each mount."""
-        return self.channel in AT_EACH_MOUNT
+        return is_at_mounts(self.channel)
 
     @property
     def is_inside(self) -> bool:

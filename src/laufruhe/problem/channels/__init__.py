@@ -111,6 +111,7 @@ __all__ = [
     "PlaceChannel",
     "SizeChannel",
     "counted_cases",
+    "is_at_mounts",
     "motion_indices",
     "mounting_in",
 ]
@@ -185,6 +186,12 @@ ADDED_MASS = MassChannel("added mass", "kg", roles=(Role.COUNTERWEIGHT, Role.BAL
 SHAFT_DISTANCE = _of_places("shaft distance", ("min", "max"), lambda m, a, b: distances(m.rotors, a, b, False))
 SHAFT_CLEARANCE = _of_places("shaft clearance", ("min",), lambda m, a, b: distances(m.rotors, a, b, True))
 ENVELOPE_RADIUS = _of_places("envelope radius", ("max",), lambda m, a, b: reaches(m.rotors, a, b))
+
+
+def is_at_mounts(channel: Channel) -> bool:
+    """Return whether a channel is the force or the travel of each mount."""
+    return channel in AT_EACH_MOUNT
+
 
 CHANNELS: Mapping[str, Channel] = {
     channel.name: channel
