@@ -191,7 +191,8 @@ def test_what_others_made_is_never_touched(here: Path) -> None:
     assert run("evaluate", path, "--no-plots").exit_code == 0
     (here / "results/scene-as-given/cycle.png").write_text("mine")
     refused(run("evaluate", path), "results", "'cycle.png', which Laufruhe did not make")
-    for name, text in (("trace.csv", "1,2\n"), ("package.json", '{"name": 1}'), ("deep.json", "[" * 5000)):
+    for name, text in (("trace.csv", "1,2\n"), ("package.json", '{"name": 1}'), ("deep.json", "[" * 5000),
+                       ("book.json", '{"title": "mine"}'), ("list.json", '[{"problem": 1}]')):  # fmt: skip
         (here / name).write_text(text)
         refused(run("check", path, "--json", name), "--json", "did not make")
         assert (here / name).read_text() == text

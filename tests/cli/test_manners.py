@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import os
 import re
+import shlex
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -57,6 +59,70 @@ def test_output_that_nobody_can_take_is_told(here: Path) -> None:
     assert found.returncode == 1
     assert found.stderr.startswith("laufruhe: the output cannot be written (No space left")
     assert found.stderr.count("\n") == 1
+
+
+def shell(words: str, here: Path, **more: str) -> subprocess.CompletedProcess[str]:
+    """A command whose streams a shell closes."""
+    line = f"{shlex.quote(sys.executable)} -m laufruhe {words}"
+    env = {**os.environ, **more}
+    return subprocess.run(["sh", "-c", line], cwd=here, env=env, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "status", "said"),
+    [
+        ("check p.toml <&-", 0, ""),
+        ("check p.toml 2>&-", 0, ""),
+        ("check none.toml 2>&-", 2, ""),
+        ("check none.toml >&- 2>&- <&-", 2, ""),
+        ("check p.toml >&-", 1, "laufruhe: the output cannot be written"),
+        ("--version >&-", 1, "laufruhe: the output cannot be written"),
+        ("check p.toml -q >&- 2>&- <&-", 0, ""),
+        ("check - <&-", 2, "stdin: title: is missing"),
+        ("init new.toml <&-", 2, "laufruhe: init: asks questions, and nobody is there"),
+        ("evaluate p.toml --no-plots --out o --json - >&-", 1, "laufruhe: the output cannot be written"),
+    ],
+)
+def test_closed_streams(words: str, status: int, said: str, here: Path) -> None:
+    shutil.copy(SINGLE, here / "p.toml")
+    found = shell(words, here)
+    assert (found.returncode, found.stderr[: len(said)]) == (status, said)
+    assert "Traceback" not in found.stderr
+    assert said or not found.stderr
+
+
+@pytest.mark.slow
+def test_files_do_not_take_the_numbers_of_closed_streams(here: Path) -> None:
+    """What is said would stand in the middle of them."""
+    shutil.copy(SINGLE, here / "p.toml")
+    for out, streams in (("open", ">/dev/null"), ("closed", "-q >&- 2>&- <&-")):
+        assert shell(f"evaluate p.toml --no-plots --out {out} {streams}", here).returncode == 0
+    names = sorted(path.name for path in (here / "open").iterdir())
+    assert sorted(path.name for path in (here / "closed").iterdir()) == names
+    for name in (name for name in names if name.endswith(".csv")):
+        assert (here / "open" / name).read_bytes() == (here / "closed" / name).read_bytes()
+
+
+@pytest.mark.slow
+def test_a_backend_that_is_none_is_not_asked_for(here: Path) -> None:
+    shutil.copy(SINGLE, here / "p.toml")
+    found = shell("evaluate p.toml --out o -q", here, MPLBACKEND="junk")
+    assert (found.returncode, found.stdout, found.stderr) == (0, "", "")
+    assert (here / "o/cycle.png").is_file()
+
+
+def test_names_of_files_cannot_command_a_screen(here: Path) -> None:
+    path = here / "a\x1b[31m\u202eb.toml"
+    shutil.copy(SINGLE, path)
+    for words in (["check", path.name], ["evaluate", path.name, "--no-plots"],
+                  ["evaluate", path.name, "--no-plots", "--out", "o\x1b[2J\u202e"],
+                  ["init", "n\x1b[2J\u202e.toml", "--from", "vw-ea827-2-0"],
+                  ["examples", "tractor-single", "--to", "t\x1b[2J\u202e"]):  # fmt: skip
+        found = run.invoke(app, words)
+        assert found.exit_code == 0
+        assert "\\x1b" in found.output
+        assert all(line.isprintable() for line in found.output.splitlines())
 
 
 @pytest.mark.parametrize("command", ["check", "solve", "evaluate", "study", "explain", "trade", "page"])

@@ -178,6 +178,17 @@ def test_a_trace_that_never_ends(tmp_path: Path) -> None:
     refused(written(tmp_path, harness.TRACED), "gas.file", "100000 rows")
 
 
+def test_a_trace_larger_than_any(tmp_path: Path) -> None:
+    """1 GB took 2.1 GB of memory."""
+    path = written(tmp_path, harness.TRACED)
+    with (tmp_path / "trace.csv").open("wb") as stream:
+        stream.truncate(10_000_001)
+    refused(path, "gas.file", "larger than 10 MB")
+    lines = harness.TRACE.splitlines()
+    (tmp_path / "trace.csv").write_text("\n".join([lines[0] + "," * 1_000_000, *lines[1:]]), encoding="utf-8")
+    assert CliRunner().invoke(app, ["check", str(path)]).exit_code == 0
+
+
 @pytest.mark.parametrize(
     "values",
     ["[1e400, 1]", f"[{10**400}, 1]", "[[0.2], 0.3]", "[{}, 1]", "[nan, 0.1]", '["0.2", 0.3]', "[1e308, -1e308]", "[]",

@@ -33,6 +33,7 @@ CONSTRAINT = table(
 SCHEMA = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
     **table(
+        made_by={"const": "laufruhe"},
         problem=TEXT,
         status={"enum": ["optimal", "feasible", "infeasible", "failed"]},
         objective={"anyOf": [{"type": "null"}, table(name=TEXT, value=MAYBE, unit=TEXT, initial=MAYBE)]},

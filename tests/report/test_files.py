@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import random
 import signal
 import subprocess
@@ -15,6 +16,7 @@ import pytest
 from laufruhe.errors import InputError
 from laufruhe.report import files
 from laufruhe.report.files import MADE, Set, staged, staged_file
+from laufruhe.report.strict_json import strict
 
 NAMES = [f"file-{k}" for k in range(8)]
 # makes set after set, each of files that hold its number
@@ -200,9 +202,9 @@ def test_a_link_to_a_folder_stays_a_link(tmp_path: Path) -> None:
 def test_one_file_appears_whole(tmp_path: Path) -> None:
     place = tmp_path / "deep/data.json"
     with staged_file(place, "--json") as path:
-        files.write(path, '{"title": "x"}')
+        files.write(path, strict({"title": "x"}))
         assert not place.exists()
-    assert place.read_text() == '{"title": "x"}'
+    assert json.loads(place.read_text()) == {"made_by": "laufruhe", "title": "x"}
     with staged_file(place, "--json"):
         pass
     assert [entry.name for entry in place.parent.iterdir()] == ["data.json"]

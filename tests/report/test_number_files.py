@@ -23,7 +23,7 @@ from laufruhe.problem.evaluation import measured
 from laufruhe.report import curves, tables
 from laufruhe.report.sections import SECTIONS
 from laufruhe.report.sheet import Sheet
-from laufruhe.report.tables import sheets_of, writing_tables
+from laufruhe.report.tables import sheets_of, write_csv, writing_tables
 from laufruhe.report.workbook import write_book
 from laufruhe.solvers import Result, state
 from problem_files import PROBLEMS, loaded
@@ -48,6 +48,29 @@ def folder(result: Result, tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("tables")
     write_tables(result, place)
     return place
+
+
+FORMULAS = ["=1+1", "@SUM(A1)", "+A1", "-A1", "-1+cmd|' /C calc'!A0", "\t=1", "＝1", "-5 =1", "+4 (=1)"]
+PLAIN = ["-5", "+5 %", "-3.2 N m", "-1e-5 kg m^2", "-", "a=1", "1-3-4-2", " =1", "-3 N/mm²"]
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+def test_no_text_is_computed_by_a_spreadsheet(text: str, tmp_path: Path) -> None:
+    sheet = Sheet([text, "x"], [[text, -1.5], ["a", 2]])
+    write_csv(sheet, tmp_path / "t.csv")
+    with (tmp_path / "t.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.reader(stream))
+    assert rows == [[f"'{text}", "x"], [f"'{text}", "-1.5"], ["a", "2"]]
+    # a workbook knows texts from formulas
+    write_book({"t": sheet}, tmp_path / "t.xlsx")
+    cells = [cell for row in openpyxl.load_workbook(tmp_path / "t.xlsx")["t"] for cell in row]
+    assert [cell.data_type for cell in cells] == ["s", "s", "s", "n", "s", "n"]
+
+
+@pytest.mark.parametrize("text", PLAIN)
+def test_plain_texts_are_left_alone(text: str, tmp_path: Path) -> None:
+    write_csv(Sheet([text], [[text]]), tmp_path / "t.csv")
+    assert (tmp_path / "t.csv").read_text(encoding="utf-8") == f"{text}\n{text}\n"
 
 
 def test_forces_over_the_crank_angle_have_the_measures_of_the_result(result: Result, folder: Path) -> None:

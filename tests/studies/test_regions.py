@@ -56,6 +56,10 @@ def files(root: Path) -> list[Path]:
     return sorted(path for path in root.rglob("*") if path.is_file() and path.name != "zarr.json")
 
 
+def contents(root: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() for path in root.rglob("*") if path.is_file()}
+
+
 def test_pieces_are_read_as_they_were_kept(tmp_path: Path) -> None:
     root = written(tmp_path / "s.zarr")
     assert trusted(root) == sorted(WANTED)
@@ -116,7 +120,75 @@ def test_what_is_not_ours_is_left_alone(tmp_path: Path) -> None:
     (root / "mine.txt").write_text("mine")
     with pytest.raises(InputError, match="holds what Laufruhe did not make"):
         opened(root)
-    assert [path.name for path in root.iterdir() if path.name != "zarr.json"] == ["mine.txt"]
+    assert [path.name for path in root.iterdir()] == ["mine.txt"]
+
+
+@pytest.mark.parametrize(
+    "damage",
+    ["", "{", "[]", "\x00", '{"zarr_format": 3}', '{"zarr_format": 3, "node_type": 5}', "[" * 5000,
+     '{"zarr_format": 3, "node_type": "group", "attributes": 1}',
+     '{"zarr_format": 3, "node_type": "group", "attributes": {"made_by": "laufruhe study", "parts": 1}}',
+     '{"zarr_format": 2}'],
+)  # fmt: skip
+def test_a_damaged_root_is_one_line_and_stays(damage: str, tmp_path: Path) -> None:
+    root = written(tmp_path / "s.zarr")
+    (root / "zarr.json").write_text(damage, encoding="utf-8")
+    before = contents(root)
+    with pytest.raises(InputError, match="another place by --out") as caught:
+        opened(root)
+    assert len(str(caught.value).splitlines()) == 1
+    assert contents(root) == before
+
+
+@pytest.mark.parametrize("kind", ["group", "array", "empty group", "old group", "old array"])
+def test_a_store_of_others_is_left_alone(kind: str, tmp_path: Path) -> None:
+    import zarr
+
+    root, form = tmp_path / "s.zarr", 2 if "old" in kind else 3
+    if "array" in kind:
+        zarr.create_array(root, shape=(3,), dtype="float64", zarr_format=form)[:] = 1.0
+    else:
+        group = zarr.open_group(root, mode="w", zarr_format=form, attributes={"whose": "mine"})
+        if kind != "empty group":
+            group.create_array("part", shape=(3,), dtype="float64")[:] = 1.0
+    before = contents(root)
+    with pytest.raises(InputError, match="another place by --out"):
+        opened(root)
+    assert contents(root) == before
+
+
+@pytest.mark.parametrize("kind", ["group", "array", "file"])
+def test_a_stranger_in_our_store_is_left_alone(kind: str, tmp_path: Path) -> None:
+    import zarr
+
+    root = written(tmp_path / "s.zarr")
+    whole = zarr.open_group(root, mode="r+")
+    if kind == "group":
+        whole.create_group("other").create_array("values", shape=(3,), dtype="float64")[:] = 1.0
+    elif kind == "array":
+        whole.create_array("other", shape=(3,), dtype="float64")[:] = 1.0
+    else:
+        (root / "other").write_text("mine")
+    before = contents(root)
+    with pytest.raises(InputError, match="did not make"):
+        Regions(root, "other", TEMPLATE, WANTED)
+    assert contents(root) == before
+    assert trusted(root) == sorted(WANTED)
+
+
+@pytest.mark.parametrize("key", ["values", "done"])
+def test_arrays_of_another_form_are_not_written_into(key: str, tmp_path: Path) -> None:
+    """Whole numbers would cut off what is behind the point."""
+    import zarr
+
+    root = written(tmp_path / "s.zarr")
+    group = zarr.open_group(root, mode="r+")["part"]
+    form = {"shape": group[key].shape, "chunks": group[key].chunks}
+    group.create_array(key, **form, dtype="int64", overwrite=True)
+    store = opened(root)
+    assert store.seconds == {}
+    store.keep("00", 0.25, {VALUES: rows("00")})
+    assert trusted(root) == ["00"]
 
 
 def test_two_runs_do_not_write_at_once(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import typer
 
 from laufruhe.cli.questions import asked, described
-from laufruhe.errors import refused
+from laufruhe.errors import printed, refused
 from laufruhe.files import drafts, ready
 from laufruhe.files.catalogue import CatalogueEngine, engine_named, engines
 from laufruhe.files.complaints import in_file, nearest
@@ -28,7 +28,7 @@ def begun(file: Path, name: str | None) -> str:
     _write({file.parent / other: text for other, text in texts.items()})
     known = ready.ready().get((source or "").removesuffix(".toml"))
     command = "study" if known is not None and known.is_study else "solve"
-    return f"{file}: ready to be changed; then: {shlex.join(['laufruhe', command, str(file)])}\n"
+    return printed(f"{file}: ready to be changed; then: {shlex.join(['laufruhe', command, str(file)])}") + "\n"
 
 
 def _texts(file: Path, source: str | None) -> dict[str, str]:
@@ -68,7 +68,7 @@ def copied(names: Sequence[str], folder: Path) -> str:
     """Ready problems in a folder, with what they refer to; what to say of them."""
     texts = ready.copies(names)
     _write({folder / name: text for name, text in texts.items()})
-    return "".join(f"{folder / name}\n" for name in texts)
+    return "".join(f"{printed(str(folder / name))}\n" for name in texts)
 
 
 def _write(texts: Mapping[Path, str]) -> None:

@@ -27,6 +27,7 @@ from laufruhe.cli.screen import (
     exit_statuses,
     handing_out,
     in_time,
+    open_closed_streams,
     progress,
     share_below_one,
     spoken,
@@ -307,6 +308,9 @@ def main() -> None:
     gc.set_threshold(SELDOM)
     if not ONE_THREAD.keys() & os.environ.keys():
         os.environ.update(ONE_THREAD)
+    # pictures are made without a backend, and a name that is none ends the import of matplotlib
+    os.environ.pop("MPLBACKEND", None)
+    open_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             # a terminal that knows no Greek gets an escape in place of a traceback

@@ -8,7 +8,7 @@ from pathlib import Path
 import typer
 
 from laufruhe.cli.screen import above_zero
-from laufruhe.errors import check_whole, refused
+from laufruhe.errors import check_whole, printed, refused
 from laufruhe.server.serving import Page
 
 LARGEST_PORT = 65535
@@ -26,7 +26,7 @@ def served(problem: Path, port: int | None, time_limit: float, ends_after: float
     page = Page(problem, port, seconds)
 
     def ready() -> None:
-        typer.echo(f"{problem}: {page.address}\nCtrl-C ends it; who has this address can use the page.")
+        typer.echo(f"{printed(str(problem))}: {page.address}\nCtrl-C ends it; who has this address can use the page.")
         if opens_browser and not webbrowser.open(page.server.guard.ticket_address):
             typer.echo("No browser could be started; open the address above in one.", err=True)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import math
+import os
 import sys
 import time
 import warnings
@@ -163,6 +164,18 @@ def speak(loud: int) -> None:
     """In a process that a command has made: be as loud as it."""
     _loudness.set(loud)
     warn_plainly()
+
+
+def open_closed_streams() -> None:
+    """Give the command the standard streams that its caller closed, so that no file of results takes their numbers.
+
+    Nothing comes from such an input, and what is said to such an error stream is lost. An output refuses what is
+    written, as a full device does: the answer was asked for there.
+    """
+    for name, access in (("stdin", os.O_RDONLY), ("stdout", os.O_RDONLY), ("stderr", os.O_WRONLY)):
+        if getattr(sys, name) is None:
+            mode = "r" if name == "stdin" else "w"
+            setattr(sys, name, os.fdopen(os.open(os.devnull, access), mode, encoding="utf-8"))
 
 
 def warn_plainly() -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from laufruhe.files.complaints import Refused
 
-MOST_ROWS = 100_000
+MOST_ROWS, MOST_BYTES = 100_000, 10_000_000
 
 
 def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[tuple[float, ...]]:
@@ -19,7 +19,11 @@ def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[t
     try:
         if path.exists() and not path.is_file():
             raise Refused(key, file, "is no file", beside)
-        text = path.read_text(encoding="utf-8-sig")
+        with path.open("rb") as stream:
+            content = stream.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise Refused(key, file, f"is larger than {MOST_BYTES // 1_000_000} MB", "thin it out")
+        text = content.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         why = error.strerror or "error" if isinstance(error, OSError) else "it is no UTF-8 text"
         raise Refused(key, file, f"cannot be read ({why})", beside) from None
@@ -27,7 +31,7 @@ def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[t
     rows: list[tuple[float, ...]] = []
     heading = True
     for number, line in enumerate(text.splitlines(), 1):
-        cells = [cell.strip().strip('"') for cell in line.split(parted_by)]
+        cells = [cell.strip().strip('"') for cell in line.split(parted_by, len(columns))]
         if not line.strip() or cells[0].startswith("#"):
             continue
         try:

@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from laufruhe.errors import Complaint, InputError, ModelError, refused, wrong_call
+from laufruhe.errors import Complaint, InputError, ModelError, printed, refused, wrong_call
 from laufruhe.files import edits
 from laufruhe.files.asked import limits_of, objectives_of
 from laufruhe.files.assembly import assembly_of
@@ -280,7 +280,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     ranks = objectives_of(file.objective, scene, file.single)
     _check_decided(decisions, bool(ranks))
     problem = Problem(
-        name=path.stem,
+        name=printed(path.stem),
         title=file.title,
         engine=engine,
         points=points,

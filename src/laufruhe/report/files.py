@@ -14,9 +14,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from laufruhe.errors import InputError, refused
+from laufruhe.errors import InputError, printed, refused
 from laufruhe.numerics.locks import held
 from laufruhe.present.pictures import CURVES, PICTURES, PRINTED, SHEETS
+from laufruhe.report.strict_json import is_ours
 
 RESULT = "result.json"
 REPORT = "report.md"
@@ -163,7 +164,7 @@ def staged_file(path: Path, option: str) -> Iterator[Path]:
         raise refused(option, str(path), "is a folder", "name a file in it")
     if path.is_file() and not os.access(path, os.W_OK):
         raise refused(option, str(path), "cannot be written", "check its permissions")
-    if path.is_file() and not _is_data(path):
+    if path.is_file() and not is_ours(path):
         raise place.refused("is a file that Laufruhe did not make")
     with ExitStack() as until_then:
         with _reporting(place):
@@ -176,7 +177,7 @@ def staged_file(path: Path, option: str) -> Iterator[Path]:
 
 def placed(folder: Path, page: str) -> str:
     """Where the files are, and which of them to open first."""
-    return f"Results: {folder} (begin with {page})"
+    return f"Results: {printed(str(folder))} (begin with {printed(page)})"
 
 
 def write(path: Path, text: str) -> None:
@@ -202,16 +203,6 @@ def write_all(texts: Mapping[Path, str]) -> None:
                 raise
         for path, stage in staged.items():
             os.replace(stage, path)
-
-
-def _is_data(path: Path) -> bool:
-    """Whether a file is empty, or JSON as a command writes it."""
-    try:
-        found = json.loads(path.read_text(encoding="utf-8") or '{"title": ""}')
-    except (OSError, ValueError, RecursionError):
-        return False
-    first = found[0] if isinstance(found, list) and found else found
-    return isinstance(first, dict) and not {"problem", "title"}.isdisjoint(first)
 
 
 @contextmanager
@@ -247,7 +238,7 @@ def _made(folder: Path) -> tuple[str, frozenset[str]]:
         noted: Any = json.loads((folder / MADE).read_text(encoding="utf-8"))
         names = [entry.name for entry in folder.iterdir()] if noted["files"] is None else noted["files"]
         return str(noted["made_by"]), frozenset(map(str, names))
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return "", frozenset()
 
 

@@ -14,6 +14,7 @@ from laufruhe.report.document import Block, Bullets, Document, Heading, Illustra
 from laufruhe.report.grid import Grid, unmarked
 from laufruhe.report.sheet import Sheet
 from laufruhe.report.strict_json import strict
+from laufruhe.report.tables import write_csv
 from laufruhe.report.web_page import as_html
 from laufruhe.report.workbook import write_book
 from laufruhe.studies.part import Part
@@ -62,8 +63,8 @@ def write_study(
         data.rename(spaced).to_netcdf(folder / f"{name}.nc")
         if "csv" in part.ends:
             rows = _flat(data)
-            rows.to_csv(folder / f"{name}.csv")
             sheets[name] = Sheet([*rows.index.names, *rows.columns], rows.reset_index().to_numpy(dtype=object).tolist())
+            write_csv(sheets[name], folder / f"{name}.csv")
         if "png" in part.ends:
             drawn[name] = draw(part.picture(data), folder / name)
     if sheets:

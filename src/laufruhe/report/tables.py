@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple, fields
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +32,8 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionValue, LimitValue
 
 MOST_ROWS = 20 * STEPS
+_FORMULA = re.compile(r"(?!-?$|[+-]?[0-9.]+(?:e[+-]?[0-9]+)?(?: ?%| [\w ./*^°²³]*)?$)[=+\-@\t＝＋－＠]")
+"""Begins what a spreadsheet may compute: a sign that no plain number with its unit follows."""
 MANY = 5_000
 """Cells that take longer to write than a process to begin."""
 
@@ -157,10 +161,15 @@ def writing_tables(result: Result, folder: Path) -> Iterator[Callable[[], None]]
 
 
 def write_csv(sheet: Sheet, path: Path) -> None:
-    """One sheet as comma-separated values, numbers in full precision."""
+    """Write one sheet as comma-separated values: numbers in full precision, no text that a spreadsheet computes."""
     with path.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(sheet.head)
-        writer.writerows(
-            ["" if isinstance(cell, float) and not math.isfinite(cell) else cell for cell in row] for row in sheet.rows
-        )
+        writer.writerow(map(_cell, sheet.head))
+        writer.writerows(map(_cell, row) for row in sheet.rows)
+
+
+def _cell(cell: Any) -> Any:
+    if isinstance(cell, float) and not math.isfinite(cell):
+        return ""
+    # names are the user's, and spreadsheets take ' for the mark of a text
+    return f"'{cell}" if isinstance(cell, str) and _FORMULA.match(cell) else cell

@@ -23,6 +23,8 @@ from laufruhe.studies.part import Record, Template
 
 VALUES, COLUMNS, DONE = "values", "columns", "done"
 MADE_BY = "laufruhe study"
+_ROOT = "zarr.json"
+_FOREIGN, _ELSEWHERE = "what Laufruhe did not make", "name another place by --out"
 _SECONDS = struct.Struct("<d")
 _SUM = hashlib.sha256().digest_size
 
@@ -96,33 +98,71 @@ def _checksum(mark: str, seconds: bytes, values: NDArray[np.float64]) -> bytes:
 
 def _laid_out(root: Path, name: str, template: Template) -> tuple[Any, Any]:
     """Arrays of a part, as they stand there or new."""
-    import zarr
-
-    whole = zarr.open_group(root, mode="a", zarr_format=3)
-    if whole.attrs.get("made_by") != MADE_BY and any(entry.name != "zarr.json" for entry in root.iterdir()):
-        raise refused("results", str(root), "holds what Laufruhe did not make", "name another place by --out")
-    whole.attrs["made_by"] = MADE_BY
-    about = {"columns": {key: asdict(column) for key, column in template.columns.items()}, "cases": [*template.cases]}
+    whole = _store_at(root)
+    columns = {key: asdict(column) for key, column in template.columns.items()}
+    about = {"columns": columns, "cases": [*template.cases], "chunk": template.chunk}
     cases, pieces = len(template.cases), -(-template.draws // template.chunk)
     shapes = {VALUES: (cases, template.draws, len(template.columns)), DONE: (cases, pieces, _SUM + _SECONDS.size)}
-    with suppress(KeyError, ValueError, OSError, TypeError):
-        group = whole[name]
-        if {key: group.attrs.get(key) for key in about} == about and group.attrs.get("chunk") == template.chunk:
-            for key, shape in shapes.items():
-                # more draws go on from those that are there
-                if group[key].shape != shape:
-                    group[key].resize(shape)
-            return group[VALUES], group[DONE]
-    group = whole.create_group(name, overwrite=True, attributes={**about, "chunk": template.chunk})
+    forms = {
+        VALUES: (np.dtype("float64"), (1, template.chunk, len(template.columns))),
+        DONE: (np.dtype("uint8"), (1, 1, shapes[DONE][-1])),
+    }
+    arrays = _standing(whole, name, about, forms)
+    if arrays is not None:
+        for key, array in zip(shapes, arrays, strict=True):
+            # more draws go on from those that are there
+            if array.shape != shapes[key]:
+                array.resize(shapes[key])
+        return arrays
+    if (root / name).exists() and name not in whole.attrs["parts"]:
+        raise refused("results", str(root / name), f"is {_FOREIGN}", _ELSEWHERE)
+    whole.attrs["parts"] = sorted({*whole.attrs["parts"], name})
+    group = whole.create_group(name, overwrite=True, attributes=about)
     values = group.create_array(
-        VALUES, shape=shapes[VALUES], dtype="float64", chunks=(1, template.chunk, len(template.columns)),
+        VALUES, shape=shapes[VALUES], dtype="float64", chunks=forms[VALUES][1],
         fill_value=np.nan, dimension_names=("case", "draw", "quantity"),
     )  # fmt: skip
     done = group.create_array(
-        DONE, shape=shapes[DONE], dtype="uint8", chunks=(1, 1, shapes[DONE][-1]), fill_value=0,
+        DONE, shape=shapes[DONE], dtype="uint8", chunks=forms[DONE][1], fill_value=0,
         dimension_names=("case", "piece", "byte"), compressors=None,
     )  # fmt: skip
     return values, done
+
+
+def _standing(whole: Any, name: str, about: Mapping[str, Any], forms: Mapping[str, Any]) -> tuple[Any, Any] | None:
+    """Return the arrays of a part that was laid out like this; None where another stands there, or a damaged one."""
+    with suppress(Exception):
+        group = whole[name]
+        alike = all((group[key].dtype, group[key].chunks) == form for key, form in forms.items())
+        if alike and {key: group.attrs.get(key) for key in about} == about:
+            return group[VALUES], group[DONE]
+    return None
+
+
+def _store_at(root: Path) -> Any:
+    """Return the group of a store, new in an empty folder; what is not ours stays as it is.
+
+    Raises
+    ------
+    InputError
+        If the folder holds anything but a sound store that was made here.
+    """
+    import zarr
+
+    if not any(root.iterdir()):
+        return zarr.open_group(root, mode="w", zarr_format=3, attributes={"made_by": MADE_BY, "parts": []})
+    if not (root / _ROOT).is_file():
+        raise refused("results", str(root), f"holds {_FOREIGN}", _ELSEWHERE)
+    try:
+        whole = zarr.open_group(root, mode="r+", zarr_format=3)
+        is_ours = whole.attrs.get("made_by") == MADE_BY and isinstance(whole.attrs.get("parts"), list)
+    except Exception:
+        # an array, no JSON, a number for a name: each ends in another error of Zarr
+        rule, remedy = f"has a '{_ROOT}' that is damaged or no group", f"delete the folder, or {_ELSEWHERE}"
+        raise refused("results", str(root), rule, remedy) from None
+    if not is_ours:
+        raise refused("results", str(root), f"holds {_FOREIGN}", _ELSEWHERE)
+    return whole
 
 
 @contextmanager
