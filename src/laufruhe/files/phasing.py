@@ -95,10 +95,10 @@ def opened(
         cylinders=count,
         throws=None if given is None else tuple(given),
         throw_bounds=bounds,
-        firing_order=None if engine.given_order is None else tuple(engine.given_order),
+        firing_order=_order_of(engine, cycle, count),
         bank=_bounds(engine.own("bank_angle")),
         split=_bounds(engine.own("split_pin_angle")),
-        intervals=_intervals(table.intervals, cycle, count, bounds is not None, fixed.spread if fixed else 0.0),
+        intervals=_intervals(table.intervals, cycle, count, _fires_as_given(engine), fixed.spread if fixed else 0.0),
         realise=realise,
         steps=table.phases,
         shafts=_shaft_choice(shafts, table),
@@ -161,11 +161,28 @@ def _bounds(value: float | Open | None) -> tuple[float, float] | None:
     return None if value is None else Open.of(value).bounds
 
 
-def _intervals(given: IntervalsTable | None, cycle: Cycle, count: int, bounded: bool, spread: float) -> Intervals:
+def _fires_as_given(engine: EngineTable) -> bool:
+    """Tell if throws with angles or bounds of their own, and no open order, need no limits of firing intervals."""
+    return isinstance(engine.throws, list) and (_has_open(engine.throws) or engine.firing_order != "open")
+
+
+def _order_of(engine: EngineTable, cycle: Cycle, count: int) -> tuple[int, ...] | None:
+    """Return the order given, or that of the first dead centres of throws where no order is open."""
+    if engine.given_order is not None:
+        return tuple(engine.given_order)
+    throws = engine.given_throws
+    if throws is None or engine.firing_order == "open" or any(_has_open(engine.own(key)) for key in _OPENABLE):
+        return None
+    layout = layout_of(_closed(engine, count, engine.own("bank_angle"), engine.own("split_pin_angle")))
+    order = next(lap_orders(cycle, layout, throws), None)
+    # a later turn is chosen where two come at once
+    return order if order is not None and max(firing_turns(layout, throws, order)) < 1.0 else None
+
+
+def _intervals(given: IntervalsTable | None, cycle: Cycle, count: int, as_given: bool, spread: float) -> Intervals:
     even = cycle.angle / count
     if given is None:
-        # throws with bounds of their own need no others
-        return Intervals(0.0, cycle.angle) if bounded else Intervals(even - spread, even + spread)
+        return Intervals(0.0, cycle.angle) if as_given else Intervals(even - spread, even + spread)
     low = given.min if given.min is not None else 0.0
     high = given.max if given.max is not None else cycle.angle
     away = given.largest_deviation
@@ -223,14 +240,18 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
         where = "engine.throws" if phasing.throw_bounds is not None else "phasing.intervals"
         rule = f"lets throws leave the even steps, and those of layout '{engine.layout}' do not"
         raise Refused(where, None, rule, 'write throws = "open", without intervals')
-    both = all(isinstance(engine.own(key), Open) for key in ("bank_angle", "split_pin_angle"))
-    if not phasing.continuous and both:
-        rule = "is open beside bank_angle, and even firing binds only their sum"
-        raise Refused("engine.split_pin_angle", None, rule, "fix one of the two, or let the firing be uneven")
     for angle in ("bank_angle", "split_pin_angle"):
         if phasing.throws is not None and Open.of(engine.own(angle)).is_open:
             rule = "is open beside throws that are given, and is decided with open ones only"
-            raise Refused(f"engine.{angle}", None, rule, 'write throws = "open", or fix the angle')
+            remedy = f'write throws = "open" and cylinders = {count}, or fix the angle'
+            raise Refused(f"engine.{angle}", None, rule, remedy)
+    both = all(isinstance(engine.own(key), Open) for key in ("bank_angle", "split_pin_angle"))
+    if not phasing.continuous and both:
+        rule = "is open beside bank_angle, and even firing binds only their sum"
+        remedy = (
+            'fix one of the two, or let the firing be uneven: intervals = { min = "...", max = "..." } in [phasing]'
+        )
+        raise Refused("engine.split_pin_angle", None, rule, remedy)
     throws, rest = divmod(count, kind.cylinders_per_throw)
     if rest:
         rule = f"is no multiple of the {kind.cylinders_per_throw} cylinders that share a throw"

@@ -21,7 +21,7 @@ from laufruhe.problem.evaluation import Evaluation, finely, objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import STRENGTH, Certificate, Proof, Reach, certified
+from laufruhe.prove.certificate import STRENGTH, Certificate, Proof
 from laufruhe.solvers.accuracy import largest_error
 from laufruhe.solvers.cones.equal_designs import equal_designs
 from laufruhe.solvers.result import Result, Status
@@ -112,7 +112,7 @@ def _together(
         certificate=_certificate(first, ranks, weakest),
         decisions=tuple(replace(d, shadow_price=math.nan if d.at_bound else 0.0) for d in last.decisions),
         limits=tuple(replace(x, shadow_price=math.nan if x.active else 0.0) for x in last.limits[:count]),
-        initial=first.initial,
+        initial=replace(first.initial, samples=last.final.samples),
         message=message,
         error=partial(largest_error, stages),
         timing=_summed(stages),
@@ -143,16 +143,12 @@ def _rank(
 
 
 def _certificate(first: Result, ranks: tuple[RankValue, ...], weakest: Proof) -> Certificate | None:
-    """Of the first objective in the design of the last rank, no stronger than any of them."""
+    """Return the bound of the first objective with the largest gap of any: what later ones may take is none (P12)."""
     own = first.certificate
     if own is None:
         return None
-    nothing = nothing_of(first.problem, first.final.engine)
-    found = certified(
-        ranks[0].final, own.lower_bound, nothing, first.problem.tolerance, Reach.WHOLE, own.kkt_residual,
-        f"{own.method}; then {len(ranks) - 1} more in order",
-    )  # fmt: skip
-    return replace(found, kind=min(found.kind, weakest, key=STRENGTH))
+    method = f"{own.method}; then {len(ranks) - 1} more in order"
+    return replace(own, kind=weakest, gap=max(rank.gap for rank in ranks), method=method)
 
 
 def _summed(stages: list[Result]) -> dict[str, float]:

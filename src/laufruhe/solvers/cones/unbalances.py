@@ -193,7 +193,23 @@ def settled(problem: Problem, affine: AffineProblem, x: Array) -> Array:
     if still.shape[1]:
         sizes = [sum(abs(drive.gain) for drive in domain.decision.rotor_drives) for domain in affine.domains]
         x = lightest(affine, x, still, sizes)
-    return _without_negligible(affine, x)
+    return _cancelling(affine, _without_negligible(affine, x))
+
+
+def _cancelling(affine: AffineProblem, x: Array) -> Array:
+    """Decisions at which what is minimised cancels to the last digit, where a solver left less than its own."""
+    norms = [norm for _, norm in affine.terms]
+    parts = sum(weight * replace(norm, constant=0.0 * norm.constant).value(x) for weight, norm in affine.terms)
+    if not 0.0 < affine.objective(x) <= NEGLIGIBLE * parts:
+        return x
+    slope = np.concatenate([norm.slope.reshape(-1, affine.size) * affine.units for norm in norms])
+    rest = np.concatenate([norm.rows(x).reshape(-1) for norm in norms])
+    # what is left out stays out
+    found = x - affine.units * np.linalg.lstsq(slope * (x != 0.0), rest)[0]
+    for domain in affine.domains:
+        found[domain.columns] = domain.project(found)
+    is_better = affine.objective(found) < affine.objective(x) and _keeps_limits(affine, x, found)
+    return found if is_better else x
 
 
 def _without_negligible(affine: AffineProblem, x: Array) -> Array:

@@ -1,0 +1,77 @@
+"""Optional shafts beside throws that are given, and angles that cannot be open beside them."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import laufruhe
+from laufruhe.errors import InputError
+
+INPUTS = Path(__file__).parent / "inputs"
+
+
+def table(**engine: Any) -> dict[str, Any]:
+    """Return the scene with these keys of its engine."""
+    found = tomllib.loads((INPUTS / "optional-shaft-uneven-throws.toml").read_text())
+    kept = {key: value for key, value in found["engine"].items() if key not in engine}
+    return found | {"engine": kept | {key: value for key, value in engine.items() if value is not None}}
+
+
+def with_shaft(scene: dict[str, Any]) -> dict[str, Any]:
+    """Return the scene with its shaft built."""
+    (shaft,) = scene["balancer_shafts"]
+    own = {key: value for key, value in shaft.items() if key not in ("optional", "shaft_mass")}
+    return scene | {"balancer_shafts": [own]}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "engine",
+    [
+        {"throws": [0, 90]},
+        {"throws": [0, 90], "firing_order": [1, 2]},
+        {"throws": [0, 100, 190], "cycle": "two-stroke"},
+        {"throws": [0, 70], "layout": "vee", "bank_angle": 50},
+    ],
+    ids=["uneven", "with an order", "two-stroke", "vee"],
+)
+def test_a_shaft_that_may_be_built_is_worth_what_it_is_worth_built(engine: dict[str, Any]) -> None:
+    """Nothing limits the firing intervals, so throws as given fire as they do without the choice."""
+    scene = table(**engine)
+    free, built = laufruhe.solve(scene), laufruhe.solve(with_shaft(scene))
+    assert free.status == "optimal"
+    assert free.objective.value == pytest.approx(built.objective.value, rel=1e-6)
+    fires = [[part.firing_angle for part in found.final.engine.slider_cranks] for found in (free, built)]
+    assert fires[0] == pytest.approx(fires[1])
+
+
+@pytest.mark.slow
+def test_two_throws_at_a_right_angle() -> None:
+    assert laufruhe.solve(table()).objective.value == pytest.approx(1884.49, abs=0.01)
+
+
+def test_intervals_that_are_given_still_hold() -> None:
+    result = laufruhe.solve(table() | {"phasing": {"intervals": {"largest_deviation": "10 deg"}}})
+    assert result.status == "infeasible"
+    assert "from 270 to 450 deg" in result.message
+
+
+def test_angles_beside_given_throws_are_refused_with_what_helps() -> None:
+    """The remedy, word for word, is a file that is read."""
+    text = (INPUTS / "vee-bank-and-split-open.toml").read_text()
+    with pytest.raises(InputError, match=r'bank_angle: .*write throws = "open" and cylinders = 2, or fix') as told:
+        laufruhe.load(text)
+    assert "let the firing be uneven" not in str(told.value)
+    opened = text.replace("throws=[0]", 'throws = "open"\ncylinders = 2')
+    assert laufruhe.load(opened).phasing.opened == (True, True)
+
+
+def test_two_open_angles_are_refused_with_intervals_that_help() -> None:
+    text = (INPUTS / "vee-bank-and-split-open.toml").read_text().replace("throws=[0]", 'throws = "open"\ncylinders = 2')
+    even = text.replace('intervals={min="0 deg",max="360 deg"}', "")
+    with pytest.raises(InputError, match=r"split_pin_angle: .*intervals = .* in \[phasing\]"):
+        laufruhe.load(even)
