@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from pydantic import BaseModel
 
 from laufruhe.files import problem_file, ready
 from laufruhe.files.catalogue import KEY, engines
+from laufruhe.files.fields import without_open
 from laufruhe.files.problem_file import ProblemFile
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.studies.reader import StudyFile
@@ -149,9 +150,9 @@ def schema() -> str:
     return _text(_schema(ProblemFile))
 
 
-def _schema(model: type[BaseModel]) -> dict[str, Any]:
-    """In the draft that editors support."""
-    found = model.model_json_schema(ref_template="#/definitions/{model}")
+def _schema(model: type[BaseModel], kept: Callable[[Any], Any] = lambda found: found) -> dict[str, Any]:
+    """In the draft that editors support; what is kept of it is explained."""
+    found = kept(model.model_json_schema(ref_template="#/definitions/{model}"))
     whole: dict[str, Any] = {"$schema": "http://json-schema.org/draft-07/schema#", **found}
     whole["definitions"] = whole.pop("$defs")
     if "EngineTable" in whole["definitions"]:
@@ -182,7 +183,7 @@ def _with_catalogue_key(schema: dict[str, Any]) -> None:
 
 def study_schema() -> str:
     """The schema of study files, for editors: what a part leaves out may stand in [study.common]."""
-    found = _schema(StudyFile)
+    found = _schema(StudyFile, without_open)
     holder = found["definitions"]["StudyTable"]["properties"]["parts"]
     kinds = {kind: ref.rsplit("/", 1)[1] for kind, ref in holder["items"]["discriminator"]["mapping"].items()}
     keys: dict[str, Any] = {}

@@ -67,7 +67,7 @@ def test_one_number_for_each() -> None:
         ({"absorbers": [{"name": "d", "on": "pulley", "inertia": "1 kg m^2"}]}, "leaves its ring to nothing"),
         ({"absorbers": [{"name": "d", "on": "puley", "inertia": "1 kg m^2"}]}, "did you mean 'pulley'"),
         ({"output": "gearbox"}, "is no disc"),
-        ({"throw_inertia": {"between": ["0.001 kg m^2", "0.01 kg m^2"]}}, "cannot be left open"),
+        ({"throw_inertia": {"between": ["0.01 kg m^2", "0.001 kg m^2"]}}, "has its bounds reversed"),
         ({"discs": []}, None),
     ],
 )

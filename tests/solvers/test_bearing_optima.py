@@ -15,6 +15,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.report.json_result import as_dict
 from problem_files import MOUNTS
 from ready import solved
+from searched import searched
 
 THREE = """
 title = "Three with bearings"
@@ -175,14 +176,12 @@ def test_friction_power_is_what_the_bearings_lose_in_sum(tmp_path: Path) -> None
 
 
 @pytest.mark.slow
-def test_places_of_a_shaft_that_bearings_carry_are_decided_locally(tmp_path: Path) -> None:
-    text = (THREE + WEBS + asked("mean main-bearing force")).replace(
-        'x = "150 mm"', 'x = { between = ["100 mm", "150 mm"] }'
-    )
-    result = laufruhe.solve(read(tmp_path, text))
-    held = laufruhe.solve(read(tmp_path, THREE + WEBS + asked("mean main-bearing force")))
-    assert result.certificate.kind == "local"
-    assert result.objective.value <= held.objective.value * (1.0 + 1e-3)
+def test_a_weight_that_bearings_feel_is_searched_along_the_crank(tmp_path: Path) -> None:
+    """As good as the best of a row of places, each with its weights proven."""
+    text = THREE + WEBS + asked("mean main-bearing force")
+    found = searched(read(tmp_path, text.replace('x = "150 mm"', 'x = { between = ["100 mm", "150 mm"] }')))
+    row = (read(tmp_path, text.replace('x = "150 mm"', f'x = "{x} mm"')) for x in (100, 110, 120, 130, 140, 150))
+    assert found.objective.value <= min(laufruhe.solve(one).objective.value for one in row) * (1.0 + 1e-4)
 
 
 @pytest.mark.parametrize(

@@ -257,10 +257,14 @@ def test_a_flywheel_beside_counterweights_is_the_sum_of_both(tmp_path: Path) -> 
         laufruhe.solve(loaded(tmp_path, SINGLE + INERTIA + web + force))
 
 
-def test_what_no_method_decides_with_a_flywheel_is_refused_by_name(tmp_path: Path) -> None:
+def test_a_flywheel_beside_an_open_crank_is_that_of_each_crank(tmp_path: Path) -> None:
+    """All even cranks of equal cylinders turn as evenly."""
     text = changed(SINGLE, "throws = [0]", 'cylinders = 3\ncylinder_spacing = "120 mm"\nthrows = "open"')
-    with pytest.raises(ModelError, match="degree of irregularity"):
-        laufruhe.solve(loaded(tmp_path, text + INERTIA + LEAST))
+    both = laufruhe.solve(loaded(tmp_path, text + INERTIA + LEAST))
+    crank = changed(text, 'throws = "open"', "throws = [0, 120, 240]\nfiring_order = [1, 2, 3]")
+    assert both.objective.value == pytest.approx(
+        laufruhe.solve(loaded(tmp_path, crank + INERTIA + LEAST)).objective.value
+    )
 
 
 def test_what_a_flywheel_needs_is_told_and_nothing_traded_for_it() -> None:
@@ -304,8 +308,8 @@ def test_every_even_star_of_equal_cylinders_stores_the_same(tmp_path: Path) -> N
     problem = loaded(tmp_path, text + fixed + wanted)
     degrees = [irregularity(problem.engine, point, 1.0, problem.fidelity) for point in problem.points]
     assert proven(problem).objective.value == pytest.approx(max(degrees), rel=1e-9)
-    with pytest.raises(ModelError, match="no method decides star and flywheel together for degree of irregularity"):
-        laufruhe.solve(loaded(tmp_path, text + INERTIA + wanted))
+    wheel = laufruhe.solve(loaded(tmp_path, text + INERTIA + wanted))
+    assert wheel.final.engine.flywheel.inertia == pytest.approx(40.0, rel=1e-6)
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ import pytest
 from scipy.optimize import minimize
 
 import laufruhe
-from laufruhe.errors import InputError, ModelError
+from laufruhe.errors import InputError
 from laufruhe.machine import Engine
 from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.workers import HERE, working_on
@@ -229,11 +229,15 @@ def test_what_makes_no_sense_is_refused(change: str, tmp_path: Path) -> None:
         _problem(tmp_path, _engine() + change)
 
 
-def test_an_open_firing_order_is_refused_beside_places(tmp_path: Path) -> None:
-    """What no method decides together is an error, and never frozen."""
-    text = _engine([0, 120, 240]).replace("throws = [0, 120, 240]", 'cylinders = 3\nthrows = "open"')
-    with pytest.raises(ModelError, match="place and star"):
-        laufruhe.solve(_problem(tmp_path, text + _shaft(x=_between(-10, 10))))
+def test_an_open_crank_beside_places_is_decided_star_by_star(tmp_path: Path) -> None:
+    """As well as with each crank given."""
+    text = _engine([0, 120, 240]) + _shaft(x=_between(-10, 10))
+    both = laufruhe.solve(_problem(tmp_path, text.replace("throws = [0, 120, 240]", 'cylinders = 3\nthrows = "open"')))
+    each = [
+        laufruhe.solve(_problem(tmp_path, text.replace("[0, 120, 240]", throws))).objective.value
+        for throws in ("[0, 120, 240]", "[0, 240, 120]")
+    ]
+    assert both.objective.value == pytest.approx(min(each), rel=1e-4)
 
 
 LIMITS = {

@@ -20,6 +20,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.boxes.shared_gas import CELLS, torque_change
 from problem_files import PROBLEMS
+from searched import searched
 
 READY = tables_of(PROBLEMS / "opposed-pistons-lead.toml")
 
@@ -145,8 +146,7 @@ def test_a_lead_moves_the_mean_torque_that_arms_hand_on(start: float) -> None:
         for own in (problem("rms shaking force", lead, constraints=[limit], **more) for lead in (0, 60))
     ]
     assert stress[0] > 0.0 > stress[1]
-    with pytest.raises(ModelError, match=r"lead together for .* arm stress"):
-        laufruhe.solve(problem("rms shaking force", between(0, 60, start=start), constraints=[limit], **more))
+    searched(problem("rms shaking force", between(0, 60, start=start), constraints=[limit], **more))
 
 
 @pytest.mark.parametrize(

@@ -21,6 +21,7 @@ from laufruhe.solvers.boxes.sizes import ask_cones
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.result import Result
 from problem_files import PROBLEMS, changed
+from searched import searched
 from solvers.test_sizes import TEXT
 
 WEIGHT = """
@@ -145,11 +146,15 @@ def test_masses_of_weights_are_limited_beside_sizes(solved: Result) -> None:
     assert result.limits[-1].active
 
 
+def test_bearings_beside_an_uneven_speed_are_refused_in_a_line() -> None:
+    with pytest.raises(ModelError, match="even crank speed") as refused:
+        laufruhe.solve(changed(TOGETHER, "samples = 90", 'samples = 90\ncrank_inertia = "1 kg m^2"'))
+    assert "\n" not in str(refused.value)
+
+
 @pytest.mark.slow
-def test_masses_of_pistons_beside_sizes_are_decided_locally() -> None:
-    problem = laufruhe.load(changed(TOGETHER, '"0.5 kg"', '{ between = ["0.1 kg", "1 kg"] }'))
-    result = laufruhe.solve(problem.changed(search=replace(problem.search, starts=2)))
-    assert result.certificate is None or result.certificate.kind in (Proof.LOCAL, Proof.NONE)
+def test_pistons_beside_sizes_are_searched() -> None:
+    searched(laufruhe.load(changed(TOGETHER, '"0.5 kg"', '{ between = ["0.1 kg", "1 kg"], start = "0.5 kg" }')), 10.0)
 
 
 STARS = """

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
 from pydantic import BaseModel, Field
 
@@ -31,6 +31,8 @@ def _with_knobs(table: type[T]) -> type[T]:
 @_with_knobs
 class FidelityTable(Table):
     """How exactly the physics is computed; exact by default."""
+
+    closed: ClassVar[str] = "says how exactly things are computed, not what the engine is"
 
     kinematics: Literal["exact", "two-order", "auto"] = f.told(
         "Motion of the pistons; auto takes the cheapest that keeps the objective in tolerance.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypeAlias, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -36,6 +36,8 @@ Given = TypeVar("Given", bound=BaseModel)
 
 # what may stand behind a number: what of it is no tolerance, the reader says
 _BEHIND = "(?:(?:±|[+]/?-).*)?$"
+ANYWHERE = "A number that a local search decides, without a bound."
+"""What a schema says of a number that is open where no method knows what depends on it."""
 _TOLERANCE = {"type": "string", "description": "How far a built one may be off.", "examples": ["± 2 %"]}
 
 
@@ -81,6 +83,8 @@ class Number:
         Smallest value, value to exceed, largest value, value to stay under [SI].
     plain
         Factor that turns a bare number into SI, where one is allowed (degrees).
+    closed
+        Why it may not be open at all, after "it"; empty where any search may move it.
     """
 
     unit: str
@@ -90,23 +94,25 @@ class Number:
     most: float = math.inf
     below: float = math.inf
     plain: float | None = None
+    closed: str = ""
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
-        return core_schema.no_info_plain_validator_function(self._read)
+        return core_schema.no_info_plain_validator_function(self.read)
 
     def __get_pydantic_json_schema__(
         self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         number = self._number_schema()
-        if not self.openable:
+        if self.closed:
             return number
         pair = {"type": "array", "items": number, "minItems": 2, "maxItems": 2}
         between = {
             "type": "object",
             "properties": {"between": pair, "start": number, "tolerance": _TOLERANCE},
             "required": ["between"],
+            "additionalProperties": False,
         }
-        return {"anyOf": [number, {**between, "additionalProperties": False}]}
+        return {"anyOf": [number, between if self.openable else {**between, "description": ANYWHERE}]}
 
     def _number_schema(self) -> dict[str, Any]:
         if not self.unit:
@@ -117,7 +123,8 @@ class Number:
         text = {"type": "string", "pattern": units.pattern(self.unit)[:-1] + _BEHIND, **told}
         return {"anyOf": [text, {"type": "number"}]} if self.plain is not None else text
 
-    def _read(self, given: Any) -> float | Open:
+    def read(self, given: Any) -> float | Open:
+        """Return a number [SI], or the bounds of one that is open; a refusal says what is wrong."""
         return self._open(given) if isinstance(given, dict) else self._bounded(self._number(given))
 
     def _number(self, given: Any) -> float:
@@ -154,7 +161,7 @@ class Number:
 
     def _open(self, given: dict[str, Any]) -> Open:
         if not self.openable:
-            raise refusal("cannot be left open; give a number")
+            raise refusal("cannot be left open here; give a number")
         if unknown := set(given) - {"between", "start"}:
             rule = f"has an unknown key '{min(unknown)}'"
             raise refusal(f"{rule}; write {{ between = [low, high] }}, start = ... is optional")
@@ -268,11 +275,14 @@ OpenAngle: TypeAlias = Annotated[float | Open, Number("rad", plain=_DEG, openabl
 Speed: TypeAlias = Annotated[float, Number("rad/s", above=0.0)]
 PistonSpeed: TypeAlias = Annotated[float, Number("m/s", above=0.0)]
 Time: TypeAlias = Annotated[float, Number("s", above=0.0)]
-Ratio: TypeAlias = Annotated[float, Number("", least=-100.0, most=100.0), AfterValidator(_turning)]
+_GEARED = "is a ratio of gears, and the orders of loads jump from one ratio to the next"
+Ratio: TypeAlias = Annotated[float, Number("", least=-100.0, most=100.0, closed=_GEARED), AfterValidator(_turning)]
 NonNegative: TypeAlias = Annotated[float, Number("", least=0.0)]
 Part: TypeAlias = Annotated[float, Number("", least=0.0, most=1.0)]
 Positive: TypeAlias = Annotated[float, Number("", above=0.0)]
-Tolerance: TypeAlias = Annotated[float, Number("", above=0.0, below=1.0)]
+Tolerance: TypeAlias = Annotated[
+    float, Number("", above=0.0, below=1.0, closed="says how exactly things are computed, not what the engine is")
+]
 OpenFraction: TypeAlias = Annotated[float | Open, Number("", least=-10.0, most=10.0, openable=True)]
 NonNegativeLength: TypeAlias = Annotated[float, Number("m", least=0.0)]
 Unbalance: TypeAlias = Annotated[float, Number("kg m", least=0.0)]
@@ -321,10 +331,40 @@ Pair: TypeAlias = Annotated[list[T], Field(min_length=2, max_length=2)]
 Three: TypeAlias = Annotated[list[T], Field(min_length=3, max_length=3)]
 
 
+def without_open(schema: Any) -> Any:
+    """Return a schema without numbers that are open where no key says so."""
+    if isinstance(schema, list):
+        return [without_open(one) for one in schema]
+    if not isinstance(schema, dict):
+        return schema
+    choices = schema.get("anyOf", [])
+    number = next((one for one in choices if one.get("description") == ANYWHERE), None)
+    if number is None:
+        return {key: without_open(one) for key, one in schema.items()}
+    others = [one for one in choices if one is not number]
+    # a number is one of two beside its being open; pydantic joins further ones
+    first = [*others[0].get("anyOf", [others[0]]), *others[1:]]
+    rest = {key: without_open(one) for key, one in schema.items() if key != "anyOf"}
+    return dict(sorted({**({"anyOf": first} if len(first) > 1 else first[0]), **rest}.items()))
+
+
 class Table(BaseModel):
     """A TOML table that knows its keys and takes no others."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
+    closed: ClassVar[str] = ""
+    """Why no number in it may be open but those whose keys say so, after "it"; empty where any may."""
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        """Return the schema, which offers no open number where the table is closed."""
+        found = handler(schema)
+        if cls.closed:
+            own = handler.resolve_ref_schema(found)
+            own |= without_open(own)
+        return found
 
 
 def needed(text: str) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from laufruhe import units
 from laufruhe.files import fields as f
@@ -20,6 +20,8 @@ SAME_SPEED = 0.01
 
 class FrictionTable(Table):
     """Friction mean effective pressure, measured in a CSV file or given, with its uncertainty."""
+
+    closed: ClassVar[str] = "is of a measurement"
 
     file: str | None = f.told("CSV file: speed, load and fuel for kind fuel; speed and drag for kind motoring.")
     kind: Literal["fuel", "motoring"] = "fuel"

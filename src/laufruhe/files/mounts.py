@@ -159,8 +159,6 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
         numbers = [*stiffness, 0.0, 0.0, 0.0, 0.0]
         for key in ("position", "turned"):
             values = _values(table, place, key, where, "add it, or mirror_of")
-            if any(isinstance(value, Open) for value in values):
-                raise Refused(f"{where}.{key}", None, "is open, and rigid mounts stay", 'fix it, or use kind "elastic"')
             numbers += [Open.of(value).start for value in values]
         mounts.append(mount_of(Mount(name, (0.0, 0.0, 0.0)), [*numbers, 0.0]))
     all_different([m.position for m in mounts], "mounts.positions", "mounts stand in one place", "move one")

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -40,6 +40,8 @@ _OPENABLE = ("throws", "firing_order", "bank_angle", "split_pin_angle")
 class IntervalsTable(Table):
     """Bounds on the crank angle from each firing to the next."""
 
+    closed: ClassVar[str] = "is a limit, and a search would relax it"
+
     min: f.Angle | None = None
     max: f.Angle | None = None
     largest_deviation: f.Angle | None = f.told("Largest deviation of an interval from equal firing.")
@@ -47,6 +49,8 @@ class IntervalsTable(Table):
 
 class PhasingTable(Table):
     """How open throws, firing orders and shafts are decided."""
+
+    closed: ClassVar[str] = "is a limit, or says how a search goes"
 
     phases: Annotated[int, Field(ge=1, le=96)] | None = f.told(
         "Equal steps of a turn on which throws may stand; by default those of even firing."

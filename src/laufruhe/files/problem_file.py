@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from pydantic import Field
 
@@ -32,6 +32,8 @@ SCHEMA = "laufruhe.schema.json"
 
 class SearchTable(Table):
     """How far a search goes where the problem is not convex."""
+
+    closed: ClassVar[str] = "says how a search goes, not what the engine is"
 
     starts: int = Field(default=16, ge=1, le=10_000)
     seed: int = Field(default=0, ge=0)

@@ -7,8 +7,9 @@ import re
 import sys
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ from laufruhe.files.geared import geared_of
 from laufruhe.files.load_cases import load_cases_of
 from laufruhe.files.mounts import mounts_of
 from laufruhe.files.nested import inside, plain
+from laufruhe.files.open_numbers import without_open
 from laufruhe.files.open_parts import check_factors, leads_of, piston_masses
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
@@ -47,6 +49,7 @@ from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.machine.running_gear import RunningGear
 from laufruhe.problem.decision import Decision
+from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem, Search
 from laufruhe.problem.tolerance import Drawing, Tolerances
 from laufruhe.problem.tolerance import Path as Place
@@ -93,17 +96,40 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
     try:
         with in_file(path):
             plain, written = parted(tables)
-            file = ProblemFile.model_validate(plain)
+            closed, numbers = without_open(plain)
+            file = ProblemFile.model_validate(closed)
             problem = _of_file(file, path)
-            each = tolerances_of(written, file.tolerances, problem, plain)
-            over = over_of(file.robust, each)
-            if each:
-                problem = problem.changed(tolerances=Tolerances(each, _Rebuilt(plain, path)), over=over)
+
+            def finished(own: Problem, candidate: Candidate | None) -> Problem:
+                rebuild = _Rebuilt(closed, path, candidate)
+                each = tolerances_of(written, file.tolerances, own, closed)
+                return replace(
+                    own, decisions=(*own.decisions, *numbers), rebuild=rebuild, tolerances=Tolerances(each, rebuild),
+                    over=over_of(file.robust, each),
+                )  # fmt: skip
+
+            if numbers or written or file.tolerances is not None or file.robust is not None:
+                problem = _of_every_star(problem, finished)
+            _check_decided(problem.decisions, bool(problem.objective))
+            _check_followed(problem)
             return replace(problem, origin=_Origin(tables, path))
     except ValidationError as error:
         raise InputError(str(path), complaints_of(error, ProblemFile)) from None
     except ModelError as error:
         raise InputError(str(path), (Complaint.of(error, "engine"),)) from None
+
+
+def _of_every_star(problem: Problem, finished: Callable[[Problem, Candidate | None], Problem]) -> Problem:
+    """The problem with what a file adds to the engine, and every star that its phasing may choose with the same."""
+    phasing = problem.phasing
+    if phasing is None:
+        return finished(problem, None)
+    realise = phasing.realise
+
+    def star(candidate: Candidate) -> Problem:
+        return finished(realise(candidate), candidate)
+
+    return replace(finished(problem, None), phasing=replace(phasing, realise=star))
 
 
 def shown_as(path: Path) -> Path:
@@ -159,19 +185,38 @@ class _Origin:
 
 @dataclass(frozen=True)
 class _Rebuilt:
-    """What a file describes with other numbers at some of its places."""
+    """What a file describes with other numbers at some of its places.
+
+    Attributes
+    ----------
+    candidate
+        The star that it is of where stars are open; else None.
+    """
 
     tables: Mapping[str, Any]
     path: Path
+    candidate: Candidate | None = None
 
     def __call__(self, changes: Mapping[Place, str | float]) -> Drawing:
         """As built."""
         try:
-            found = _of_file(ProblemFile.model_validate(with_numbers(self.tables, changes)), self.path)
+            found = _of_file(ProblemFile.model_validate(with_numbers(self._plainly, changes)), self.path)
+            if self.candidate is not None and found.phasing is not None:
+                found = found.phasing.realise(self.candidate)
         except (ValidationError, Refused, ModelError) as error:
             at = ", ".join(f"{key_path(place)} = {value}" for place, value in changes.items())
-            raise ModelError(f"an engine within its tolerances cannot be built, {at}: {error}; narrow one") from None
+            told = complaints_of(error, ProblemFile) if isinstance(error, ValidationError) else (error,)
+            why = " and ".join(map(str, told))
+            raise ModelError(f"this engine cannot be built, {at}: {why}; narrow its bounds or tolerances") from None
         return Drawing(found.engine, found.points, found.decisions, found.mount_numbers)
+
+    @cached_property
+    def _plainly(self) -> Mapping[str, Any]:
+        """The tables without a choice of fidelity, which is made once."""
+        if self.tables.get("fidelity", {}).get("kinematics") != "auto":
+            return self.tables
+        own = {key: value for key, value in self.tables["fidelity"].items() if key not in ("kinematics", "tolerance")}
+        return {**self.tables, "fidelity": own}
 
 
 def tables_of(path: Path) -> dict[str, Any]:
@@ -278,7 +323,6 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     loads = (*piston_masses(table, cylinders, file.counterweights), *leads_of(table), *collected.decisions, *of_geared)
     scene, decisions = Scene(engine, points), (*loads, *found.decisions, *of_wheel, *of_chain, *of_sizes)
     ranks = objectives_of(file.objective, scene, file.single)
-    _check_decided(decisions, bool(ranks))
     problem = Problem(
         name=printed(path.stem),
         title=file.title,
@@ -321,6 +365,22 @@ def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, fo
     if any(part.swept.piston.bore is None for part in cylinders):
         raise Refused("engine.bore", None, "is missing, and a load at the brake is over the displacement", "add it")
     return Brake(file.friction, folder, sum(part.piston_area * part.stroke for part in cylinders), cycle)
+
+
+def _check_followed(problem: Problem) -> None:
+    """Refuse an open number of the file that nothing follows, and one that names operating points by their speed."""
+    given = problem.engine, problem.points, problem.mount_numbers
+    names = [point.name for point in problem.points]
+    for decision in problem.decisions:
+        drawn = list[Drawing]()
+        for bound in (decision.lower, decision.upper) if decision.address_drives else ():
+            with suppress(ModelError):
+                drawn.append(problem.rebuild({drive.path: drive.written(bound) for drive in decision.address_drives}))
+        if drawn and all((own.engine, own.points, own.mount_numbers) == given for own in drawn):
+            raise Refused(decision.name, None, "is open, and nothing of this engine follows it", "fix or leave it out")
+        if any([point.name for point in own.points] != names for own in drawn):
+            rule = f"is open, and the speeds follow by which operating points are called, {', '.join(names)}"
+            raise Refused(decision.name, None, rule, "give each operating point a name, and leave up_to out")
 
 
 def _check_decided(decisions: Sequence[Decision], has_objective: bool) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeVar
+from typing import ClassVar, Literal, TypeVar
 
 from laufruhe.errors import ModelError
 from laufruhe.files import fields as f
@@ -65,6 +65,8 @@ _ROUNDING = 1e-9
 
 class QuantityTable(Table):
     """What part of a quantity counts."""
+
+    closed: ClassVar[str] = "says what is asked of a design, and a search would ask for what is easiest"
 
     mounts: list[str] | None = None
     bearings: list[str] | None = None

@@ -6,10 +6,10 @@ import math
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, TypeAlias, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeAlias
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, Field
+from pydantic import BeforeValidator, Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
@@ -17,6 +17,7 @@ from laufruhe.files import nested
 from laufruhe.files.asked import SIDES, limit_name
 from laufruhe.files.complaints import Refused, measured, nearest
 from laufruhe.files.fields import Name, Table, refusal
+from laufruhe.files.model_walk import number_at
 from laufruhe.files.problem_file import ProblemFile
 
 MOST_POINTS = 100_000
@@ -148,31 +149,7 @@ def _options(here: Any) -> dict[str, Any]:
 
 def field_at(where: str) -> f.Number | None:
     """How the number at a path is read; None where text, a list or a choice stands there."""
-    here: list[Any] = [ProblemFile]
-    for part in parts_of(where):
-        here = [inner for annotation in here for inner in _inside(annotation, part)]
-    return next((found for annotation in here for found in _numbers(annotation)), None)
-
-
-def _inside(annotation: Any, part: str) -> list[Any]:
-    """Annotations of what a part of a path may mean."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        field = annotation.model_fields.get(part)
-        return [] if field is None else [Annotated[field.annotation, *field.metadata, None]]
-    if get_origin(annotation) is list:
-        return list(get_args(annotation))
-    if isinstance(annotation, f.OrOpen):
-        return _inside(annotation.inner, part)
-    # what is annotated and its notes, or the members of a union
-    return [inner for one in get_args(annotation) for inner in _inside(one, part)]
-
-
-def _numbers(annotation: Any) -> list[f.Number]:
-    if isinstance(annotation, f.Number):
-        return [annotation]
-    if get_origin(annotation) is list:
-        return []
-    return [found for one in get_args(annotation) for found in _numbers(one)]
+    return number_at(ProblemFile, parts_of(where))
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
@@ -47,6 +47,8 @@ RESIDUAL = "tolerances.residual_unbalance"
 class TolerancesTable(Table):
     """Tolerances of built engines that are not those of a number in this file."""
 
+    closed: ClassVar[str] = "is a tolerance, and none would be least"
+
     residual_unbalance: str | None = Field(
         default=None, description="Left on the crankshaft by balancing: an unbalance on each plane, or a grade of "
         "ISO 21940-11 for all of them together.", examples=["G 6.3", "50 g cm"],
@@ -60,6 +62,8 @@ class TolerancesTable(Table):
 
 class RobustTable(Table):
     """Design for engines as built: for the worst case within the tolerances, or for a share of them."""
+
+    closed: ClassVar[str] = "says for which engines one is designed"
 
     over: str = f.told('"worst case", or a share of engines such as "95 %".', "worst case")
     engines: int = Field(default=1000, ge=20, le=100_000, description="Number of engines that are drawn.")

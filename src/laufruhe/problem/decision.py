@@ -21,6 +21,7 @@ from laufruhe.problem.drives import (
     POSITION,
     STIFFNESS,
     TURNED,
+    AddressDrive,
     Drive,
     Kind,
     MountDrive,
@@ -40,6 +41,7 @@ __all__ = [
     "POSITION",
     "STIFFNESS",
     "TURNED",
+    "AddressDrive",
     "Decision",
     "Domain",
     "Drive",
@@ -114,6 +116,11 @@ class Decision:
     def keys(self, kind: Kind) -> tuple[Any, ...]:
         """Of the numbers of a kind that follow."""
         return tuple(drive.key for drive in self.drives if isinstance(drive, NumberDrive) and drive.kind is kind)
+
+    @property
+    def address_drives(self) -> tuple[AddressDrive, ...]:
+        """Numbers of the file that follow."""
+        return tuple(drive for drive in self.drives if isinstance(drive, AddressDrive))
 
     @property
     def place_drives(self) -> tuple[PlaceDrive, ...]:

@@ -43,6 +43,8 @@ class Kind(IntEnum):
     """Of inertia on a geared shaft: the roll moment is affine in it while the masses of the pistons are held."""
     LEAD = 11
     """Of a geared shaft: every load of order h that it carries comes earlier by h times as much (P13)."""
+    NUMBER = 12
+    """Any other number of the problem file: nothing is known of what depends on it, so everything may."""
 
 
 @dataclass
@@ -135,7 +137,7 @@ class Drive(Protocol):
     def acts(self) -> bool:
         """Whether anything of the engine follows."""
 
-    def move(self, numbers: Numbers, change: Any) -> None:
+    def move(self, numbers: Numbers, change: Any, /) -> None:
         """Move the number by a change of the decision."""
 
 
@@ -219,6 +221,33 @@ class NumberDrive:
         """Of the number."""
         key = self.kind, self.key
         numbers.changes[key] = numbers.changes.get(key, 0.0) + float(change.real)
+
+
+@dataclass(frozen=True)
+class AddressDrive:
+    """A number of the problem file: the engine is put together anew with the value at its address.
+
+    Attributes
+    ----------
+    path
+        Keys, and numbers in lists from zero.
+    unit
+        SI unit in which the value is written; empty for a plain number.
+    """
+
+    path: tuple[str | int, ...]
+    unit: str
+    kind: ClassVar[Kind] = Kind.NUMBER
+    acts: ClassVar[bool] = True
+
+    def written(self, value: Value) -> str | float:
+        """Return the value as a file has it."""
+        number = float(value.real)
+        return f"{number!r} {self.unit}" if self.unit else number
+
+    def move(self, _numbers: Numbers, _change: Any) -> None:
+        """Refuse: no number of an engine that is put together follows by a change (`Problem.held`)."""
+        raise TypeError(f"{self.path} is a number of the file; the engine is put together anew with it")
 
 
 def mount_of(mount: Mount, numbers: Sequence[float]) -> Mount:

@@ -21,7 +21,7 @@ from laufruhe.problem.measure import Limit, Measure, Rank, Term
 from laufruhe.problem.phasing import PhasingOf
 from laufruhe.problem.plausibility import doubts
 from laufruhe.problem.sets import Value
-from laufruhe.problem.tolerance import NO_TOLERANCES, Drawing, Over, Tolerances
+from laufruhe.problem.tolerance import NO_TOLERANCES, Beside, Drawing, Over, Rebuild, Tolerances, no_file
 
 
 @dataclass(frozen=True)
@@ -123,6 +123,8 @@ class Problem:
         Measurements that loads at the brake are made indicated ones by.
     known_rows
         Of measures in time, whose largest length is convex in what loads are affine in.
+    rebuild
+        What gives the drawing of its file with other numbers.
     """
 
     name: str
@@ -148,6 +150,7 @@ class Problem:
     fires_together: bool = False
     friction: tuple[FrictionTest, ...] = ()
     known_rows: Mapping[Measure, KnownRows] = field(default_factory=dict, compare=False, repr=False)
+    rebuild: Rebuild = field(default=no_file, compare=False, repr=False)
 
     def __repr__(self) -> str:
         return f"<Problem {self.summary}>"
@@ -328,9 +331,56 @@ class Problem:
             mount_numbers=found.mount_numbers, tolerances=NO_TOLERANCES, over=None,
         )  # fmt: skip
 
+    def held(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Problem:
+        """Return the problem with decisions, all of them unless some are named, held at these values.
+
+        A number of the file puts the engine, its operating points and what follows of other decisions together anew.
+
+        Raises
+        ------
+        ModelError
+            If there is no such engine.
+        """
+        held = self.decisions if decisions is None else tuple(decisions)
+        value_of = {decision.name: value for decision, value in zip(held, values, strict=True)}
+        drawn = self._drawn({v.path: v.written(value_of[d.name]) for d in held for v in d.address_drives})
+        if drawn is not self:
+            known = {decision.name: decision for decision in drawn.decisions}
+            held = tuple(known[decision.name] for decision in held)
+        moved = [decision for decision in held if not decision.address_drives]
+        numbers = drawn.numbers([value_of[decision.name] for decision in moved], moved)
+        rows = tuple(tuple(map(float, row)) for row in numbers.mounts)
+        return replace(
+            drawn, engine=numbers.engine(drawn.engine), mount_numbers=rows or drawn.mount_numbers,
+            decisions=tuple(decision for decision in drawn.decisions if decision.name not in value_of),
+        )  # fmt: skip
+
+    def _drawn(self, changes: Mapping[tuple[str | int, ...], str | float]) -> Problem:
+        """The problem as its file draws it with numbers changed; decisions keep their sets, and follow as there."""
+        if not changes:
+            return self
+        found = self.rebuild(changes)
+        known = {decision.name: decision for decision in found.decisions}
+        for decision in self.decisions:
+            if not decision.address_drives and decision.name not in known:
+                raise ModelError(f"{decision.name} is open, and nothing of this engine follows it")
+        if len(found.points) != len(self.points):
+            raise ModelError("another number of operating points follows from an open number; fix it")
+        # measures know operating points by name, and a name may be the speed that is open
+        points = tuple(replace(new, name=own.name) for new, own in zip(found.points, self.points, strict=True))
+        decisions = tuple(d if d.address_drives else replace(known[d.name], set=d.set) for d in self.decisions)
+        tolerances = replace(self.tolerances, rebuild=Beside(self.tolerances.rebuild, changes))
+        return replace(
+            self, engine=found.engine, points=points, mount_numbers=found.mount_numbers, decisions=decisions,
+            rebuild=Beside(self.rebuild, changes), tolerances=tolerances,
+        )  # fmt: skip
+
     def design(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Engine:
         """The engine with decisions, all of them unless some are named, in place of those it was given with."""
-        return self.numbers(values, decisions).engine(self.engine)
+        moved = self.decisions if decisions is None else decisions
+        if any(decision.address_drives for decision in moved):
+            return self.held(values, moved).engine
+        return self.numbers(values, moved).engine(self.engine)
 
     def numbers(self, values: Sequence[Any], decisions: Sequence[Decision] | None = None) -> Numbers:
         """The numbers of the engine with decisions at these values; symbols do as well."""

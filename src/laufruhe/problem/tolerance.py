@@ -51,6 +51,22 @@ class Drawing:
     mount_numbers: tuple[tuple[float, ...], ...]
 
 
+Rebuild: TypeAlias = Callable[[Mapping[Path, str | float]], Drawing]
+"""The drawing of a problem file with other numbers at some of its places."""
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A rebuild in which some numbers stand at other values already."""
+
+    rebuild: Rebuild
+    changes: Mapping[Path, str | float]
+
+    def __call__(self, changes: Mapping[Path, str | float]) -> Drawing:
+        """Return the drawing with further numbers changed."""
+        return self.rebuild({**self.changes, **changes})
+
+
 class ErrorDrive(Protocol):
     """What one error moves."""
 
@@ -267,7 +283,7 @@ class Tolerances:
     """
 
     each: tuple[Tolerance, ...]
-    rebuild: Callable[[Mapping[Path, str | float]], Drawing] = no_file
+    rebuild: Rebuild = no_file
 
     @property
     def acting(self) -> Tolerances:

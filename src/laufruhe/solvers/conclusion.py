@@ -100,7 +100,8 @@ def judged(problem: Problem, values: Sequence[Value], samples: int | None = None
     ModelError
         If it has no loads, as on a resonance that nothing damps.
     """
-    evaluation = evaluate(problem, problem.design(values), samples)
+    held = problem.held(values)
+    evaluation = evaluate(held, samples=samples)
     value = objective_value(problem, evaluation)
     return Design(problem, tuple(values), evaluation, value, evaluation.excess(problem.limits))
 

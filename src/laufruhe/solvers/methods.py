@@ -45,6 +45,7 @@ from laufruhe.solvers.apart import is_apart, solve_apart
 from laufruhe.solvers.conclusion import KEPT, Shown, concluded, judged, none_within, with_limits
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import beyond_mounts
+from laufruhe.solvers.general import solve_generally
 from laufruhe.solvers.in_order import solve_in_order
 from laufruhe.solvers.mounts.convex import is_convex
 from laufruhe.solvers.reachable import with_reachable
@@ -168,6 +169,11 @@ def solve_each_apart(problem: Problem) -> Result:
     return solve_apart(problem, _decided)
 
 
+def solve_all_numbers(problem: Problem) -> Result:
+    """Numbers that nothing better decides, by local programs; what loads are affine in by cones within them."""
+    return solve_generally(problem, _decided, lambda part: _method(part).home == _CONES)
+
+
 def _asks_led(problem: Problem) -> bool:
     """Whether all that is asked is of loads that what each shaft carries adds up to, or of how evenly these turn."""
     felt = all(measure.channel.adds_up_by_shafts or measure.is_mass for measure in problem.measures)
@@ -270,8 +276,8 @@ METHODS: tuple[Method, ...] = (
            "mounts.sizes:solve_mounted_sizes", False, _OF_SIZES | _OF_MOUNTS, also=_asks_mounted_sizes),
     Method("stars, each with a smooth program", {_S: _BUILT, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
            "mounts.stars:solve_star_mounts", False, _OF_MOUNTS | _TOLD_APART, _is_pointwise, _asks_stars_on_mounts),
-    Method("local programs of all numbers", dict.fromkeys(set(Kind) - {_S}, tuple(Dependence)), Reach.ASIDE,
-           "general:solve_generally", norms=lambda _: True),
+    Method("local programs of all numbers", dict.fromkeys(Kind, tuple(Dependence)), Reach.ASIDE,
+           "methods:solve_all_numbers", norms=lambda _: True),
 )  # fmt: skip
 """Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
 
@@ -346,6 +352,11 @@ def _decided(problem: Problem) -> Result:
     return solve_told(problem, _by_what_is_open)
 
 
+def _method(problem: Problem) -> Method:
+    """The first that suits a problem; the last suits all."""
+    return next(method for method in METHODS if method.suits(problem))
+
+
 def _by_what_is_open(problem: Problem) -> Result:
     """By the first method that suits."""
     if problem.ranks:
@@ -368,7 +379,7 @@ def _by_what_is_open(problem: Problem) -> Result:
             return none_within(problem, given, broken, {})
         moved = tuple(limit for limit in problem.limits if limit not in fixed)
         return with_limits(_decided(problem.changed(limits=moved)), problem.limits)
-    if kinds and asks_runs(problem):
+    if kinds and asks_runs(problem) and Kind.NUMBER not in kinds:
         return _by("runs:solve_runs", problem, kinds, _decided)
     if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
         raise ModelError("flywheel is open, and nothing that is asked depends on it; fix it, or ask for its inertia")
@@ -381,10 +392,7 @@ def _by_what_is_open(problem: Problem) -> Result:
     words = " and ".join(kind.name.lower() for kind in sorted(kinds))
     if kinds and not problem.objective:
         raise ModelError(f"{words} is open and nothing is minimised; add [objective] or [mounts]")
-    method = next((m for m in METHODS if m.suits(problem)), None)
-    if method is None:
-        asked = ", ".join(dict.fromkeys(measure.name for measure in problem.measures))
-        raise ModelError(f"no method decides {words} together for {asked}; fix one of them, or ask for less")
+    method = _method(problem)
     # what is decided apart is asked once more, each part by itself
     tell(method.name)
     conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and not kinds & {_S, _T, _F, Kind.SIZE} else ()

@@ -12,7 +12,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.budget import passed
+from laufruhe.numerics.budget import in_time, passed
 from laufruhe.problem.decision import Domain, domains_of, ends_of, vector_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side
@@ -73,7 +73,7 @@ class LocalProgram:
         """
         edges = self.edges(shares)
         try:
-            evaluation = evaluate(self.problem, self.problem.design(self.values(shares)))
+            evaluation = evaluate(self.problem.held(self.values(shares)))
             rooms = [-evaluation.standing(limit).excess for limit in self.problem.limits]
             return np.array([objective_value(self.problem, evaluation), *rooms, *edges])
         except ModelError:
@@ -98,13 +98,14 @@ class LocalProgram:
         for k in range(len(shares)):
             ends = [np.clip(shares + sign * STEP * np.eye(len(shares))[k], 0.0, 1.0) for sign in (-1.0, 1.0)]
             low, high = (self.numbers(end) for end in ends)
-            found.append((high - low) / (ends[1][k] - ends[0][k]))
+            # no engine on either side says nothing of a slope
+            with np.errstate(invalid="ignore"):
+                found.append((high - low) / (ends[1][k] - ends[0][k]))
         return np.ascontiguousarray(np.array(found).T)
 
     def rank(self, shares: Array) -> tuple[float, float]:
         """Designs within their limits by their objective, others by what they exceed these by."""
-        value, *rooms = self.numbers(shares)
-        return max(-min(rooms, default=0.0), KEPT), float(value)
+        return _rank(self.numbers(shares))
 
 
 def looks(problem: Problem) -> list[Array]:
@@ -117,7 +118,7 @@ def looks(problem: Problem) -> list[Array]:
 
 def searched(program: LocalProgram, places: list[Array], starts: int) -> Array:
     """The best design of local programs from the best of some places."""
-    ranked = sorted(places, key=program.rank)
+    ranked = sorted(in_time(places), key=program.rank)
     best = ranked[0]
     for place in ranked[: max(1, min(starts, LOOKS))]:
         if passed():
@@ -133,15 +134,22 @@ def _local(program: LocalProgram, place: Array) -> Array:
     first = program.numbers(place)
     unit = first[0] if math.isfinite(first[0]) and first[0] > 0.0 else 1.0
     known: dict[bytes, Array] = {}
+    best = place, _rank(first)
 
     def numbers(x: Array) -> Array:
-        key = np.clip(x, 0.0, 1.0).tobytes()
-        if key not in known:
-            found = program.numbers(np.clip(x, 0.0, 1.0))
-            known[key] = np.append(min(found[0] / unit, FAR), found[1:])
-        return known[key]
+        nonlocal best
+        own = np.clip(x, 0.0, 1.0)
+        if own.tobytes() not in known:
+            if passed():
+                raise _OverError
+            found = program.numbers(own)
+            best = min(best, (own, _rank(found)), key=lambda pair: pair[1])
+            known[own.tobytes()] = np.append(min(found[0] / unit, FAR), found[1:])
+        return known[own.tobytes()]
 
     def slopes(x: Array) -> Array:
+        if passed():
+            raise _OverError
         found = program.slopes(np.clip(x, 0.0, 1.0))
         found[0] /= unit
         return np.nan_to_num(found, posinf=FAR, neginf=-FAR)
@@ -149,11 +157,24 @@ def _local(program: LocalProgram, place: Array) -> Array:
     limits = len(first) - 1
     inside: Any = [{"type": "ineq", "fun": lambda x: numbers(x)[1:], "jac": lambda x: slopes(x)[1:]}] if limits else []
     run: Any = minimize
-    found = run(
-        lambda x: numbers(x)[0], place, jac=lambda x: slopes(x)[0], method="SLSQP", bounds=[(0.0, 1.0)] * len(place),
-        constraints=inside, options={"maxiter": 60, "ftol": 1e-10},
-    )  # fmt: skip
+    try:
+        found = run(
+            lambda x: numbers(x)[0], place, jac=lambda x: slopes(x)[0], method="SLSQP",
+            bounds=[(0.0, 1.0)] * len(place), constraints=inside, options={"maxiter": 60, "ftol": 1e-10},
+        )  # fmt: skip
+    except _OverError:
+        return best[0]
     return np.asarray(np.clip(found.x, 0.0, 1.0))
+
+
+class _OverError(Exception):
+    """Ends a program between two evaluations when time is over."""
+
+
+def _rank(numbers: Array) -> tuple[float, float]:
+    """Designs within their limits by their objective, others by what they exceed these by."""
+    value, *rooms = numbers
+    return max(-min(rooms, default=0.0), KEPT), float(value)
 
 
 Bounded: TypeAlias = Callable[[float, float], Divided]

@@ -138,14 +138,17 @@ def every_star(phasing: Phasing) -> list[Star]:
 
 
 def by_each_order(
-    problem: Problem, phasing: Phasing, stars: Sequence[Star], decide: Decide = lambda own, _: solve_fixed(own)
-) -> Result:
+    problem: Problem, phasing: Phasing, stars: Sequence[Star], decide: Decide = lambda own, _: solve_fixed(own),
+    most: int | None = None,
+) -> Result:  # fmt: skip
     """Every firing order that loads tell apart of every star, and every set of shafts, each solved by itself.
 
     Parameters
     ----------
     decide
         What else is open of one of them, where a design of a value is known.
+    most
+        Designs, drawn of all, that are decided where no bound is asked for; None for every one, with its bound.
     """
     orders = {star: ranked_orders(phasing, star, steps) for star, steps in stars}
     if not any(orders.values()):
@@ -153,11 +156,16 @@ def by_each_order(
     # the small ones first: a shaft that buys nothing is not built
     sets = sorted(phasing.shafts.allowed, key=lambda chosen: (len(chosen), chosen))
     told = [(star, order.order) for star, steps in stars for order in told_orders(problem, phasing, star, steps)]
-    if len(told) * len(sets) >= MOST_ORDERS:
+    if most is None and len(told) * len(sets) >= MOST_ORDERS:
         many = f"{MOST_ORDERS} and more firing orders and sets of shafts are too many to decide one by one"
         raise ModelError(f"{many}; give a firing order, or throws")
     designs = [replace(star, firing_order=o, left_out=phasing.without(built)) for built in sets for star, o in told]
-    every, least, complete = _solved(problem, phasing, designs, decide)
+    whole = len(designs)
+    if most is not None and whole > most:
+        drawn = np.random.default_rng(problem.search.seed).choice(whole, most, replace=False)
+        designs = [designs[k] for k in sorted({0, *drawn.tolist()})]
+    every, least, complete = _solved(problem, phasing, designs, decide, most is None)
+    complete = complete and len(designs) == whole
     solved = [design for design in every if design.is_met]
     if not solved:
         proven = complete and all(design.is_excluded for design in every)
@@ -173,11 +181,14 @@ def by_each_order(
     count = sum(map(len, orders.values()))
     of_stars = f" of {len(stars)} stars" if len(stars) > 1 else ""
     method = f"{len(told)} of {counted(count, 'firing order')}{of_stars} seen at {counted(len(sets), 'set')} of shafts"
+    if len(designs) < whole or not complete:
+        method += f", {len(every)} of all {whole} drawn and decided"
     if len(every) < len(designs) and complete:
         method += f", {len(designs) - len(every)} of these by one order of the torque alone"
     proof = best.result.certificate
     how, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
-    certificate = certified(best.value, bound, nothing, problem.tolerance, Reach.WHOLE, residual, how)
+    reach = Reach.WHOLE if most is None else Reach.ASIDE
+    certificate = certified(best.value, bound, nothing, problem.tolerance, reach, residual, how)
     ranking = _entries(phasing, [best, *sorted(solved, key=lambda one: one.value)], orders, bound, complete)
     details = ranking_result(phasing, best.candidate, ranking, count * len(sets), len(solved), method)
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
@@ -201,13 +212,15 @@ def _entries(
 
 
 def _solved(
-    problem: Problem, phasing: Phasing, designs: Sequence[Candidate], decide: Decide
+    problem: Problem, phasing: Phasing, designs: Sequence[Candidate], decide: Decide, is_bounded: bool
 ) -> tuple[list[StarDesign], float, bool]:
     """Those that may be the best, the rest at its optimum; what the others are at least; whether time was enough."""
     started = time.perf_counter()
     found: list[StarDesign] = []
-    # those that one order of the torque says least of come first
-    lowest, broken = floors(problem, phasing, designs)
+    # those that one order of the torque says least of come first, where all else that is open leaves the torque alone
+    lowest, broken = floors(problem, phasing, designs if is_bounded else ())
+    if not is_bounded:
+        lowest, broken = np.zeros(len(designs)), np.zeros(len(designs), dtype=bool)
     places, nothing = np.argsort(lowest, kind="stable"), nothing_of(problem)
     for k, place in enumerate(places):
         best = min((one.value for one in found), default=math.inf)
