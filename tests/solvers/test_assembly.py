@@ -11,12 +11,12 @@ import pytest
 
 from laufruhe.errors import InputError, ModelError
 from laufruhe.files.reader import load
+from laufruhe.problem.assembly import assembled
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.tolerances.assembly import assembled
 from problem_files import FOUR, MOUNTS
 
 THREE = FOUR.replace("[1, 3, 4, 2]", "[1, 3, 2]")

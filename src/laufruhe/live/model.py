@@ -225,12 +225,12 @@ def _proved(result: Result) -> Proved | None:
     """Of the objective as it is shown; None where something else was bounded."""
     if result.problem.over is not None or not result.decisions:
         return None
-    if result.ranks:
-        first = result.ranks[0]
-        return Proved(first.least, first.lower_bound, first.gap, str(first.proof))
     certificate, objective = result.certificate, result.objective
     if certificate is None or objective is None or certificate.kind is Proof.NONE:
         return None
+    if result.ranks:
+        first = result.ranks[0]
+        return Proved(first.least, first.lower_bound, first.gap, str(first.proof))
     return Proved(objective.value, certificate.lower_bound, certificate.gap, str(certificate.kind))
 
 

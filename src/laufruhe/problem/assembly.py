@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import cmath
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
+from laufruhe.problem.tolerance import AddedDrive
+
+Chosen = tuple[tuple[int, ...], ...]
+"""Of every lot the part in each cylinder."""
 
 
 @dataclass(frozen=True)
@@ -36,3 +43,20 @@ class Assembly:
     """Lots of parts, of each of which every cylinder takes one."""
 
     lots: tuple[Lot, ...]
+
+
+def assembled(engine: Engine, lots: Sequence[Lot], chosen: Chosen) -> Engine:
+    """Return the engine with these parts: each weighs more than the drawing by its difference from its lot's mean."""
+    more = np.sum([lot.differences[list(parts)] for lot, parts in zip(lots, chosen, strict=True)], axis=0)
+    drawing = [
+        AddedDrive(
+            f"difference of the rod of {part.name}", part.x, cmath.rect(part.crank_radius, part.throw), part.shaft
+        )
+        for part in engine.slider_cranks
+    ]
+    pistons = tuple(
+        replace(part, reciprocating_mass=part.reciprocating_mass + float(own))
+        for part, own in zip(engine.slider_cranks, more[:, 0], strict=True)
+    )
+    rotors = tuple(drive.rotor(float(own)) for drive, own in zip(drawing, more[:, 1], strict=True) if own)
+    return replace(engine, slider_cranks=pistons, rotors=(*engine.rotors, *rotors))

@@ -147,6 +147,8 @@ def explained(result: Result) -> str:
         bound = figure(c.lower_bound, o.unit, 6)
         least = f"No design within the bounds and limits has less than {bound}. " if c.is_useful else ""
         return f"{least}The design found breaks a limit, so that nothing is proven of it."
+    if c.kind is Proof.NONE:
+        return f"{result.message[:1].upper()}{result.message[1:]}."
     if c.kind is Proof.LOCAL or not c.is_useful:
         bound = (
             f"No design is below {figure(c.lower_bound, o.unit, 6)}; designs between the two values are not ruled out."

@@ -53,6 +53,7 @@ from laufruhe.solvers.relaxed import solve_relaxed
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.rooms import surely_broken, with_room
 from laufruhe.solvers.told_limits import solve_told, told_excess
+from laufruhe.solvers.walk import walked
 
 LIBRARIES = ("casadi", "clarabel", "cvxpy", "pyscipopt")
 """Packages that are imported where something open needs them, named as their modules."""
@@ -306,7 +307,7 @@ def solve(
         If the engine as given cannot be evaluated, or nothing decides what is open.
     """
     with limited(time_limit), listening(listener):
-        begun = time.perf_counter()
+        begun, spent = time.perf_counter(), time.thread_time()
         found: Result | None
         try:
             found = _decided(problem)
@@ -322,6 +323,7 @@ def solve(
         found = found if found is not None and not passed() else _cut_short(problem, found)
         # what a method made of the problem is of the same file
         found = replace(found, problem=replace(found.problem, origin=problem.origin))
+        found = walked(problem, found, time.thread_time() - spent)
         if not further or found.status is Status.FEASIBLE:
             return found
         if found.status is Status.OPTIMAL:

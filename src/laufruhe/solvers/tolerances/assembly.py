@@ -7,6 +7,7 @@ that the bound is drawn to, step by step; every such assignment is an assembly t
 
 from __future__ import annotations
 
+import cmath
 import math
 import time
 from collections.abc import Sequence
@@ -17,10 +18,9 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.built_engines import BuiltEngines, values_of
-from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.progress import tell
-from laufruhe.problem.assembly import Lot
+from laufruhe.problem.assembly import Chosen, Lot, assembled
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
@@ -35,9 +35,6 @@ from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.tolerances.assembly_result import AssemblyResult, Place
 from laufruhe.solvers.tolerances.result import SHARES
 from laufruhe.solvers.values import ObjectiveValue
-
-Chosen = tuple[tuple[int, ...], ...]
-"""Of every lot the part in each cylinder."""
 
 MOST_NODES, STEPS, RANDOM = 20_000, 8, 2000
 """Parts of all assemblies that are bounded, steps of each bound, and assemblies at random that are shown."""
@@ -102,25 +99,6 @@ def _check(problem: Problem) -> None:
         raise ModelError("[assembly] minimises nothing; add [objective]")
 
 
-def assembled(engine: Engine, lots: Sequence[Lot], chosen: Chosen) -> Engine:
-    """An engine of these parts; what they weigh more than the mean of their lot, it weighs more than the drawing."""
-    more = np.sum([lot.differences[list(parts)] for lot, parts in zip(lots, chosen, strict=True)], axis=0)
-    drawing = [
-        AddedDrive(f"difference of the rod of {part.name}", part.x, part.crank_radius * _unit(part.throw), part.shaft)
-        for part in engine.slider_cranks
-    ]
-    pistons = tuple(
-        replace(part, reciprocating_mass=part.reciprocating_mass + float(own))
-        for part, own in zip(engine.slider_cranks, more[:, 0], strict=True)
-    )
-    rotors = tuple(drive.rotor(float(own)) for drive, own in zip(drawing, more[:, 1], strict=True) if own)
-    return replace(engine, slider_cranks=pistons, rotors=(*engine.rotors, *rotors))
-
-
-def _unit(angle: float) -> complex:
-    return complex(math.cos(angle), math.sin(angle))
-
-
 def _terms(problem: Problem) -> Terms:
     """The objective as norms of rows that are affine in what every cylinder has more: to and fro, then turning [kg]."""
     parts = problem.engine.slider_cranks
@@ -128,7 +106,7 @@ def _terms(problem: Problem) -> Terms:
     errors += [
         Error(
             part.name,
-            (AddedDrive(part.name, part.x, PER_KILOGRAM * part.crank_radius * _unit(part.throw), part.shaft),),
+            (AddedDrive(part.name, part.x, cmath.rect(PER_KILOGRAM * part.crank_radius, part.throw), part.shaft),),
         )
         for part in parts
     ]

@@ -1,0 +1,506 @@
+"""A second witness: a walk by exact evaluations from the decided design.
+
+The walk knows the bounds, the limits and the exact model. It shares nothing with the search that found the design, nor
+with the proof. A design on its way that lies under the lower bound shows that the bound is false.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import time
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from laufruhe.errors import LaufruheError
+from laufruhe.fidelity.error_bounds import missed, relative
+from laufruhe.machine.firing import firing_turns, from_one, intervals_of, lap_orders
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.assembly import Chosen, assembled
+from laufruhe.problem.decision import Domain, columns_of, domains_of, vector_of
+from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.phasing import SOONEST, Candidate
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.problem.sets import Value
+from laufruhe.prove.certificate import Certificate, Proof
+from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.conclusion import Design, decided, limit_values, values_of
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.stars.conclusion import phase_decisions
+from laufruhe.solvers.stars.ranking import candidates_of, ranked_star
+from laufruhe.solvers.told_limits import told_excess
+from laufruhe.solvers.tolerances.assembly_result import Place
+from laufruhe.solvers.values import ObjectiveValue, RankValue
+
+MOST, SEED = 64, 0
+"""Evaluations of a walk at most, and the seed of its random directions."""
+SHARE, SECONDS = 0.03, 0.02
+"""Processor time of a walk: so many seconds, or a share of the time of the solve where that is more."""
+STEP, SHORTER, LONGER = 0.1, 0.2, 2.0
+"""First step as a share of the bounds, and its factors after a failure and after a success."""
+ORDERS = 6
+"""Firing orders of one star that are tried."""
+ROUNDING = 1e-9
+"""Relative difference that counts as none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Stand:
+    """A design before it is evaluated.
+
+    Attributes
+    ----------
+    problem
+        With its star, or with its parts.
+    values
+        Of the decisions.
+    candidate
+        Star and firing order; None where neither is open.
+    chosen
+        Parts of every cylinder; empty where none are chosen.
+    """
+
+    problem: Problem
+    values: tuple[Value, ...]
+    candidate: Candidate | None = None
+    chosen: Chosen = ()
+
+
+Move = Callable[[Stand, float], Stand | None]
+"""Gives the design that is a signed share of the bounds away; None where the bounds leave none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Visit:
+    """A design by the exact model.
+
+    Attributes
+    ----------
+    value
+        Objective.
+    excess
+        Largest relative excess over a limit.
+    sure
+        The same with what samples may have missed of each limit.
+    """
+
+    stand: Stand
+    evaluation: Evaluation
+    value: float
+    excess: float
+    sure: float
+
+    def is_better(self, other: Visit, allowed: float) -> bool:
+        """Compare by the limits first, then by the objective."""
+        own, theirs = (max(each.excess, allowed) for each in (self, other))
+        return (own, self.value) < (theirs, other.value)
+
+
+def walked(problem: Problem, found: Result, spent: float) -> Result:
+    """Return the result, its proof withheld where a walk from its design shows that it is false.
+
+    Parameters
+    ----------
+    problem
+        As it was asked.
+    spent
+        Processor time of the solve [s].
+    """
+    is_none = found.status is Status.INFEASIBLE
+    bound = found.certificate.lower_bound if found.certificate is not None else 0.0
+    claims = bool(found.limits) and problem.phasing is None if is_none else found.status.has_design and bound > 0.0
+    if not claims or problem.over is not None:
+        return found
+    start = _start(found)
+    # a step may lead onto a resonance
+    with np.errstate(all="ignore"):
+        witness = _Walk(found, start).run(max(SHARE * spent, SECONDS))
+        if witness is None or not _is_shown(found, witness, None if is_none else bound):
+            return found
+    return _withheld(problem, found, witness, bound)
+
+
+def _start(found: Result) -> Stand:
+    """The decided design, or the one given where none was decided."""
+    problem = found.problem
+    if found.assembly is not None and problem.assembly is not None:
+        parts = [[part - 1 for part in place.parts] for place in found.assembly.places]
+        chosen = tuple(zip(*parts, strict=True))
+        return _of_parts(problem, chosen)
+    values = tuple(values_of(problem, found))
+    if problem.phasing is not None and found.phasing is not None:
+        candidate = next(iter(candidates_of(problem.phasing, found.phasing.ranking[:1])), None)
+        return Stand(problem, values, candidate)
+    return Stand(problem, values)
+
+
+class _Walk:
+    """Steps from a design to better ones while time is left."""
+
+    def __init__(self, found: Result, start: Stand) -> None:
+        self.limits, self.samples = found.problem.limits, found.final.samples
+        errors = [limit.error_estimate for limit in found.limits]
+        self.errors = errors if len(errors) == len(self.limits) else [0.0] * len(self.limits)
+        self.random = np.random.default_rng(SEED)
+        self.start, self.is_none = start, found.status is Status.INFEASIBLE
+        self.drawing, self.phasing = found.problem, found.problem.phasing
+
+    def run(self, seconds: float) -> Visit | None:
+        """Return the best design that surely keeps the limits; None where no step found a better one."""
+        until = time.thread_time() + seconds
+        here = self._visit(self.start, None)
+        if here is None:
+            return None
+        allowed, witness = 0.0 if self.is_none else max(here.excess, 0.0), None
+        sources = [self._choices(), self._steps()]
+        coming = [next(source, None) for source in sources]
+        seen = 0
+        for k in itertools.cycle(range(len(sources))):
+            if not any(coming) or seen >= MOST or time.thread_time() > until:
+                return witness
+            if (step := coming[k]) is None:
+                continue
+            move, share = step
+            stand = move(here.stand, share)
+            visit = None if stand is None else self._visit(stand, here)
+            seen += stand is not None
+            won = visit is not None and visit.is_better(here, allowed)
+            if visit is not None and visit.sure <= 0.0 and (witness is None or visit.value < witness.value):
+                witness = visit
+            if won and visit is not None:
+                here = visit
+            try:
+                coming[k] = sources[k].send(won)
+            except StopIteration:
+                coming[k] = None
+        return witness
+
+    def _visit(self, stand: Stand, here: Visit | None) -> Visit | None:
+        """The design by the exact model; None where it has no loads. Limits are read where it may be better."""
+        problem = stand.problem
+        try:
+            evaluation = evaluate(problem, problem.design(stand.values), self.samples)
+            value = objective_value(problem, evaluation)
+            if not math.isfinite(value) or (here is not None and here.excess <= 0.0 and value >= here.value):
+                return None
+            excesses = [evaluation.standing(limit).excess for limit in self.limits]
+        except LaufruheError:
+            return None
+        sure = max((excess + error for excess, error in zip(excesses, self.errors, strict=True)), default=0.0)
+        return Visit(stand, evaluation, value, max(excesses, default=0.0), sure)
+
+    def _steps(self) -> Generator[tuple[Move, float], bool, None]:
+        """Steps along coordinates, and along random directions beside them; each goes on while it leads down."""
+        moves = [*_coordinates(self.start.problem), *self._angles()]
+        sizes = [STEP] * len(moves)
+        for size in STEP * SHORTER ** np.arange(8.0):
+            for k in self.random.permutation(len(moves)):
+                for sign in (1.0, -1.0):
+                    if (yield moves[k], sign * sizes[k]):
+                        while (yield moves[k], sign * sizes[k]):
+                            sizes[k] *= LONGER
+                        break
+                else:
+                    sizes[k] *= SHORTER
+                if len(moves) > 1:
+                    columns = sum(domain.width for domain in domains_of(self.start.problem.decisions))
+                    yield _along(self.random.normal(size=columns) / math.sqrt(max(columns, 1))), size
+
+    def _angles(self) -> list[Move]:
+        """Throws, bank angle and split pins that may leave the even steps."""
+        phasing, candidate = self.phasing, self.start.candidate
+        if phasing is None or candidate is None or not phasing.continuous:
+            return []
+        moves = [_throw(phasing, k) for k in range(len(candidate.throws))]
+        return [*moves, *(_angle(phasing, name) for name in ("bank_angle", "split_pin"))]
+
+    def _choices(self) -> Generator[tuple[Move, float], bool, None]:
+        """Neighbours of what is chosen from finitely many, until none of them is better."""
+        moves = [*self._stars(), *self._parts()]
+        failed = 0
+        for k in itertools.cycle(self.random.permutation(len(moves))):
+            failed = 0 if (yield moves[k], 1.0) else failed + 1
+            if failed == len(moves):
+                return
+
+    def _stars(self) -> list[Move]:
+        """Throws that change places, alone or with those of the other end; other firing orders and optional shafts."""
+        phasing, candidate = self.phasing, self.start.candidate
+        if phasing is None or candidate is None:
+            return []
+        moves: list[Move] = []
+        if phasing.throws is None and phasing.throw_bounds is None:
+            last = len(candidate.throws) - 1
+            for i, j in itertools.combinations(range(last + 1), 2):
+                moves.append(_swapped(phasing, [(i, j)]))
+                if i + j < last and {i, j}.isdisjoint({last - i, last - j}):
+                    moves.append(_swapped(phasing, [(i, j), (last - i, last - j)]))
+        if phasing.firing_order is None:
+            moves += [_fired(phasing, k) for k in range(ORDERS)]
+        return [*moves, *(_built(phasing, built) for built in phasing.shafts.allowed if phasing.shafts.optional)]
+
+    def _parts(self) -> list[Move]:
+        """Parts of two cylinders changed for each other, and parts that no cylinder has."""
+        if self.drawing.assembly is None or not self.start.chosen:
+            return []
+        cylinders = range(len(self.start.chosen[0]))
+        moves: list[Move] = []
+        for lot, own in enumerate(self.drawing.assembly.lots):
+            moves += [_exchanged(self.drawing, lot, *pair) for pair in itertools.combinations(cylinders, 2)]
+            spare = range(len(own.masses) - len(cylinders))
+            moves += [_spare(self.drawing, lot, k, number) for k in cylinders for number in spare]
+        return moves
+
+
+# --- moves of numbers
+
+
+def _coordinates(problem: Problem) -> list[Move]:
+    columns = sum(domain.width for domain in domains_of(problem.decisions))
+    return [_along(row) for row in np.eye(columns)]
+
+
+def _along(direction: Array) -> Move:
+    """Step along a direction in shares of the bounds, back into them."""
+
+    def move(stand: Stand, share: float) -> Stand | None:
+        domains = domains_of(stand.problem.decisions)
+        x = vector_of(domains, stand.values)
+        if len(x) != len(direction):
+            return None
+        wide = [d.set.upper - d.set.lower for d in domains for _ in range(d.width)]
+        moved = x + share * direction * np.array(wide)
+        for domain in domains:
+            moved[domain.columns] = domain.project(moved)
+        if np.array_equal(moved, x):
+            return None
+        return replace(stand, values=tuple(_value(domain, moved) for domain in domains))
+
+    return move
+
+
+def _value(domain: Domain, x: Array) -> Value:
+    value = domain.complex_value(x)
+    return value if domain.decision.is_affine else value.real
+
+
+# --- moves of throws and firing orders
+
+
+def _throw(phasing: Phasing, k: int) -> Move:
+    """Move one throw; the first one is where cylinder 1 fires unless it has bounds of its own (C5)."""
+    bounds = phasing.throw_bounds
+    wide = min(phasing.intervals.most - phasing.intervals.least, phasing.even_interval)
+
+    def move(stand: Stand, share: float) -> Stand | None:
+        assert stand.candidate is not None
+        throws = list(stand.candidate.throws)
+        if bounds is None:
+            throws[k] += share * wide if k else 0.0
+        else:
+            low, high = bounds[k]
+            throws[k] = min(max(throws[k] + share * (high - low), low), high)
+        return _realised(phasing, stand, replace(stand.candidate, throws=tuple(throws)))
+
+    return move
+
+
+def _angle(phasing: Phasing, name: str) -> Move:
+    """Move the bank angle or the split pins."""
+    low, high = (phasing.bank if name == "bank_angle" else phasing.split) or (0.0, 0.0)
+
+    def move(stand: Stand, share: float) -> Stand | None:
+        assert stand.candidate is not None
+        given = getattr(stand.candidate, name)
+        if given is None:
+            return None
+        angle = min(max(given + share * (high - low), low), high)
+        return _realised(phasing, stand, replace(stand.candidate, **{name: angle}))
+
+    return move
+
+
+def _swapped(phasing: Phasing, pairs: Sequence[tuple[int, int]]) -> Move:
+    """Throws of each pair change places, and their cylinders their turns in the firing order."""
+
+    def move(stand: Stand, _: float) -> Stand | None:
+        candidate = stand.candidate
+        assert candidate is not None
+        pins, throws, order = phasing.layout_of(candidate).pins, list(candidate.throws), candidate.firing_order
+        for i, j in pairs:
+            own, other = ([k + 1 for k, pin in enumerate(pins) if pin == throw] for throw in (i, j))
+            if len(own) != len(other) or order is None:
+                return None
+            throws[i], throws[j] = throws[j], throws[i]
+            changed = dict(zip((*own, *other), (*other, *own), strict=True))
+            order = from_one([changed.get(number, number) for number in order])
+        # cylinder 1 stays where it fires (C5)
+        back = candidate.throws[0] - throws[0]
+        turned = tuple((angle + back) % math.tau for angle in throws)
+        return _realised(phasing, stand, replace(candidate, throws=turned, firing_order=order))
+
+    return move
+
+
+def _fired(phasing: Phasing, k: int) -> Move:
+    """Take another firing order of the same star."""
+
+    def move(stand: Stand, _: float) -> Stand | None:
+        candidate = stand.candidate
+        assert candidate is not None
+        orders = lap_orders(phasing.cycle, phasing.layout_of(candidate), candidate.throws)
+        order = next(itertools.islice(orders, k, None), None)
+        return None if order is None else _realised(phasing, stand, replace(candidate, firing_order=order))
+
+    return move
+
+
+def _built(phasing: Phasing, built: Sequence[int]) -> Move:
+    """Take another choice of the optional shafts."""
+
+    def move(stand: Stand, _: float) -> Stand | None:
+        assert stand.candidate is not None
+        return _realised(phasing, stand, replace(stand.candidate, left_out=phasing.without(built)))
+
+    return move
+
+
+def _realised(phasing: Phasing, stand: Stand, candidate: Candidate) -> Stand | None:
+    """The design of a candidate with the decisions as they stand; None where it fires as is not allowed."""
+    if candidate == stand.candidate:
+        return None
+    if phasing.firing_order is not None and candidate.firing_order != phasing.firing_order:
+        return None
+    if candidate.firing_order is not None:
+        turns = firing_turns(phasing.layout_of(candidate), candidate.throws, candidate.firing_order)
+        intervals = intervals_of(phasing.cycle, turns)
+        if not phasing.intervals.holds(intervals) or min(intervals) <= SOONEST:
+            return None
+    try:
+        problem = phasing.realise(candidate)
+    except LaufruheError:
+        return None
+    known = dict(zip((d.name for d in stand.problem.decisions), stand.values, strict=True))
+    values = [known.get(decision.name, decision.start) for decision in problem.decisions]
+    domains = domains_of(problem.decisions)
+    x = columns_of(domains, values)
+    return Stand(problem, tuple(_value(domain, x) for domain in domains), candidate)
+
+
+# --- moves of parts
+
+
+def _of_parts(drawing: Problem, chosen: Chosen) -> Stand:
+    assert drawing.assembly is not None
+    engine = assembled(drawing.engine, drawing.assembly.lots, chosen)
+    return Stand(replace(drawing, engine=engine), (), None, chosen)
+
+
+def _exchanged(drawing: Problem, lot: int, i: int, j: int) -> Move:
+    def move(stand: Stand, _: float) -> Stand:
+        parts = list(stand.chosen[lot])
+        parts[i], parts[j] = parts[j], parts[i]
+        return _of_parts(drawing, (*stand.chosen[:lot], tuple(parts), *stand.chosen[lot + 1 :]))
+
+    return move
+
+
+def _spare(drawing: Problem, lot: int, k: int, number: int) -> Move:
+    """Take a part that no cylinder has."""
+
+    def move(stand: Stand, _: float) -> Stand:
+        parts = list(stand.chosen[lot])
+        assert drawing.assembly is not None
+        parts[k] = [p for p in range(len(drawing.assembly.lots[lot].masses)) if p not in parts][number]
+        return _of_parts(drawing, (*stand.chosen[:lot], tuple(parts), *stand.chosen[lot + 1 :]))
+
+    return move
+
+
+# --- what a walk shows
+
+
+def _is_shown(found: Result, witness: Visit, bound: float | None) -> bool:
+    """Whether a design keeps the limits, and lies under the bound if there is one, by more than samples may miss."""
+    problem, own = witness.stand.problem, witness.evaluation
+    standings = ((limit, own.standing(limit)) for limit in problem.limits)
+    kept = all(stands.excess + relative(missed(limit.measure, own), stands.value) <= 0.0 for limit, stands in standings)
+    if bound is None or not kept or told_excess(problem, own) > 0.0:
+        return kept and told_excess(problem, own) <= 0.0
+    # the bound may be of as few angles as the fidelity has
+    coarse = replace(own, samples=min(own.samples, found.problem.fidelity.samples))
+    over = 1.0 + 2.0 * error_of(problem, coarse) + ROUNDING
+    return witness.value * over + nothing_of(problem, own.engine) < bound
+
+
+def _withheld(problem: Problem, found: Result, witness: Visit, bound: float) -> Result:
+    """The design of the walk, of which nothing is proven."""
+    stand, candidate, own = witness.stand, witness.stand.candidate, found.problem
+    shown = own if stand.chosen else replace(stand.problem, phasing=own.phasing)
+    design = Design(shown, stand.values, witness.evaluation, witness.value, witness.excess)
+    decisions, details, assembly = decided(design), found.phasing, found.assembly
+    if details is not None:
+        ranking = tuple(replace(star, lower_bound=0.0, proven=False) for star in details.ranking)
+        if candidate is not None and own.phasing is not None:
+            decisions = (*phase_decisions(problem, own.phasing, candidate), *decisions)
+            if candidate != next(iter(candidates_of(own.phasing, details.ranking[:1])), None):
+                ranking = (ranked_star(own.phasing, candidate, None, witness.value, 0.0, False), *ranking)
+        trade = tuple(replace(point, lower_bound=0.0) for point in details.trade)
+        details = replace(details, ranking=ranking, trade=trade)
+    if assembly is not None and own.assembly is not None:
+        lots = own.assembly.lots
+        parts = zip(*stand.chosen, strict=True)
+        places = tuple(
+            Place(
+                place.cylinder,
+                tuple(p + 1 for p in each),
+                tuple(lot.masses[p] for lot, p in zip(lots, each, strict=True)),
+            )
+            for place, each in zip(assembly.places, parts, strict=True)
+        )
+        assembly = replace(assembly, places=places)
+    objective = ObjectiveValue.of(own, witness.value, objective_value(own, found.initial))
+    return replace(
+        found,
+        problem=shown,
+        status=Status.FEASIBLE,
+        objective=objective,
+        certificate=Certificate(Proof.NONE, 0.0, 1.0, math.inf, "a walk by exact evaluations, which proves nothing"),
+        decisions=decisions,
+        limits=limit_values(shown, witness.evaluation),
+        final=witness.evaluation,
+        message=_message(found, objective, bound),
+        conflict=(),
+        error=partial(error_of, shown, witness.evaluation),
+        phasing=details,
+        assembly=assembly,
+        ranks=_unproven(found, witness),
+        nearest=None,
+    )
+
+
+def _message(found: Result, objective: ObjectiveValue, bound: float) -> str:
+    said = "no design exists"
+    if found.status is not Status.INFEASIBLE:
+        said = f"no design has less than {bound:.6g} {objective.unit}".rstrip()
+    value = f"{objective.value:.6g} {objective.unit}".rstrip()
+    return (
+        f"the proof is withheld: it said that {said}, and this design, found by a walk, has {value}; please report it"
+    )
+
+
+def _unproven(found: Result, witness: Visit) -> tuple[RankValue, ...]:
+    """Several objectives in order, each of the design of the walk."""
+    own = found.problem
+    shown: list[RankValue] = []
+    for rank, value in zip(own.ranks, found.ranks, strict=False):
+        final = objective_value(replace(own, objective=rank.terms), witness.evaluation)
+        least = min(value.least, final) if not shown else value.least
+        shown.append(
+            replace(value, least=least, lower_bound=0.0, gap=1.0, proof=Proof.NONE, final=final, price=math.nan)
+        )
+    return tuple(shown)

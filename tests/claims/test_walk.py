@@ -1,0 +1,231 @@
+"""A walk by exact evaluations takes back what a false bound claims, and nothing that is true."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from laufruhe.errors import ModelError
+from laufruhe.files.reader import load
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.norms import NORMS, lengths
+from laufruhe.numerics.norms.maximum import Maximum
+from laufruhe.numerics.norms.norm import Grid
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.problem.channels import CHANNELS, ON_BLOCK, LoadChannel, Needs
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.measure import MEASURES, Measure
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Certificate, Proof
+from laufruhe.report.wording import explained
+from laufruhe.solvers import solve, walk
+from laufruhe.solvers.conclusion import decision_values
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.stars.conclusion import with_star
+from laufruhe.solvers.stars.ranking import candidates_of
+from laufruhe.solvers.tolerances import assembly
+from problem_files import PROBLEMS
+from ready import solved
+
+RESULTANT = Path(__file__).parent / "inputs" / "resultant-of-mount-forces.toml"
+BETTER = {
+    "engine.stiffness.z": 134976.827, "engine block.stiffness.z": 41921.457, "torque rod.stiffness.y": 103493.121,
+    "gearbox.stiffness.z": 320608.48,
+}  # fmt: skip
+"""A design of the file within its limits, of 37.21 N."""
+
+
+def told_as_optimum(result: Result) -> Result:
+    """The design as given, told as the proven optimum."""
+    value = result.objective.initial if result.objective is not None else math.nan
+    claim = Certificate(Proof.GLOBAL, value * (1.0 - 1e-5), 1e-5, 0.0, "a false bound")
+    decisions = tuple(e for d in result.problem.decisions for e in decision_values(d, d.start))
+    assert result.objective is not None
+    return replace(
+        result, status=Status.OPTIMAL, objective=replace(result.objective, value=value), certificate=claim,
+        decisions=decisions, final=result.initial,
+    )  # fmt: skip
+
+
+def is_withheld(result: Result, best: float) -> bool:
+    """Whether a result claims nothing, says why, and has a design that is real, within its limits and not too good."""
+    problem, own, told = result.problem, result.final, result.objective
+    assert told is not None
+    assert result.certificate is not None
+    assert own.excess(problem.limits) <= 0.0
+    assert objective_value(problem, own) == pytest.approx(told.value, rel=1e-12)
+    assert told.value >= best * (1.0 - 1e-4)
+    assert f"{told.value:.6g}" in result.message
+    assert "report" in result.message
+    assert "no design within" not in explained(result).lower()
+    return (result.certificate.kind, result.certificate.lower_bound) == (Proof.NONE, 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name",
+    [
+        "car-four-willans",  # unbalances
+        "twin-boxer",  # an unbalance and its angle
+        "single-counter-shaft",  # several objectives in order
+        "geared-inertia",  # a share of inertia
+        "geared-three-leads",
+        "opposed-pistons-lead",
+        "opposed-pistons-masses",
+        "tractor-four-shaft-heights",
+        "inline-five-damper",  # the crankshaft
+        "powertrain-joined-springs",
+        "soft-mounts-run-up",
+        "klein-steam-pump",
+    ],
+)
+def test_a_design_that_is_not_the_best_is_found_out(name: str) -> None:
+    result = solved(name)
+    assert result.objective is not None
+    lie = told_as_optimum(result)
+    found = walk.walked(result.problem, lie, 1.0)
+    assert is_withheld(found, result.objective.value)
+    assert found.objective is not None
+    assert found.objective.value < 0.9999 * result.objective.initial
+    assert walk.walked(result.problem, result, 1.0) is result
+
+
+@pytest.mark.parametrize("rank", [1, 2])
+def test_a_star_that_was_pruned_is_found_out(rank: int) -> None:
+    result = solved("inline-five-open")
+    phasing, ranked = result.problem.phasing, result.phasing
+    assert phasing is not None
+    assert ranked is not None
+    (candidate,) = candidates_of(phasing, ranked.ranking[rank : rank + 1])
+    star = solve(replace(phasing.realise(candidate), phasing=None))
+    assert star.objective is not None
+    claim = Certificate(Proof.GLOBAL, star.objective.value, 0.0, 0.0, "a false bound")
+    lie = with_star(result.problem, phasing, star, candidate, claim, replace(ranked, ranking=ranked.ranking[rank:]))
+    found = walk.walked(result.problem, lie, 1.0)
+    assert result.objective is not None
+    assert is_withheld(found, result.objective.value)
+    assert found.phasing is not None
+    assert found.phasing.ranking[0].value == pytest.approx(result.objective.value, rel=1e-9)
+    assert not any(star.proven for star in found.phasing.ranking)
+
+
+@pytest.fixture
+def pruned_assemblies(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every part of the assemblies is said to hold nothing better."""
+    right = assembly._Search._bound
+
+    def bound(self: Any, node: Any) -> float:
+        free = all(part < 0 for parts in node for part in parts)
+        return right(self, node) if free else math.inf
+
+    monkeypatch.setattr(assembly._Search, "_bound", bound)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("pruned_assemblies")
+def test_an_assembly_that_was_pruned_is_found_out() -> None:
+    found = solve(load(PROBLEMS / "selective-assembly.toml"))
+    best = solved("selective-assembly")
+    assert best.objective is not None
+    assert is_withheld(found, best.objective.value)
+    assert found.assembly is not None
+    # the places told are those of the design
+    chosen = tuple(zip(*([p - 1 for p in place.parts] for place in found.assembly.places), strict=True))
+    assert found.problem.assembly is not None
+    engine = assembly.assembled(found.problem.engine, found.problem.assembly.lots, chosen)
+    value = objective_value(found.problem, evaluate(found.problem, engine))
+    assert found.objective is not None
+    assert value == pytest.approx(found.objective.value, rel=1e-12)
+
+
+# --- channels and norms that nobody knows
+
+
+def resultant(loads: PointLoads) -> Spectrum:
+    if loads.mount_forces is None:
+        raise ModelError("this mounting has no transmitted force")
+    return loads.mount_forces.each(lambda values: values.sum(axis=1, keepdims=True))
+
+
+@pytest.fixture
+def transmitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The resultant of the forces on all mounts, as a channel that says no more of itself than it must."""
+    channel = LoadChannel("transmitted force", "N", ON_BLOCK, Needs.MOUNTS, signal=resultant)
+    monkeypatch.setitem(CHANNELS, channel.name, channel)  # type: ignore[arg-type]
+    for norm in NORMS.values():
+        monkeypatch.setitem(MEASURES, f"{norm.name} {channel.name}", (channel, norm))  # type: ignore[arg-type]
+
+
+class WorstTwentieth(Maximum):
+    """The mean of the longest twentieth of the rows, with no flag that says so."""
+
+    name = "worst twentieth"
+    refinement = 1
+    is_largest = False
+
+    def value(self, grid: Grid, rows: Array) -> float:
+        size, left, total = lengths(rows), 0.05 * grid.weights.sum(), 0.0
+        for k in np.argsort(-size):
+            total += size[k] * min(grid.weights[k], left)
+            left -= min(grid.weights[k], left)
+        return float(total / (0.05 * grid.weights.sum()))
+
+    def dual_norm(self, grid: Grid, z: Array) -> float:
+        size, shares = lengths(z), grid.weights / grid.weights.sum()
+        most = np.divide(0.05 * size, shares, out=np.zeros_like(size), where=shares > 0.0)
+        return float(max(most.max(initial=0.0), size.sum()))
+
+    def of_lengths(self, lengths: Array, weights: Array) -> Array:
+        count = max(lengths.shape[-1] // 20, 1)
+        return np.asarray(np.sort(lengths, axis=-1)[..., -count:].mean(axis=-1))
+
+
+def at(problem: Problem, values: dict[str, float]) -> float:
+    """The objective of a design of this file, which keeps its limits."""
+    design = evaluate(problem, problem.design([values[decision.name] for decision in problem.decisions]))
+    assert design.excess(problem.limits) <= 0.0
+    return objective_value(problem, design)
+
+
+def claims_no_more_than(result: Result, value: float) -> bool:
+    """Whether no bound is over a design that exists."""
+    assert result.certificate is not None
+    return result.certificate.lower_bound <= value * (1.0 + 1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("transmitted")
+def test_a_channel_that_nobody_knows_is_claimed_nothing_false_of() -> None:
+    problem = load(RESULTANT)
+    known = at(problem, BETTER)
+    assert known == pytest.approx(37.21, abs=0.01)
+    assert claims_no_more_than(solve(problem), known)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("transmitted")
+def test_what_is_wrongly_taken_for_a_constant_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A channel that is said not to be on the mounts, while their stiffness is open."""
+    names = ("mount force", "mount travel")
+    monkeypatch.setattr(Measure, "on_mounts", property(lambda self: self.is_load and self.load.name in names))
+    problem = load(RESULTANT)
+    assert claims_no_more_than(solve(problem), at(problem, BETTER))
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("transmitted")
+@pytest.mark.parametrize("channel", ["mount force", "transmitted force"])
+def test_a_norm_that_nobody_knows_is_claimed_nothing_false_of(channel: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    norm = WorstTwentieth()
+    monkeypatch.setitem(NORMS, norm.name, norm)  # type: ignore[arg-type]
+    monkeypatch.setitem(MEASURES, f"{norm.name} {channel}", (CHANNELS[channel], norm))  # type: ignore[arg-type]
+    problem = load(RESULTANT.read_text().replace("rms transmitted force", f"{norm.name} {channel}"))
+    found = solve(problem)
+    print(found, found.certificate, at(problem, BETTER))
+    assert claims_no_more_than(found, at(problem, BETTER))
