@@ -96,6 +96,21 @@ def test_a_design_that_is_not_the_best_is_found_out(name: str) -> None:
     assert walk.walked(result.problem, result, 1.0) is result
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["study-soft-mounts", "worked-diesel", "locomotive-two-cylinder"])
+def test_a_design_that_is_said_not_to_exist_is_found(name: str) -> None:
+    """The design as given breaks a limit, or has room that a step away from it keeps."""
+    result = solved(name)
+    lie = replace(
+        result, status=Status.INFEASIBLE, objective=None, certificate=None, decisions=(), final=result.initial,
+        conflict=tuple(limit.name for limit in result.problem.limits), message="no design exists",
+    )  # fmt: skip
+    found = walk.walked(result.problem, lie, 10.0)
+    assert result.objective is not None
+    assert is_withheld(found, result.objective.value)
+    assert found.conflict == ()
+
+
 @pytest.mark.parametrize("rank", [1, 2])
 def test_a_star_that_was_pruned_is_found_out(rank: int) -> None:
     result = solved("inline-five-open")
