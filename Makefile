@@ -6,8 +6,15 @@ VENV := .venv
 BIN := $(VENV)/bin
 LANES := -n auto --maxprocesses 8 --dist worksteal
 STAMP := $(VENV)/.installed
+LOWEST := .venv-lowest
+LOWEST_STAMP := $(LOWEST)/.installed
+# Every library at work, in about a minute.
+SMOKE := tests/problem/test_units.py tests/files/test_reader.py tests/report/test_number_files.py tests/report/test_json_result.py \
+	tests/cli/test_commands.py tests/solvers/test_conic.py tests/solvers/test_optimality.py tests/solvers/test_nonlinear.py \
+	tests/mounts/test_mount_convex.py tests/phasing/test_known_cases.py tests/plots/test_indicator_picture.py tests/studies/test_studies.py \
+	tests/studies/test_regions.py
 
-.PHONY: help solve study test test-fast test-long lanes attack matrix mutants faults benchmarks proofs speed pictures docs lint format clean distclean
+.PHONY: help solve study test test-fast test-long test-lowest lanes attack matrix mutants faults benchmarks proofs speed pictures docs lint format clean distclean
 
 help:
 	@echo "make solve      design the balance of PROBLEM ($(PROBLEM))"
@@ -15,6 +22,7 @@ help:
 	@echo "make test-fast  tests of every room, under a minute on two cores"
 	@echo "make test       all tests, minutes"
 	@echo "make test-long  the long tail of random families, which make test leaves out"
+	@echo "make test-lowest  a smoke part of the tests with the lowest versions that pyproject.toml allows, about a minute"
 	@echo "make lanes      which tests are too slow for the fast lane, measured; writes tests/slow.txt"
 	@echo "make attack     random problems against an independent model, ATTACK='--number 100'"
 	@echo "make matrix     every kind of decision, measure and layout together, an hour and more; MATRIX='--share 0.1'"
@@ -27,7 +35,7 @@ help:
 	@echo "make speed      what users wait for, timed; SPEED=--benchmark-compare against the last run"
 	@echo "make pictures   the pictures of README.md again, under docs/pictures/"
 	@echo "make docs       the documentation site, docs/_build/index.html"
-	@echo "make clean      remove caches; make distclean removes $(VENV) as well"
+	@echo "make clean      remove caches; make distclean removes $(VENV) and $(LOWEST) as well"
 	@echo "TESTS='-k name' goes to pytest"
 
 # pip from Python 3.11 knows no dependency groups, so the pinned pip comes first.
@@ -38,6 +46,12 @@ $(STAMP): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --build-constraint constraints.txt --editable . --group dev
 	@touch $@
 
+$(LOWEST_STAMP): pyproject.toml constraints-lowest.txt
+	$(PYTHON) -m venv $(LOWEST)
+	$(LOWEST)/bin/python -m pip install --quiet --upgrade --constraint constraints-lowest.txt pip
+	$(LOWEST)/bin/python -m pip install --quiet --constraint constraints-lowest.txt --build-constraint constraints-lowest.txt --editable .[cluster] --group smoke
+	@touch $@
+
 solve: $(STAMP)
 	$(BIN)/laufruhe solve $(PROBLEM)
 
@@ -46,8 +60,8 @@ study: $(STAMP)
 
 # A process for every core, one thread in each. Compiled modules are kept: every process, and every command that a test
 # starts, would compile all of them again.
-test test-fast test-long lanes: export OMP_NUM_THREADS = 1
-test test-fast test-long lanes: export PYTHONDONTWRITEBYTECODE =
+test test-fast test-long test-lowest lanes: export OMP_NUM_THREADS = 1
+test test-fast test-long test-lowest lanes: export PYTHONDONTWRITEBYTECODE =
 
 test: $(STAMP)
 	$(BIN)/python -m pytest $(LANES) $(TESTS)
@@ -57,6 +71,10 @@ test-fast: $(STAMP)
 
 test-long: $(STAMP)
 	$(BIN)/python -m pytest $(LANES) --long $(TESTS)
+
+# What an old library says of the newer ones below it is no fault here.
+test-lowest: $(LOWEST_STAMP)
+	$(LOWEST)/bin/python -m pytest $(LANES) -m "not slow" --hypothesis-profile=fast -W ignore::DeprecationWarning $(SMOKE)
 
 # What each test takes of a core decides its lane. Once more, because what a test shares falls to the next one then.
 lanes: $(STAMP)
@@ -122,4 +140,4 @@ clean:
 	find src tests -type d -name __pycache__ -prune -exec rm -rf {} +
 
 distclean: clean
-	rm -rf $(VENV)
+	rm -rf $(VENV) $(LOWEST)

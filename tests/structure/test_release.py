@@ -36,6 +36,31 @@ def test_the_recipe_needs_what_the_package_needs() -> None:
     assert found == {*PROJECT["dependencies"], f"python{PROJECT['requires-python']}"}
 
 
+def test_the_lowest_versions_are_those_that_are_tested() -> None:
+    """Each as pyproject.toml has it, all others as in constraints.txt where they may be."""
+    lowest = dict(_pins("constraints-lowest.txt"))
+    needed = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["cluster"]]
+    for name, version in (one.split(">=") for one in needed):
+        assert re.fullmatch(rf"{re.escape(version)}(\.0)*", lowest[_plain(name)]), name
+    assert len(lowest) > len(needed)
+
+
+@pytest.mark.parametrize("file", ["constraints.txt", "constraints-lowest.txt"])
+def test_versions_name_no_place(file: str) -> None:
+    assert "/" not in (ROOT / file).read_text(encoding="utf-8")
+    assert len(dict(_pins(file))) == len(_pins(file))
+
+
+def _pins(file: str) -> list[tuple[str, str]]:
+    lines = (ROOT / file).read_text(encoding="utf-8").splitlines()
+    assert all(line.count("==") == 1 for line in lines)
+    return [(_plain(line.split("==")[0]), line.split("==")[1]) for line in lines]
+
+
+def _plain(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
 @pytest.mark.slow
 def test_a_wheel_carries_its_data(tmp_path: Path) -> None:
     """Schemas, engines, the page of reports, every ready problem with what it refers to; and it works from there."""
