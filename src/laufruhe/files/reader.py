@@ -376,7 +376,7 @@ def _check_followed(problem: Problem) -> None:
         for bound in (decision.lower, decision.upper) if decision.address_drives else ():
             with suppress(ModelError):
                 drawn.append(problem.rebuild({drive.path: drive.written(bound) for drive in decision.address_drives}))
-        if drawn and all((own.engine, own.points, own.mount_numbers) == given for own in drawn):
+        if len(drawn) > 1 and all((own.engine, own.points, own.mount_numbers) == given for own in drawn):
             raise Refused(decision.name, None, "is open, and nothing of this engine follows it", "fix or leave it out")
         if any([point.name for point in own.points] != names for own in drawn):
             rule = f"is open, and the speeds follow by which operating points are called, {', '.join(names)}"

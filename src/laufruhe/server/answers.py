@@ -168,7 +168,7 @@ def measure(source: Source, asked: Asked) -> dict[str, Any]:
     tables, whole = _asked_about(source, asked, with_held=True)
     problem = replace(scene_of(whole, tables).problem, limits=whole.limits)
     values = decided(problem, asked.design)
-    evaluation = evaluate(problem, problem.design([values[decision.name] for decision in problem.decisions]))
+    evaluation = evaluate(problem.held([values[decision.name] for decision in problem.decisions]))
     limits = {limit.name: limit.value for limit in limit_values(problem, evaluation)}
     return {"objective": objective_value(problem, evaluation) if problem.objective else None, "limits": limits}
 

@@ -70,7 +70,7 @@ class Scene:
         unread = [limit for limit in problem.limits if not self._reads(limit)]
         limits: tuple[LimitValue, ...] = ()
         if unread:
-            design = evaluate(problem, problem.design(found.values))
+            design = evaluate(problem.held(found.values))
             limits = limit_values(problem.changed(limits=tuple(unread)), design)
         return replace(
             bare,

@@ -397,7 +397,7 @@ def _by_what_is_open(problem: Problem) -> Result:
     method = _method(problem)
     # what is decided apart is asked once more, each part by itself
     tell(method.name)
-    conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and not kinds & {_S, _T, _F, Kind.SIZE} else ()
+    conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and kinds <= {_U, _K, _M} else ()
     if conflict:
         return none_within(problem, evaluate_start(problem), conflict, {})
     closing = _closing(problem, kinds, method)

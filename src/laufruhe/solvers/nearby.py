@@ -139,12 +139,12 @@ def _from(problem: Problem, known: Result) -> Engine | None:
 def _begun(problem: Problem, known: Result) -> Problem:
     """The problem as it would stand with known values, to be searched from there alone."""
     values = values_of(problem, known)
-    numbers = problem.numbers(values)
-    decisions = tuple(replace(d, start=value) for d, value in zip(problem.decisions, values, strict=True))
-    return replace(
-        problem, engine=numbers.engine(problem.engine), decisions=decisions, search=_unproven(problem, 1, NEAR_BOXES),
-        mount_numbers=tuple(tuple(row) for row in numbers.mounts) or problem.mount_numbers,
-    )  # fmt: skip
+    pairs = list(zip(problem.decisions, values, strict=True))
+    numbers = [(decision, value) for decision, value in pairs if decision.address_drives]
+    drawn = problem.held([value for _, value in numbers], [decision for decision, _ in numbers])
+    known_there = {decision.name: decision for decision in drawn.decisions}
+    decisions = tuple(replace(known_there.get(d.name, d), start=value) for d, value in pairs)
+    return replace(problem.held(values), decisions=decisions, search=_unproven(problem, 1, NEAR_BOXES))
 
 
 def _unproven(problem: Problem, starts: int, few: int) -> Search:

@@ -1,0 +1,190 @@
+"""Any number of the file open: optima against a model of its own, what follows in the file, and what stays closed."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, minimize
+
+import laufruhe
+from files.test_reader import complaint_about
+from laufruhe.errors import InputError, ModelError
+from laufruhe.problem.evaluation import evaluate, objective_value
+from problem_files import PROBLEMS, changed, loaded, written
+from searched import searched
+
+ASIDE = """
+title = "Single whose mounts stand aside"
+[engine]
+layout = "inline"
+cycle = "two-stroke"
+stroke = { between = ["80 mm", "100 mm"], start = "90 mm" }
+offset = { between = ["-12 mm", "25 mm"], start = "0 mm" }
+rod_length = "150 mm"
+reciprocating_mass = "0.8 kg"
+throws = [0]
+[[operating_points]]
+name = "rated"
+speed = "3000 rpm"
+[mounts]
+names = ["left", "right"]
+positions = [["0 mm", "70 mm", "0 mm"], ["0 mm", "-50 mm", "0 mm"]]
+[[counterweights]]
+name = "web"
+balance_factor = { between = [0, 1] }
+radius = "50 mm"
+[objective]
+minimise = "rms mount force"
+"""
+MASS, ROD, SPEED, STEPS = 0.8, 0.15, 3000.0 * math.pi / 30.0, 720
+
+
+def _radius(stroke: float, offset: float) -> float:
+    """Return the crank radius [m] whose piston travels the stroke on a path beside the crank axis."""
+
+    def travel(radius: float) -> float:
+        return math.sqrt((ROD + radius) ** 2 - offset**2) - math.sqrt((ROD - radius) ** 2 - offset**2)
+
+    return float(brentq(lambda radius: travel(radius) - stroke, 0.3 * stroke, 0.6 * stroke, xtol=1e-15))
+
+
+def _rms_mount_force(stroke: float, offset: float, share: float) -> float:
+    """Return the root mean square force [N] on two mounts at y = 70 and -50 mm, level with the crank axis."""
+    radius, turn = _radius(stroke, offset), 2.0 * np.pi * np.arange(STEPS) / STEPS
+    # the crank turns from upright towards the left, the piston's path stands at y = offset
+    height = radius * np.cos(turn) + np.sqrt(ROD**2 - (radius * np.sin(turn) - offset) ** 2)
+    orders, spectrum = np.fft.fftfreq(STEPS, 1.0 / STEPS), np.fft.fft(height)
+    climb = np.fft.ifft(spectrum * 1j * orders).real
+    pushed = MASS * np.fft.ifft(spectrum * orders**2).real * SPEED**2
+    weight = share * MASS * radius * SPEED**2
+    upward, leftward = pushed - weight * np.cos(turn), -weight * np.sin(turn)
+    # about the crank axis: the piston pushes at its own path, and the block holds against the torque of its inertia
+    moment = pushed * (offset + climb)
+    left = (moment + 0.05 * upward) / 0.12
+    right = upward - left
+    return float(np.sqrt(np.mean(np.stack([left**2, right**2]) + (leftward / 2.0) ** 2)))
+
+
+def _least() -> tuple[float, ...]:
+    """Return the least force of a grid and of a search from its best point, with stroke, offset and share."""
+    grid = [
+        (_rms_mount_force(stroke, offset, share), stroke, offset, share)
+        for stroke in (0.08, 0.09, 0.10)
+        for offset in np.linspace(-0.012, 0.025, 12)
+        for share in np.linspace(0.0, 1.0, 9)
+    ]
+    bounds = [(0.08, 0.10), (-0.012, 0.025), (0.0, 1.0)]
+    found = minimize(lambda x: _rms_mount_force(*x) / 100.0, min(grid)[1:], bounds=bounds, method="L-BFGS-B")
+    return min(grid)[0], 100.0 * float(found.fun), *map(float, found.x)
+
+
+def test_a_pin_offset_and_a_stroke_are_those_of_an_independent_search(tmp_path: Path) -> None:
+    """The offset brings the piston near the middle of the mounts, and the stroke stays what the piston travels."""
+    result = searched(loaded(tmp_path, ASIDE))
+    on_grid, least, stroke, offset, share = _least()
+    decided = {entry.name: entry.value for entry in result.decisions}
+    assert result.objective.value <= on_grid
+    assert result.objective.value == pytest.approx(least, rel=1e-5)
+    assert decided["engine.stroke"] == pytest.approx(stroke, rel=1e-6)
+    assert decided["engine.offset"] == pytest.approx(offset, abs=2e-5)
+    assert decided["web.balance_factor"] == pytest.approx(share, abs=2e-3)
+    assert 0.003 < offset < 0.02
+    part = result.final.engine.slider_cranks[0]
+    assert part.crank_radius == pytest.approx(_radius(stroke, decided["engine.offset"]), rel=1e-9)
+
+
+@pytest.mark.parametrize(("stroke", "offset", "share"), [(0.09, 0.0, 0.0), (0.085, 0.02, 0.4), (0.1, -0.01, 1.0)])
+def test_every_value_is_that_of_a_file_with_it(stroke: float, offset: float, share: float, tmp_path: Path) -> None:
+    problem = loaded(tmp_path, ASIDE)
+    values = {"web.balance_factor": share, "engine.stroke": stroke, "engine.offset": offset}
+    held = problem.held([values[decision.name] for decision in problem.decisions])
+    given = problem.with_values(
+        {name: value if name.endswith("factor") else f"{value!r} m" for name, value in values.items()}
+    )
+    forces = [objective_value(each, evaluate(each)) for each in (held, given)]
+    assert forces[0] == pytest.approx(forces[1], rel=1e-12)
+    assert forces[0] == pytest.approx(_rms_mount_force(stroke, offset, share), rel=1e-6)
+
+
+def test_what_follows_in_the_file_follows_an_open_number(tmp_path: Path) -> None:
+    """Spacing moves the throws, a speed the loads, and places of rigid mounts what they carry."""
+    text = changed(ASIDE, "throws = [0]", 'throws = [0, 180]\ncylinder_spacing = { between = ["90 mm", "120 mm"] }')
+    problem = loaded(tmp_path, text)
+    spacing = next(decision for decision in problem.decisions if decision.name == "engine.cylinder_spacing")
+    places = [part.x for part in problem.held([0.1], [spacing]).engine.slider_cranks]
+    assert places[0] - places[1] == pytest.approx(0.1, rel=1e-12)
+    text = changed(changed(ASIDE, '"3000 rpm"', '{ between = ["2000 rpm", "4000 rpm"] }'), '"70 mm"',
+                   '{ between = ["60 mm", "90 mm"] }')  # fmt: skip
+    problem = loaded(tmp_path, text)
+    assert [decision.name for decision in problem.decisions][-2:] == [
+        "operating_points.rated.speed", "mounts.positions.1.2",
+    ]  # fmt: skip
+    held = problem.held([300.0, 0.08], problem.decisions[-2:])
+    assert (held.points[0].speed, held.engine.mounts[0].position[1]) == pytest.approx((300.0, 0.08))
+
+
+def test_limits_are_kept_by_what_is_searched() -> None:
+    """The ready single: both limits hold it, and no design of a coarse grid within them is better."""
+    problem = laufruhe.load(PROBLEMS / "single-stroke-offset.toml")
+    result = searched(problem)
+    assert all(limit.active for limit in result.limits)
+    for stroke in np.linspace(0.12, 0.15, 4):
+        for offset in np.linspace(0.0, 0.02, 5):
+            held = problem.held([stroke, offset], problem.decisions[-2:])
+            if max(evaluate(held).standing(limit).excess for limit in held.limits) <= 0.0:
+                assert laufruhe.solve(held).objective.value >= result.objective.value * (1.0 - 1e-5)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("throws = [0]", "throws = [0]\ncylinders = { between = [1, 2] }", "it is no number with a unit but a count"),
+        ('name = "rated"', 'name = { between = ["a", "b"] }', "a name or a choice"),
+        ('"rms mount force"', '"rms mount force"\ndirection_weights = [1, 1, { between = [0, 1] }]',
+         "it says what is asked of a design"),
+        ("[objective]", "[search]\nseed = { between = [1, 2] }\n[objective]", "it says how a search goes"),
+        ("[objective]", '[[balancer_shafts]]\nname = "s"\nratio = { between = [1, 2] }\nposition = ["0 m", "0 m"]\n'
+         '[[balancer_shafts.unbalances]]\nx = "0 m"\nunbalance = "0 kg m"\n[objective]', "it is a ratio of gears"),
+        ('name = "rated"\nspeed = "3000 rpm"', 'speed = { between = ["2000 rpm", "3000 rpm"] }',
+         "give each operating point a name"),
+        ('speed = "3000 rpm"', 'speed = "3000 rpm"\ngas = false\n[gas]\nmodel = "seiliger"\nimep = "8 bar"\n'
+         'peak_pressure = { between = ["60 bar", "80 bar"] }', "is open, and nothing of this engine follows it"),
+        ('["80 mm", "100 mm"], start = "90 mm"', '["0 mm", "100 mm"]', "must be more than 0 m"),
+        ('["80 mm", "100 mm"], start = "90 mm"', '["80 mm", "100 mm"], start = "120 mm"', "starts outside its bounds"),
+        ('["80 mm", "100 mm"], start = "90 mm"', '["80 mm", "100 kg"]', "bound \"100 kg\""),
+        ("offset = {", "ofset = {", "is not a key here"),
+    ],
+)  # fmt: skip
+def test_what_stays_closed_is_told_in_a_line_with_its_reason(old: str, new: str, said: str, tmp_path: Path) -> None:
+    line = complaint_about(written(tmp_path, changed(ASIDE, old, new)))
+    assert said in line
+    assert "\n" not in line
+
+
+def test_the_limit_of_time_keeps_the_best_so_far(tmp_path: Path) -> None:
+    result = searched(loaded(tmp_path, ASIDE), 0.2)
+    assert "time limit" in result.certificate.method
+
+
+def test_an_engine_that_cannot_turn_is_left_out_and_not_built(tmp_path: Path) -> None:
+    """Short rods of long strokes do not let the crank turn: such values are no designs, and the rest is searched."""
+    text = changed(ASIDE, '"150 mm"', '{ between = ["40 mm", "150 mm"], start = "150 mm" }')
+    problem = loaded(tmp_path, text)
+    rod = next(decision for decision in problem.decisions if decision.name == "engine.rod_length")
+    with pytest.raises(ModelError, match="does not let the crank turn"):
+        problem.held([0.04], [rod])
+    found = searched(problem)
+    part = found.final.engine.slider_cranks[0]
+    assert part.rod_length > part.crank_radius + abs(part.offset)
+    assert found.objective.value <= searched(problem.fix("engine.rod_length")).objective.value * (1.0 + 1e-6)
+
+
+def test_a_bound_of_what_is_given_twice_is_one_line(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="rod_ratio"):
+        loaded(
+            tmp_path,
+            changed(ASIDE, 'rod_length = "150 mm"', 'rod_length = "150 mm"\nrod_ratio = { between = [0.2, 0.3] }'),
+        )
