@@ -17,7 +17,7 @@ from pydantic import BaseModel
 
 from laufruhe.files import problem_file, ready
 from laufruhe.files.catalogue import KEY, engines
-from laufruhe.files.fields import without_open
+from laufruhe.files.fields import ANYWHERE, without_open
 from laufruhe.files.problem_file import ProblemFile
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.studies.reader import StudyFile
@@ -90,7 +90,7 @@ def kind(schema: Mapping[str, Any], entry: Mapping[str, Any]) -> str:
     words: list[str] = []
     for one in alternatives(schema, entry):
         if "between" in one.get("properties", {}):
-            words.append("may be open")
+            words.append("may be searched" if one.get("description") == ANYWHERE else "may be open")
         elif "const" in one or "enum" in one:
             choices = one.get("enum", [one.get("const")])
             words += [json.dumps(value, ensure_ascii=False) for value in choices]
