@@ -47,7 +47,7 @@ def solve_generally(problem: Problem, decide: Decide, by_cones: Callable[[Proble
         Return whether cones decide a problem.
     """
     if problem.phasing is not None:
-        return _of_stars(problem, problem.phasing, decide)
+        return solve_star_by_star(problem, problem.phasing, decide)
     started = time.perf_counter()
     initial, program = evaluate_start(problem), LocalProgram.of(problem)
     # what cannot be evaluated is refused first
@@ -88,7 +88,7 @@ def _in_turns(program: LocalProgram, best: Array, decide: Decide) -> Array:
     return best
 
 
-def _of_stars(problem: Problem, phasing: Phasing, decide: Decide) -> Result:
+def solve_star_by_star(problem: Problem, phasing: Phasing, decide: Decide) -> Result:
     """Decide each star that fires evenly, with each set of shafts, as a problem of its own; of many, some drawn."""
     if phasing.continuous or phasing.throw_bounds is not None:
         what = " and ".join(dict.fromkeys(decision.kind.name.lower() for decision in problem.decisions))
@@ -97,4 +97,10 @@ def _of_stars(problem: Problem, phasing: Phasing, decide: Decide) -> Result:
     stars = every_star(phasing)
     if not stars:
         return no_star(problem, none_fires(phasing)[0])
-    return by_each_order(problem, phasing, stars, lambda own, _: decide(replace(own, phasing=None)), MOST_STARS)
+    found = by_each_order(problem, phasing, stars, lambda own, _: decide(replace(own, phasing=None)), MOST_STARS)
+    if problem.over is None or found.objective is None:
+        return found
+    # of engines as built the design as given is told as they are too
+    given = decide(replace(problem, phasing=None, decisions=())).objective
+    initial = found.objective.initial if given is None else given.value
+    return replace(found, objective=replace(found.objective, initial=initial))

@@ -45,7 +45,7 @@ from laufruhe.solvers.apart import is_apart, solve_apart
 from laufruhe.solvers.conclusion import KEPT, Shown, concluded, judged, none_within, with_limits
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import beyond_mounts
-from laufruhe.solvers.general import solve_generally
+from laufruhe.solvers.general import solve_generally, solve_star_by_star
 from laufruhe.solvers.in_order import solve_in_order
 from laufruhe.solvers.mounts.convex import is_convex
 from laufruhe.solvers.reachable import with_reachable
@@ -365,6 +365,8 @@ def _by_what_is_open(problem: Problem) -> Result:
         return solve_in_order(problem, _decided)
     if problem.assembly is not None:
         return _by("tolerances.assembly:solve_assembly", problem)
+    if problem.over is not None and problem.phasing is not None:
+        return solve_star_by_star(problem, problem.phasing, _decided)
     if problem.over is not None:
         return _by("tolerances.robust:solve_robust", problem, _decided)
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):

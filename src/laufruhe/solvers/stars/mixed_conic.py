@@ -75,7 +75,7 @@ def solve_program(
     time_limit
         [s].
     """
-    if any(norm.turns is not None for _, norm in (*problem.terms, *problem.limits)):
+    if problem.is_bilinear:
         raise ModelError("unbalances that are counted from a throw make the program bilinear")
     steps = cp.Variable((space.throws, space.phases), boolean=True)
     scales = scales_of(problem.domains)

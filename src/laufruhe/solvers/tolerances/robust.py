@@ -143,8 +143,6 @@ def _found(problem: Problem, over: Over, start: tuple[Value, ...], drawing: Resu
 def _check(problem: Problem) -> None:
     """Refuse what no method decides for built engines."""
     open_kinds = {decision.kind for decision in problem.decisions} - {Kind.UNBALANCE}
-    if problem.phasing is not None:
-        raise ModelError("stars and firing orders are decided for the drawing alone; fix them, or leave [robust] out")
     if open_kinds:
         names = ", ".join(d.name for d in problem.decisions if d.kind in open_kinds)
         raise ModelError(f"[robust] decides unbalances, and {names} is open too; fix it, or leave [robust] out")

@@ -1,0 +1,93 @@
+"""Open cranks and shafts beside what no method of stars knows: each star by itself, and as good as each given."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pytest
+
+import laufruhe
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers.result import Result
+from problem_files import PROBLEMS, changed
+
+FOUR = """
+title = "Four in line"
+[engine]
+layout = "inline"
+cycle = "four-stroke"
+stroke = "80 mm"
+rod_ratio = 0.28
+reciprocating_mass = "0.5 kg"
+rotating_mass = "0.3 kg"
+cylinder_spacing = "100 mm"
+cylinders = 4
+throws = "open"
+[[operating_points]]
+name = "rated"
+speed = "3000 rpm"
+[mounts]
+positions = [["100 mm", "200 mm", "0 mm"], ["100 mm", "-200 mm", "0 mm"], ["-450 mm", "200 mm", "0 mm"],
+             ["-450 mm", "-200 mm", "0 mm"]]
+[[counterweights]]
+name = "web"
+opposite_throw = 1
+mass = { between = ["0 kg", "1 kg"] }
+angle = { between = [0, 360] }
+radius = "60 mm"
+[objective]
+minimise = "mean mount force"
+"""
+CRANKS = ("[0, 180, 180, 0]", "[0, 180, 0, 180]", "[0, 0, 180, 180]")
+
+
+def _each(text: str) -> list[Result]:
+    return [laufruhe.solve(changed(text, 'throws = "open"', f"throws = {crank}")) for crank in CRANKS]
+
+
+@pytest.mark.slow
+def test_the_worst_case_of_every_crank_is_that_of_the_best() -> None:
+    """Tolerances of the crank pins stand where the throws of each star are, not at those of the first."""
+    text = changed(FOUR, '"0.5 kg"', '"0.5 kg ± 5 %"')
+    text = changed(text, '"0.3 kg"', '"0.3 kg ± 3 %"') + "[robust]\n[fidelity]\nsamples = 180\n"
+    found, each = laufruhe.solve(text), _each(text)
+    best = min(each, key=lambda one: one.objective.value)
+    assert found.objective.value == pytest.approx(best.objective.value, rel=2e-4)
+    assert found.certificate.lower_bound <= min(one.objective.value for one in each)
+    assert found.robust is not None
+
+
+@pytest.mark.slow
+def test_a_stroke_beside_an_open_crank_is_searched_for_each() -> None:
+    text = changed(FOUR, 'stroke = "80 mm"', 'stroke = { between = ["70 mm", "90 mm"] }')
+    found = laufruhe.solve(text)
+    assert found.certificate.kind is Proof.LOCAL
+    assert found.objective.value == pytest.approx(min(one.objective.value for one in _each(text)), rel=1e-6)
+
+
+@pytest.mark.slow
+def test_optional_shafts_with_open_places_are_decided_set_by_set() -> None:
+    text = (PROBLEMS / "tractor-four-shaft-heights.toml").read_text(encoding="utf-8")
+    for name in ("left", "right"):
+        text = changed(text, f'name = "{name}"', f'name = "{name}"\noptional = true')
+    found = laufruhe.solve(text)
+    built = laufruhe.solve(laufruhe.load(PROBLEMS / "tractor-four-shaft-heights.toml"))
+    assert found.objective.value == pytest.approx(built.objective.value, rel=2e-4)
+    limited = laufruhe.solve(text + "\n[phasing]\nmost_shafts = 1\n")
+    assert limited.objective.value > found.objective.value
+
+
+@pytest.mark.slow
+def test_twelve_open_throws_with_weights_opposite_each() -> None:
+    """No program has weights that turn with open throws; exchanges find a crank without a couple, and it is proven."""
+    text = changed(changed(FOUR, "cylinders = 4", "cylinders = 12"), 'mass = { between = ["0 kg", "1 kg"] }\n', "")
+    text = changed(changed(text, "angle = { between = [0, 360] }\n", ""), "opposite_throw = 1\n",
+                   "balance_factor = { between = [0, 1] }\n")  # fmt: skip
+    found = laufruhe.solve(changed(text, 'rotating_mass = "0.3 kg"\n', ""))
+    assert found.objective.value < 1e-2 * found.objective.initial
+    assert found.certificate.lower_bound <= found.objective.value
+    throws = np.array([entry.value for entry in found.decisions if entry.name.startswith("throw")])
+    for order, power in itertools.product((1, 2), (0, 1)):
+        along = -0.1 * np.arange(12) if power else np.ones(12)
+        assert abs(np.sum(along * np.exp(1j * order * throws))) < 1e-9
