@@ -184,9 +184,7 @@ def test_more_requests_at_work_than_there_may_be_are_refused_and_room_comes_back
 
 
 @pytest.mark.parametrize("sent", [b"", b"POST /told HTTP/1.1\r\nHost: x\r\n"])
-def test_slow_connections_give_way_to_who_asks(
-    server: Server, sent: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_slow_connections_give_way_to_who_asks(server: Server, sent: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     # without a deadline these would stay, so that who asks is answered only if they give way
     monkeypatch.setattr(transport, "READ", 1e6)
     wait_for(lambda: server._room._value == MOST_AT_ONCE)
