@@ -91,3 +91,15 @@ def test_twelve_open_throws_with_weights_opposite_each() -> None:
     for order, power in itertools.product((1, 2), (0, 1)):
         along = -0.1 * np.arange(12) if power else np.ones(12)
         assert abs(np.sum(along * np.exp(1j * order * throws))) < 1e-9
+
+
+@pytest.mark.slow
+def test_throws_that_leave_the_even_steps_move_with_a_stroke() -> None:
+    """A short stroke is best, and at it the crank is that of the method of uneven throws, which proves it."""
+    text = changed(changed(FOUR, "cylinders = 4", "cylinders = 3"), 'rotating_mass = "0.3 kg"\n', "")
+    text += '[phasing]\nintervals = { largest_deviation = "40 deg" }\n'
+    found = laufruhe.solve(changed(text, '"80 mm"', '{ between = ["70 mm", "90 mm"], start = "80 mm" }'))
+    given = laufruhe.solve(changed(text, '"80 mm"', '"70 mm"'))
+    assert found.certificate.kind is Proof.LOCAL
+    assert found.objective.value == pytest.approx(given.objective.value, rel=1e-4)
+    assert found.objective.value >= given.certificate.lower_bound * (1.0 - 1e-6)

@@ -25,6 +25,7 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, searched, shown
 from laufruhe.solvers.stars.conclusion import no_star
 from laufruhe.solvers.stars.phasing import by_each_order, every_star
+from laufruhe.solvers.throws.as_numbers import solve_moved_throws
 from laufruhe.solvers.throws.starts import none_fires
 
 Decide = Callable[[Problem], Result]
@@ -46,8 +47,11 @@ def solve_generally(problem: Problem, decide: Decide, by_cones: Callable[[Proble
     by_cones
         Return whether cones decide a problem.
     """
-    if problem.phasing is not None:
-        return solve_star_by_star(problem, problem.phasing, decide)
+    phasing = problem.phasing
+    if phasing is not None and (phasing.continuous or phasing.throw_bounds is not None):
+        return solve_moved_throws(problem, phasing, lambda moved: solve_generally(moved, decide, by_cones))
+    if phasing is not None:
+        return solve_star_by_star(problem, phasing, decide)
     started = time.perf_counter()
     initial, program = evaluate_start(problem), LocalProgram.of(problem)
     # what cannot be evaluated is refused first
@@ -91,9 +95,8 @@ def _in_turns(program: LocalProgram, best: Array, decide: Decide) -> Array:
 def solve_star_by_star(problem: Problem, phasing: Phasing, decide: Decide) -> Result:
     """Decide each star that fires evenly, with each set of shafts, as a problem of its own; of many, some drawn."""
     if phasing.continuous or phasing.throw_bounds is not None:
-        what = " and ".join(dict.fromkeys(decision.kind.name.lower() for decision in problem.decisions))
-        rule = f"throws that leave the even steps are not decided together with {what} for what is asked"
-        raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out, or fix the others")
+        rule = "[robust] decides cranks that fire evenly"
+        raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out, or leave [robust] out")
     stars = every_star(phasing)
     if not stars:
         return no_star(problem, none_fires(phasing)[0])
