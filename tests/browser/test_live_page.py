@@ -6,13 +6,13 @@ import math
 import re
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Browser, Page, expect
 
 from browser import chromium
 from browser.chromium import serious
 from laufruhe.present.numbers import number
 from laufruhe.problem.evaluation import objective_value
-from live.pages import designs, evaluated, model_of, page_of, problem_of
+from live.pages import designs, evaluated, model_of, page_of, problem_of, with_unknown_norm
 
 pytestmark = pytest.mark.slow
 MEASURES = "values => laufruheLive.page.then(page => (page.setDesign(values), page.drawNow(), page.measures()))"
@@ -77,7 +77,48 @@ def test_limits_that_do_not_follow_stand_as_in_the_design_of_the_report(page: Pa
     twist.locator("text=broken").wait_for()
     page.locator("text=/Breaks run-up twist/").wait_for()
     page.evaluate("laufruheLive.page.then(page => page.setDesign({'web.mass': 0.4}))")
-    twist.locator("text=not followed").wait_for()
+    twist.locator("text=cannot be followed live").wait_for()
+
+
+def test_a_norm_that_the_page_does_not_know_leaves_the_rest_at_work(still: Page, tmp_path):
+    problem = with_unknown_norm(problem_of("every norm"))
+    model = model_of(problem)
+    still.goto(page_of(problem, tmp_path).as_uri())
+    still.locator("[data-decision]").first.wait_for()
+    for values in designs(model, 3):
+        shown = {each["name"]: each["value"] for each in still.evaluate(MEASURES, values)}
+        found = evaluated(problem, model, values)
+        assert shown["objective"] is None
+        for limit in problem.limits[1:]:
+            assert shown[limit.name] == pytest.approx(found.standing(limit).value, rel=1e-11, abs=1e-12)
+    expect(still.locator("[data-role=regret]")).to_contain_text("The objective cannot be followed live.")
+    row = still.locator('tr[data-measure="worst twentieth mount force"]')
+    expect(row).to_contain_text("cannot be followed live")
+    expect(still.locator(".live-notes")).to_contain_text("worst twentieth mount force: cannot be followed live")
+    assert still.locator(".live-polar path.now").count() == 4
+
+
+@pytest.mark.parametrize(
+    ("typed", "taken"), [("1,5", 1.5), ("0,125", 0.125), (" 1.25 ", 1.25), ("1e0", 1.0), ("9", 2.0)]
+)
+def test_a_typed_comma_is_a_decimal_sign(shown, typed, taken):
+    field = shown.locator('[data-number="web.mass"]')
+    field.fill(typed)
+    field.press("Enter")
+    assert shown.evaluate("laufruheLive.page.then(page => page.design()['web.mass'])") == pytest.approx(taken)
+    expect(field).not_to_have_attribute("aria-invalid", "true")
+
+
+@pytest.mark.parametrize("typed", ["1,500", "1,2,3", "one", "", "1.2.3", "NaN", "0x10", "Infinity"])
+def test_a_typed_text_that_is_no_number_is_refused_in_one_line(shown, typed):
+    before = shown.evaluate("laufruheLive.page.then(page => page.design()['web.mass'])")
+    field = shown.locator('[data-number="web.mass"]')
+    field.fill("1.1")
+    field.fill(typed)
+    field.press("Enter")
+    expect(shown.locator(".live-controls > .live-note")).to_contain_text(f'web.mass: "{typed}"')
+    expect(field).to_have_attribute("aria-invalid", "true")
+    assert shown.evaluate("laufruheLive.page.then(page => page.design()['web.mass'])") == before
 
 
 def test_another_model_keeps_the_sliders_that_it_still_has(shown):

@@ -6,6 +6,8 @@ import base64
 import json
 import re
 import zlib
+from dataclasses import replace
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -13,12 +15,15 @@ import pytest
 import ready
 from laufruhe.files.reader import load
 from laufruhe.live import live_model, page_assets
+from laufruhe.live.parts import Reference
 from laufruhe.live.saving import written
+from laufruhe.live.signals import NORMS_OF_PAGE
 from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.prove.certificate import Proof
 from laufruhe.report.result_report import result_document
 from laufruhe.report.web_page import as_html
 from laufruhe.solvers import state
-from live.pages import EVERY_NORM, designs, evaluated, model_of, problem_of
+from live.pages import EVERY_NORM, designs, evaluated, model_of, problem_of, with_unknown_norm
 from problem_files import PROBLEMS
 
 
@@ -142,3 +147,51 @@ def test_what_a_star_is_decided_to_be_is_saved_from_its_result_alone():
     assert objective_value(saved, evaluate(saved)) == pytest.approx(result.objective.value, rel=1e-9)
     # as the file has them
     assert {slider.shown for slider in model.sliders} == {"kg m"}
+
+
+def test_norms_that_a_page_follows_are_those_of_its_script():
+    script = (files("laufruhe.live") / "page" / "norms.js").read_text(encoding="utf-8")
+    table = script.partition("const NORMS = {")[2].partition("};")[0]
+    assert {a or b for a, b in re.findall(r'^  (?:"([^"]+)"|(\w+)):', table, re.MULTILINE)} == NORMS_OF_PAGE
+
+
+def test_a_norm_that_the_script_does_not_know_is_not_followed(every):
+    problem = with_unknown_norm(every[0])
+    model = model_of(problem)
+    unknown = [shown for shown in model.measures if shown.norm == "worst twentieth"]
+    assert len(unknown) == 2
+    assert all(shown.signal is None and not shown.followed for shown in unknown)
+    assert all(shown.signal is not None for shown in model.measures if shown not in unknown)
+    assert {name for name, why in model.unmoved if why.startswith("cannot be followed live")} == {
+        shown.name for shown in unknown
+    }
+
+
+def test_a_channel_that_nobody_named_is_not_followed(every):
+    problem = every[0]
+    (term,) = problem.objective
+    stranger = replace(term.measure.load, name="resultant of the mounts")
+    strange = problem.changed(objective=(replace(term, measure=replace(term.measure, channel=stranger)),))
+    (shown, *others) = model_of(strange).measures
+    assert shown.signal is None
+    assert not shown.followed
+    assert all(other.followed for other in others)
+
+
+@pytest.mark.parametrize(
+    ("proof", "name", "proven"),
+    [
+        (Proof.GLOBAL, "the proven optimum", True),
+        (Proof.WITHIN_GAP, "the best design found (gap 2.6 %)", False),
+        (Proof.LOCAL, "the best design found (a local optimum)", False),
+    ],
+)
+def test_a_reference_is_named_by_what_was_proven_of_it(proof, name, proven):
+    found = Reference.of(1.0, proof, 0.026)
+    assert (found.name, found.is_proven) == (name, proven)
+
+
+def test_a_served_page_takes_its_reference_from_its_server(every):
+    result = ready.solved("tractor-four-lanchester")
+    assert live_model(result.problem, result).reference.is_proven
+    assert live_model(result.problem, result, is_served=True).reference is None
