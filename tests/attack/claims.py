@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from attack import own_judge
+from attack.crossings import OWN_CROSSINGS, PLAIN_CROSSINGS, best_of_choices, judge_ranks, judge_robust
 from attack.families import moving_mass, toml
 from attack.openings import Openings
 from attack.own_families import OWN_FAMILIES
@@ -44,6 +45,8 @@ class Verdict:
     ----------
     wrong
         What is claimed and not true, in words with figures.
+    bound
+        Lower bound; zero where nothing is known.
     beaten
         Share by which a rival is better than a design that claims no optimum.
     """
@@ -53,6 +56,7 @@ class Verdict:
     status: str = ""
     kind: str = ""
     gap: float = 0.0
+    bound: float = 0.0
     seconds: float = 0.0
     own_seconds: float = 0.0
     beaten: float = 0.0
@@ -126,15 +130,21 @@ def try_problem(family: str, seed: int, table: Table, rng: np.random.Generator, 
             result = solved(table, folder, f"{family}-{seed}-{os.getpid()}")
     except Exception as error:
         verdict.status = "error"
+        if family in PLAIN_CROSSINGS and type(error).__name__ == "ModelError":
+            verdict.status = "refused"
+            verdict.notes.append(f"note: {str(error)[:150]}")
+            return verdict
         verdict.wrong.append(told_of(error))
         return verdict
     finally:
         (folder / f"{family}-{seed}-{os.getpid()}.toml").unlink(missing_ok=True)
         verdict.seconds = time.perf_counter() - started
     started = time.perf_counter()
-    if family not in OWN_FAMILIES:
+    if result.certificate is not None:
+        verdict.bound = float(result.certificate.lower_bound)
+    if family not in OWN_FAMILIES and family not in OWN_CROSSINGS:
         judge(verdict, table, result, rng, most)
-    if own_judge.knows(table):
+    if family not in PLAIN_CROSSINGS and own_judge.knows(table):
         judge_by_own(verdict, table, result, rng, most)
     verdict.own_seconds = time.perf_counter() - started
     return verdict
@@ -150,6 +160,11 @@ def judge_by_own(verdict: Verdict, table: Table, result: Any, rng: np.random.Gen
 
 def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator, most: int) -> None:
     """Complaints about a result."""
+    if result.certificate is not None and (isinstance(table["objective"], list) or "robust" in table):
+        verdict.status, verdict.kind = result.status.value, result.certificate.kind.value
+        verdict.gap = result.certificate.gap
+        judge_ranks(verdict, table, result) if "robust" not in table else judge_robust(verdict, table, result, most)
+        return
     openings = Openings(table)
     verdict.status = result.status.value
     if verdict.status == "failed":
@@ -239,6 +254,9 @@ def _rival(
     openings: Openings, vector: np.ndarray, told: Table, value: float, rng: np.random.Generator, most: int
 ) -> Rival | None:
     enough = value * (1.0 - 0.2 * GAP)
+    optional = any(shaft.get("optional") for shaft in openings.table.get("balancer_shafts", []))
+    if optional or (openings.numbers and openings.table["engine"].get("throws") == "open"):
+        return best_of_choices(openings.table, rng, (vector, told), 100 * most, enough)
     if openings.numbers:
         return local_rival(openings, rng, [vector], 100 * most, told)
     if openings.table["engine"].get("throws") == "open":

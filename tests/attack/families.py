@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from attack.openings import middle
 from attack.plain_gear import SIZED
 from attack.plain_loads import number
 from attack.plain_scene import Table, norm_and_channel
@@ -180,9 +181,7 @@ def moving_mass(engine: Table) -> float:
     throw_count = len(told) if isinstance(told, list) else engine.get("cylinders", 1)
     if engine["layout"] == "parts":
         throw_count = len(engine["slider_cranks"])
-    return (
-        count * throw_count * float(engine["reciprocating_mass"].split()[0]) * 0.5 * float(engine["stroke"].split()[0])
-    )
+    return count * throw_count * middle(engine["reciprocating_mass"]) * 0.5 * float(engine["stroke"].split()[0])
 
 
 def rigid_mounts(rng: Generator) -> Table:

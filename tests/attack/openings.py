@@ -136,7 +136,11 @@ class Openings:
                     look(part, (*path, key))
 
         for key in OPENED:
-            if not (key == "engine" and steps):
+            if key == "engine" and steps:
+                # angles of stars are chosen and not moved
+                for own in ("reciprocating_mass", "rod_length"):
+                    look(self.table["engine"].get(own), (key, own))
+            else:
                 look(self.table.get(key), (key,))
         return tuple(found)
 
@@ -255,6 +259,8 @@ class Openings:
             return math.degrees(decided[f"{_at(self.table, path[:-1])['name']}.lead"])
         if path[0] == "running_gear" or path[:2] == ("engine", "big_end") or path == ("engine", "rod_length"):
             return decided[".".join(path)]
+        if path == ("engine", "reciprocating_mass"):
+            return decided["reciprocating mass"]
         if path[0] == "main_bearings":
             return decided[f"{_at(self.table, path[:-1])['name']}.{path[-1]}"]
         if path[-1] == "crank_lead":

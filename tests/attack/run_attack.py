@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from attack.claims import Verdict, tried, try_problem
+from attack.crossings import CROSSINGS, OWN_CROSSINGS
 from attack.families import FAMILIES, problem, toml
 from attack.own_families import OWN_FAMILIES
 from attack.page import lines_of, page
@@ -39,8 +41,11 @@ VARIED = {
 NAMES = [
     *FAMILIES,
     *OWN_FAMILIES,
+    *CROSSINGS,
     *(f"{variation} of {family}" for variation, families in VARIED.items() for family in families),
 ]
+GROUPS = {"all": NAMES, "crossings": [*CROSSINGS], "alone": [*FAMILIES, *OWN_FAMILIES]}
+"""Families by one word."""
 FINER = 32768
 EFFORT = 6
 """Stars that are solved one by one, at most ten times as many, and hundreds of calls of a local search."""
@@ -54,10 +59,11 @@ def commit() -> str:
 
 def drawn(family: str, seed: int) -> tuple[Table, np.random.Generator]:
     """A problem of any family, and the generator that goes on from there."""
-    if family not in OWN_FAMILIES:
+    made = OWN_FAMILIES.get(family) or CROSSINGS.get(family)
+    if made is None:
         return problem(family, seed)
     rng = np.random.default_rng([*family.encode(), seed])
-    return {"title": f"{family} {seed}", **OWN_FAMILIES[family](rng)}, rng
+    return {"title": f"{family} {seed}", **made(rng)}, rng
 
 
 def attacked(name: str, seed: int, effort: int = EFFORT) -> Verdict:
@@ -69,7 +75,7 @@ def attacked(name: str, seed: int, effort: int = EFFORT) -> Verdict:
             vary = VARIATIONS[variation]
             return tried(Verdict(name, seed), lambda: vary(table, rng, Path(folder)))
         verdict = try_problem(family, seed, table, rng, Path(folder), effort)
-        if verdict.wrong and SAMPLES < FINER and family not in OWN_FAMILIES:
+        if verdict.wrong and SAMPLES < FINER and family not in OWN_FAMILIES and family not in OWN_CROSSINGS:
             return finer(family, seed, Path(folder), effort)
         return verdict
 
@@ -89,7 +95,7 @@ def finer(family: str, seed: int, folder: Path, effort: int) -> Verdict:
 def run(told: argparse.Namespace) -> None:
     """Every family in turn, seed by seed, until the number or the time is reached."""
     told.log.parent.mkdir(parents=True, exist_ok=True)
-    families = NAMES if told.families == "all" else told.families.split(",")
+    families = GROUPS.get(told.families) or told.families.split(",")
     known, until, at = lines_of([told.log] if told.log.exists() else []), time.monotonic() + told.seconds, commit()
     done = {(line["family"], line["seed"]) for line in known}
     firsts = [int(first) for first in told.first.split(",")]
@@ -109,11 +115,26 @@ def run(told: argparse.Namespace) -> None:
             print(name, seed, verdict.status, *verdict.wrong, sep=" | ", flush=True)
 
 
+def summary(lines: list[Table]) -> str:
+    """Tell how many problems there are, what of them is false, and of how many nothing is known."""
+    solved = [line for line in lines if line["kind"]]
+    blank = [line for line in solved if line["kind"] == "local" and not line.get("bound", 1.0) > 0.0]
+    told = [f"{len(lines)} problems, {sum(bool(line['wrong']) for line in lines)} with a false claim or a defect"]
+    told += [f"  {line['family']} {line['seed']}: {'; '.join(line['wrong'])}" for line in lines if line["wrong"]]
+    told.append(f"{len(blank)} of {len(solved)} designs are local with bound 0")
+    for family in dict.fromkeys(line["family"] for line in lines):
+        own = [line for line in lines if line["family"] == family]
+        kinds = Counter(line["kind"] or line["status"] for line in own)
+        share = sum(line in blank for line in own)
+        told.append(f"  {family}: {dict(kinds)}, bound 0: {share}, {sum(line['seconds'] for line in own):.0f} s")
+    return "\n".join(told)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     commands = parser.add_subparsers(dest="command", required=True)
     running = commands.add_parser("run")
-    running.add_argument("families", help="comma-separated, or all")
+    running.add_argument("families", help="comma-separated, or all, crossings, alone")
     running.add_argument("--from", dest="first", default="0,100000,200000", help="first seeds, comma-separated")
     running.add_argument("--number", type=int, default=2000, help="of each kind from each first seed")
     running.add_argument("--log", type=Path, default=PAGE.with_name("run.jsonl"))
@@ -123,12 +144,17 @@ def main() -> None:
     show = commands.add_parser("show", help="the problem file of a family and a seed")
     show.add_argument("families")
     show.add_argument("--from", dest="first", type=int, default=0)
+    summed = commands.add_parser("sum", help="what logs say, in short")
+    summed.add_argument("logs", nargs="+", type=Path)
     paged = commands.add_parser("page", help="write results/attack/README.md from logs")
     paged.add_argument("logs", nargs="+", type=Path)
     told = parser.parse_args()
     if told.command == "page":
         PAGE.parent.mkdir(parents=True, exist_ok=True)
         PAGE.write_text(page(told.logs, NAMES), encoding="utf-8")
+        return
+    if told.command == "sum":
+        print(summary(lines_of(told.logs)))
         return
     if told.command == "show":
         print(toml(drawn(told.families, told.first)[0]))

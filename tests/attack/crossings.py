@@ -1,0 +1,334 @@
+"""Random problems of two kinds of open numbers together, and the judges of those that the others do not know."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize
+
+from attack.families import (
+    SMOOTH,
+    Generator,
+    angle,
+    balancers,
+    block,
+    counterweights,
+    crankcase,
+    elastic_mounts,
+    inline,
+    leads,
+    mechanism,
+    moving_mass,
+    of_unbalances,
+    opened_stiffness,
+    points,
+    q,
+    rigid_mounts,
+    sizes,
+    spaced,
+    star_of,
+    unit_of,
+    with_objective,
+)
+from attack.openings import Openings
+from attack.own_families import asked_load, objective, open_numbers, scene
+from attack.own_problem import Own
+from attack.plain_loads import number
+from attack.plain_scene import Scene, Table
+from attack.rivals import KEPT, Rival, convex_rival, designs_told, local_rival
+
+WIDE = {"between": ["-0.2 m", "0.2 m"]}
+
+
+def weights(rng: Generator, table: Table, count: int) -> list[Table]:
+    """Counterweights of any angle that may be nothing."""
+    found = counterweights(rng, moving_mass(table["engine"]), count)
+    for told in found:
+        told["angle"] = {"between": [0, 360]}
+        told["mass"]["between"][0] = "0.0 kg"
+    return found
+
+
+def star_engine(rng: Generator) -> Table:
+    return star_of({"layout": "inline", **mechanism(rng), **spaced(rng)}, int(rng.integers(3, 5)))
+
+
+def elastic(rng: Generator, engine: Table) -> Table:
+    return {
+        "engine": engine, "operating_points": points(rng, 2, 60.0, 300.0), "block": block(rng),
+        "mounts": elastic_mounts(rng),
+    }  # fmt: skip
+
+
+def on_mounts(rng: Generator, table: Table) -> Table:
+    return with_objective(rng, table, 1, channels=("mount force", "mount travel"), norms=SMOOTH)
+
+
+# --- judged by the own model of elastic mounts
+
+
+def at_a_share(rng: Generator, table: Table, told: Table) -> Table:
+    """A limit on a measure, a little over what a random design has, or under what most have."""
+    own = Own(table, 256, 1e-9)
+    low, high = own.box.T
+    has = own.designs(low + (high - low) * rng.random((20, len(low)))).measure(told)
+    most = has[0] * rng.uniform(1.0, 1.1) if rng.random() < 0.6 else np.quantile(has, rng.uniform(0.05, 0.4))
+    unit = {"transmissibility": "", "static sag": "m"}[told["quantity"]]
+    rest = {key: value for key, value in told.items() if key != "quantity"}
+    return {
+        "limit": told["quantity"], "max": q(float(most), unit, 9) if unit else float(f"{most:.9g}"), "name": "l0",
+        **rest,
+    }  # fmt: skip
+
+
+def transmissibility_and_weights(rng: Generator) -> Table:
+    table = scene(rng, 2, True)
+    table["counterweights"] = weights(rng, table, int(rng.integers(1, 3)))
+    table["objective"] = objective(asked_load(rng, table))
+    told = {"quantity": "transmissibility", **({"orders": [1]} if rng.random() < 0.5 else {})}
+    return {**table, "constraints": [at_a_share(rng, table, told)]}
+
+
+def damper_and_weights(rng: Generator) -> Table:
+    table = scene(rng, 2, True)
+    open_numbers(rng, table, ["damping"])
+    table["counterweights"] = weights(rng, table, 1)
+    return {**table, "objective": objective(asked_load(rng, table)), "search": {"boxes": 20, "starts": 5}}
+
+
+def sag_and_weights(rng: Generator) -> Table:
+    """Weights beside stiffness under a limit on static sag."""
+    table = scene(rng, 2, True)
+    open_numbers(rng, table, ["stiffness"] * int(rng.integers(1, 3)))
+    table["counterweights"] = weights(rng, table, 1)
+    table["objective"] = objective(asked_load(rng, table))
+    limit = at_a_share(rng, table, {"quantity": "static sag"})
+    return {**table, "constraints": [limit], "search": {"boxes": 20, "starts": 5}}
+
+
+# --- judged by the plain model
+
+
+def stars_on_mounts(rng: Generator) -> Table:
+    table = elastic(rng, star_engine(rng))
+    opened_stiffness(rng, table["mounts"], int(rng.integers(1, 3)))
+    return {**on_mounts(rng, table), "search": {"boxes": 20, "starts": 4}}
+
+
+def between_bounds(rng: Generator, count: int) -> list[Any]:
+    told: list[Any] = [0.0, *(round(360.0 * k / count + rng.uniform(-15.0, 15.0), 3) for k in range(1, count))]
+    for k in rng.choice(count - 1, int(rng.integers(1, 3)), replace=False) + 1:
+        wide = rng.uniform(5.0, 40.0)
+        told[k] = {"between": [round(told[k] - wide, 3), round(told[k] + wide, 3)]}
+    return told
+
+
+def uneven_and_stiffness(rng: Generator) -> Table:
+    table = elastic(rng, {"layout": "inline", **mechanism(rng), **spaced(rng), "throws": [0.0]})
+    table["engine"]["throws"] = between_bounds(rng, int(rng.integers(3, 5)))
+    opened_stiffness(rng, table["mounts"], int(rng.integers(1, 3)))
+    return {**on_mounts(rng, table), "search": {"boxes": 20, "starts": 4}}
+
+
+def places_and_bearings(rng: Generator) -> Table:
+    """Where a weight stands on the crank, against its main bearings."""
+    table = crankcase(rng)
+    table.pop("constraints", None)
+    table.pop("torsion", None)
+    table["counterweights"] = table["counterweights"][:2]
+    table["counterweights"][0]["x"] = dict(WIDE)
+    return with_objective(rng, table, 1, channels=("main-bearing force", "mount force"), norms=SMOOTH)
+
+
+def sizes_and_places(rng: Generator) -> Table:
+    table = sizes(rng)
+    if "balancer_shafts" not in table:
+        table["balancer_shafts"] = balancers(rng, 1.5 * moving_mass(table["engine"]), 1)
+    table["balancer_shafts"][0]["position"][int(rng.integers(0, 2))] = dict(WIDE)
+    return table
+
+
+def leads_and_places(rng: Generator) -> Table:
+    table = leads(rng)
+    while "gas" in table:
+        table = leads(rng)
+    table.pop("constraints", None)
+    table["counterweights"] = weights(rng, table, 1)
+    table["counterweights"][0] |= {"shaft": "led 0", "x": dict(WIDE)}
+    return with_objective(rng, table, 1, norms=SMOOTH)
+
+
+def pistons_and_stars(rng: Generator) -> Table:
+    """The reciprocating mass is open beside a star, with weights that are given or open."""
+    engine = star_engine(rng)
+    given = number(engine["reciprocating_mass"])
+    table: Table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
+    table["counterweights"] = weights(rng, table, 1)
+    if rng.random() < 0.6:
+        table["counterweights"][0] |= {"mass": table["counterweights"][0]["mass"]["between"][1], "angle": angle(rng)}
+    engine["reciprocating_mass"] = {
+        "between": [q(0.6 * given, "kg"), q(1.6 * given, "kg")], "start": q(given, "kg")
+    }  # fmt: skip
+    return with_objective(rng, table, 1)
+
+
+def optional_and_uneven(rng: Generator) -> Table:
+    """One of two shafts may be built, throws between bounds."""
+    engine = {"layout": "inline", **mechanism(rng), **spaced(rng)}
+    engine["throws"] = between_bounds(rng, int(rng.integers(3, 5)))
+    shafts = balancers(rng, moving_mass(engine), 2)
+    for shaft in shafts:
+        shaft["optional"] = True
+    table = {
+        "engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng), "balancer_shafts": shafts,
+        "phasing": {"most_shafts": int(rng.integers(1, 3))},
+    }  # fmt: skip
+    return with_objective(rng, table, 1, norms=SMOOTH)
+
+
+def ranks_with_limits(rng: Generator) -> Table:
+    table = of_unbalances(inline)(rng)
+    del table["objective"]
+    table["objective"] = [with_objective(rng, table, 1)["objective"] for _ in range(2)]
+    openings = Openings({**table, "objective": table["objective"][0]})
+    scene_of = openings.scene(openings.random(rng))
+    limits = []
+    for name in rng.choice(["added mass", "rms rocking couple", "maximum shaking force"], 1):
+        has = scene_of.measure({"quantity": str(name)}) * rng.uniform(1.0, 1.3)
+        limits.append({"limit": str(name), "max": q(has, unit_of(str(name)), 9), "name": "l0"})
+    return {**table, "constraints": limits}
+
+
+SPREAD = 0.05
+
+
+def robust_and_star(rng: Generator) -> Table:
+    """The worst case of weights that weigh more or less, beside a star."""
+    engine = star_engine(rng)
+    table: Table = {"engine": engine, "operating_points": points(rng), "mounts": rigid_mounts(rng)}
+    table["counterweights"] = weights(rng, table, int(rng.integers(1, 3)))
+    for told in table["counterweights"]:
+        told["mass"]["tolerance"] = f"± {100.0 * SPREAD:g} %"
+    return {**with_objective(rng, table, 1), "robust": {"over": "worst case"}}
+
+
+PLAIN_CROSSINGS = {
+    "stars on mounts": stars_on_mounts,
+    "uneven throws and stiffness": uneven_and_stiffness,
+    "places and bearings": places_and_bearings,
+    "sizes and places": sizes_and_places,
+    "leads and places": leads_and_places,
+    "pistons and stars": pistons_and_stars,
+    "optional shafts and uneven throws": optional_and_uneven,
+    "ranks with limits": ranks_with_limits,
+    "robust and star": robust_and_star,
+}
+OWN_CROSSINGS = {
+    "transmissibility and weights": transmissibility_and_weights,
+    "damper and weights": damper_and_weights,
+    "sag and weights beside stiffness": sag_and_weights,
+}
+CROSSINGS = {**PLAIN_CROSSINGS, **OWN_CROSSINGS}
+
+
+# --- rivals
+
+
+def choices(table: Table) -> Iterator[Table]:
+    """The table with every choice of its optional shafts, as many as may be built."""
+    shafts = table.get("balancer_shafts", [])
+    optional = [k for k, shaft in enumerate(shafts) if shaft.get("optional")]
+    most = min(table.get("phasing", {}).get("most_shafts", len(optional)), len(optional))
+    for built in itertools.combinations(optional, most):
+        kept = [shaft for k, shaft in enumerate(shafts) if k not in optional or k in built]
+        yield {**table, "balancer_shafts": kept}
+
+
+def best_of_choices(
+    table: Table, rng: Generator, known: tuple[np.ndarray, Table], calls: int, enough: float
+) -> Rival | None:
+    """The best design of every star and every choice of shafts, each by a search of its own; None if they are many."""
+    every = [(Openings(one), told) for one in choices(table) for told in designs_told(Openings(one))]
+    if not every or len(every) > calls // 60:
+        return None
+    found = []
+    for openings, told in every:
+        start = openings.nearest(np.zeros(openings.size))
+        if openings.numbers:
+            alike = np.allclose(told.get("throws", 0.0), known[1].get("throws", 0.0), atol=1e-6)
+            near = [known[0]] if len(known[0]) == openings.size and alike else []
+            found.append(local_rival(openings, rng, [start, *near], calls // len(every) + 60, told))
+        else:
+            found.append(convex_rival(openings, start, told, enough))
+    kept = [rival for rival in found if rival.excess <= KEPT]
+    return min(kept, key=lambda rival: rival.value) if kept else min(found, key=lambda rival: rival.excess)
+
+
+# --- judges of their own
+
+
+def worst(openings: Openings, vector: np.ndarray, told: Table) -> float:
+    """The most that an engine has whose weights are as much too heavy or too light as they may be."""
+    scene = openings.scene(openings.nearest(vector.copy()), told)
+    own = [k for k, rotor in enumerate(scene.rotors) if rotor[6] == "c"]
+    values = []
+    for signs in itertools.product((-1.0, 1.0), repeat=len(own)):
+        rotors = list(scene.rotors)
+        for k, sign in zip(own, signs, strict=True):
+            rotors[k] = (*rotors[k][:4], rotors[k][4] * (1.0 + SPREAD * sign), *rotors[k][5:])
+        values.append(Scene(scene.table, rotors, scene.order).objective)
+    return max(values)
+
+
+def judge_robust(verdict: Any, table: Table, result: Any, most: int) -> None:
+    openings = Openings(table)
+    vector, star = openings.read(result.final.engine, {d.name: d.value for d in result.decisions})
+    value, bound = result.objective.value, result.certificate.lower_bound
+    own = worst(openings, vector, star)
+    reading = 2e-5 + result.error_estimate
+    if abs(own - value) > 1.5 * reading * value:
+        verdict.wrong.append(f"worst case {value:.9g} is {own:.9g}")
+    best = own
+    for told in designs_told(openings):
+        for start in (openings.nearest(np.zeros(openings.size)), vector):
+            found = minimize(
+                lambda x, told=told: worst(openings, x, told), start, method="Nelder-Mead",
+                options={"maxfev": 20 * most},
+            )  # fmt: skip
+            best = min(best, float(found.fun))
+            verdict.rivals += int(found.nfev)
+    if bound > best * (1.0 + reading):
+        verdict.wrong.append(f"bound {bound:.9g}, a rival has {best:.9g}")
+    if verdict.kind == "global" and value > best * (1.0 + 1e-4 + reading):
+        verdict.wrong.append(f"global {value:.9g}, a rival has {best:.9g}")
+
+
+def judge_ranks(verdict: Any, table: Table, result: Any) -> None:
+    """Each rank under the limits and what those before it leave it."""
+    limits = list(table["constraints"])
+    openings = Openings({**table, "objective": table["objective"][0]})
+    vector, _ = openings.read(result.final.engine, {d.name: d.value for d in result.decisions})
+    reading = 3e-5 + result.error_estimate
+    for told, rank in zip(table["objective"], result.ranks, strict=True):
+        stage = Openings({**copy.deepcopy(table), "objective": told, "constraints": list(limits)})
+        own = stage.scene(vector, {})
+        floor = 1e-9 * max(rank.initial, rank.final)
+        if abs(own.objective - rank.final) > reading * max(rank.final, own.objective) + floor:
+            verdict.wrong.append(f"{rank.name} is said to be {rank.final:.9g} and is {own.objective:.9g}")
+        if own.worst > 3e-5:
+            verdict.wrong.append(f"a limit is passed by {own.worst:.2e} of itself")
+        rival = convex_rival(stage, vector, {}, rank.least * (1.0 - 2e-5))
+        verdict.rivals += rival.looked_at
+        if rival.excess <= 1e-6:
+            if rank.lower_bound > rival.value * (1.0 + reading) + floor:
+                verdict.wrong.append(f"{rank.name}: bound {rank.lower_bound:.9g}, a rival has {rival.value:.9g}")
+            if str(rank.proof) == "global" and rank.least > rival.value * (1.0 + 1e-4 + reading) + floor:
+                verdict.wrong.append(f"{rank.name}: global {rank.least:.9g}, a rival has {rival.value:.9g}")
+        if rank.limit is not None:
+            quantity = told["minimise"]
+            rest = {key: value for key, value in told.items() if key != "minimise"}
+            limits.append({"limit": quantity, "max": q(rank.limit, unit_of(quantity), 15), "name": "rank", **rest})
