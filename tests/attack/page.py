@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from attack.crossings import CROSSINGS
+
 WANTED = 2000
 SEEDS = 3
 """What the attack is meant to reach: so many problems of every family, from so many first seeds together."""
@@ -36,6 +38,7 @@ FAMILIES = {
     "mounts and unbalances together": ("joint",),
     "any number of elastic mounts": ("any mounts", "run-ups"),
     "sizes of the running gear with unbalances": ("sizes",),
+    "two kinds together": tuple(CROSSINGS),
 }
 """A family is of one method of proof; its kinds differ in what is drawn."""
 

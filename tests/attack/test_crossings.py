@@ -1,0 +1,56 @@
+"""What is claimed where two kinds of numbers are open together, and whether the judges hear a lie about it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from attack.claims import Verdict, judge, solved
+from attack.run_attack import attacked, drawn, summary
+from laufruhe.solvers.result import Result
+
+SEED = 500000
+QUICK = ("pistons and stars", "stars on mounts", "ranks with limits", "optional shafts and uneven throws")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", [*QUICK, "transmissibility and weights", "robust and star"])
+def test_no_claim_falls(family: str) -> None:
+    verdict = attacked(family, SEED, 1)
+    assert verdict.wrong == []
+    assert verdict.status in ("optimal", "feasible", "infeasible", "refused")
+
+
+def raised(result: Result) -> Result:
+    """A bound that is a hundredth over the value."""
+    assert result.certificate is not None
+    assert result.objective is not None
+    bound = 1.01 * result.objective.value
+    ranks = tuple(replace(rank, lower_bound=1.01 * rank.least) for rank in result.ranks)
+    return replace(result, certificate=replace(result.certificate, lower_bound=bound), ranks=ranks)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ["pistons and stars", "ranks with limits"])
+@pytest.mark.parametrize(("change", "is_true"), [(raised, False), (lambda result: result, True)], ids=["lie", "truth"])
+def test_a_lie_is_heard(family: str, change: Callable[[Any], Any], is_true: bool, tmp_path: Path) -> None:
+    table, _ = drawn(family, SEED)
+    verdict = Verdict(family, SEED)
+    judge(verdict, table, change(solved(table, tmp_path)), np.random.default_rng(0), 1)
+    assert any("bound" in line for line in verdict.wrong) is not is_true
+
+
+def test_a_summary_counts_what_is_false_and_what_is_unknown() -> None:
+    known = {"family": "a", "seed": 1, "kind": "global", "status": "optimal", "bound": 2.0, "seconds": 1.0, "wrong": []}
+    blank = {**known, "seed": 2, "kind": "local", "bound": 0.0}
+    false = {**known, "seed": 3, "wrong": ["bound 3, a rival has 2"]}
+    none = {**known, "seed": 4, "kind": "", "status": "infeasible"}
+    told = summary([known, blank, false, none])
+    assert told.startswith("4 problems, 1 with a false claim")
+    assert "a 3: bound 3, a rival has 2" in told
+    assert "1 of 3 designs are local with bound 0" in told
