@@ -24,6 +24,9 @@ os.environ["MPLBACKEND"] = "Agg"
 # Typer makes all commands anew for every call of one, which takes as long as many a command.
 typer.testing._get_command = cache(typer.testing._get_command)
 
+# A bound that contradicts a known design is an error here, also in processes that tests start.
+os.environ["LAUFRUHE_STRICT"] = "1"
+
 # Derandomised: a failure repeats on the next machine, and no example database is needed.
 settings.register_profile("laufruhe", derandomize=True, deadline=None, database=None, max_examples=20)
 # `make test-fast` asks for this one

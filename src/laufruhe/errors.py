@@ -98,6 +98,26 @@ class SolverError(LaufruheError, RuntimeError):
     """A solver stopped without an answer that can be used."""
 
 
+class BoundError(LaufruheError, RuntimeError):
+    """A bound and a known design contradict each other, so that one of the two is wrong.
+
+    Attributes
+    ----------
+    what
+        Proof that the bound is part of, in words.
+    bound, value
+        In SI.
+    """
+
+    def __init__(self, what: str, bound: float, value: float) -> None:
+        self.what, self.bound, self.value = what, float(bound), float(value)
+        super().__init__(f"a bound of {self.bound!r} contradicts a known design of {self.value!r} ({what}) [SI]")
+
+    def __reduce__(self) -> tuple[type[BoundError], tuple[str, float, float]]:
+        # raised in a worker process, it has to reach the one that speaks to the user
+        return BoundError, (self.what, self.bound, self.value)
+
+
 def refused(where: str, value: str, rule: str, remedy: str, source: object = "laufruhe") -> InputError:
     """One line of complaint, led by the file it stands in."""
     return InputError(str(source), (Complaint(where, value, rule, remedy),))

@@ -9,7 +9,7 @@ import pytest
 
 from laufruhe.numerics.budget import limited
 from laufruhe.numerics.progress import Step, listening
-from laufruhe.prove.best_first import Box, Division, Parts, Waiting, divide, halves, widest
+from laufruhe.prove.best_first import EMPTY, Box, Division, Over, Parts, Waiting, divide, halves, widest
 
 # of random numbers in a row, those between two places bound a part from below
 Part = tuple[int, int]
@@ -43,8 +43,7 @@ class Least(Division[Part]):
                 continue
             middle = (first + last) // 2
             for part in ((first, middle), (middle, last)):
-                found = self.bound(part)
-                yield found if found[0] < self.value else None
+                yield self.bound(part)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -72,7 +71,9 @@ def test_what_is_left_bounds_all_that_was_not_looked_at(most: int) -> None:
 
 def test_nothing_allowed_leaves_nothing_and_no_time_leaves_the_whole() -> None:
     search = Least(np.arange(8.0))
-    assert search.divide(None, 10) == math.inf
+    assert search.divide(EMPTY, 10) == math.inf
+    assert search.complete
+    assert search.divide(Over(3.0), 10) == 3.0
     assert search.complete
     with limited(0.0):
         assert search.divide((-5.0, (0, 8)), 10) == -5.0

@@ -17,7 +17,7 @@ from typing import Any, Generic, TypeVar
 
 from laufruhe.numerics.budget import left
 from laufruhe.numerics.processes import Processes
-from laufruhe.numerics.workers import WORTH_PROCESSES, count_of, given, imported, worked
+from laufruhe.numerics.workers import WORTH_PROCESSES, Answer, count_of, given, imported, reported, worked
 
 T = TypeVar("T")
 A = TypeVar("A")
@@ -31,7 +31,7 @@ class Foresight(Generic[T, A]):
         self._began = time.perf_counter()
         self._executor: Executor | None = None
         self._starting: list[Future[None]] = []
-        self._asked: dict[Hashable, Future[A]] = {}
+        self._asked: dict[Hashable, Future[Answer[A]]] = {}
         self.foreseen = 0
 
     def likely(self, steps: Iterable[tuple[Hashable, T]]) -> None:
@@ -71,7 +71,7 @@ class Foresight(Generic[T, A]):
             # lost with its worker, or not understood by it; what fails here too is told by this process
             return self._work(step)
         self.foreseen += 1
-        return found
+        return reported(found)
 
     def forget(self) -> None:
         """What was foreseen and is not wanted any more."""

@@ -13,13 +13,14 @@ from contextlib import closing, contextmanager
 from contextvars import ContextVar
 from importlib import import_module
 from itertools import count, takewhile
-from typing import Generic, ParamSpec, TypeVar
+from typing import Generic, NamedTuple, ParamSpec, TypeVar
 
-from laufruhe.errors import SolverError
+from laufruhe.errors import BoundError, SolverError
 from laufruhe.numerics.budget import in_time, left, limited, passed
 from laufruhe.numerics.cores import processors
 from laufruhe.numerics.processes import Copy, Processes
 from laufruhe.numerics.progress import tell
+from laufruhe.numerics.witness import collected, report
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -208,7 +209,7 @@ class _Asked(Generic[T, A]):
 
     def __init__(self, work: Callable[[T], A], executor: Executor) -> None:
         self._work, self._executor = work, executor
-        self.pieces: dict[Future[A], tuple[int, T, int]] = {}
+        self.pieces: dict[Future[Answer[A]], tuple[int, T, int]] = {}
 
     def ask(self, number: int, piece: T, losses: int = 0) -> None:
         """Hand a piece out."""
@@ -222,11 +223,11 @@ class _Asked(Generic[T, A]):
         """Leave out what nobody has begun."""
         self.pieces = {future: piece for future, piece in self.pieces.items() if not future.cancel()}
 
-    def answers(self, future: Future[A]) -> Iterator[tuple[int, A]]:
+    def answers(self, future: Future[Answer[A]]) -> Iterator[tuple[int, A]]:
         """What has become of a piece; nothing where it was lost and is asked for again."""
         number, piece, losses = self.pieces.pop(future)
         try:
-            answer = future.result()
+            answer = reported(future.result())
         except (CancelledError, BrokenExecutor, *getattr(self._executor, "losses", ())) as lost:
             if losses + 1 >= LOSSES:
                 raise _nobody(self._executor, lost) from None
@@ -235,10 +236,25 @@ class _Asked(Generic[T, A]):
             yield number, answer
 
 
-def worked(until: float, work: Callable[[T], A], piece: T) -> A:
+class Answer(NamedTuple, Generic[A]):
+    """An answer, and the contradictions that its worker met: no report leaves its process by itself."""
+
+    answer: A
+    reports: tuple[BoundError, ...]
+
+
+def worked(until: float, work: Callable[[T], A], piece: T) -> Answer[A]:
     """A piece, where it is done, until a time of day: there it starts no workers of its own."""
-    with limited(until - time.time()), working_on(HERE):
-        return work(piece)
+    with limited(until - time.time()), working_on(HERE), collected() as reports:
+        answer = work(piece)
+    return Answer(answer, tuple(reports))
+
+
+def reported(found: Answer[A]) -> A:
+    """Return an answer; what its worker had to report is reported here."""
+    for error in found.reports:
+        report(error)
+    return found.answer
 
 
 def _nobody(executor: Executor, error: BaseException) -> WorkersGone:

@@ -134,11 +134,11 @@ class Standing:
 
 def finely(evaluation: Evaluation) -> Evaluation:
     """At so many angles that a mean is what it is: at few it may be more (P7)."""
-    return replace(evaluation, samples=_fine(evaluation.samples))
+    return replace(evaluation, samples=fine_samples(evaluation.samples))
 
 
-def _fine(samples: int) -> int:
-    """So many times as many angles that there are `FINE`, and twice as many at least."""
+def fine_samples(samples: int) -> int:
+    """Return so many times as many angles that there are `FINE`, and twice as many at least."""
     return samples * max(2, math.ceil(FINE / samples))
 
 
@@ -161,7 +161,7 @@ def is_of_few(measure: Measure, samples: int) -> bool:
 
 def told_at(measure: Measure, samples: int) -> int:
     """Angles at which a limit of a load is told: so many, or as many as it takes where these are few (P7)."""
-    return _fine(samples) if is_of_few(measure, samples) else samples
+    return fine_samples(samples) if is_of_few(measure, samples) else samples
 
 
 def over(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:

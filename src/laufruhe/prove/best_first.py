@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.progress import tell
+from laufruhe.numerics.witness import is_over
+from laufruhe.prove.witness import Known, check_around, thin
 
 P = TypeVar("P")
 
@@ -37,8 +39,18 @@ class Waiting(NamedTuple, Generic[P]):
     part: P
 
 
-Parts: TypeAlias = Iterable[tuple[float, P] | None]
-"""Parts with their bounds, None for each in which nothing better is left."""
+@dataclass(frozen=True)
+class Over:
+    """Answer of a bound that leaves nothing of a part to divide: no design in it is under a level."""
+
+    level: float
+
+
+EMPTY = Over(math.inf)
+"""No design in a part is allowed."""
+
+Parts: TypeAlias = Iterable[tuple[float, P] | Over]
+"""Parts with their raw bounds, or what is proven of a part of which nothing is left to divide."""
 
 
 class Division(Generic[P]):
@@ -52,6 +64,12 @@ class Division(Generic[P]):
         Parts that are divided in one round.
     value
         Objective of the best design known; infinite where none is.
+    enough
+        Parts that are not under it are not divided.
+    level
+        No design that bounds cut off from a part is under it.
+    known
+        A design whose part no bound may be over.
     of_objective
         Whether bounds are of the objective, and told to who waits.
     seen
@@ -65,10 +83,26 @@ class Division(Generic[P]):
     what: str
     at_once: int = 1
     value: float = math.inf
+    known: Known | None = None
     of_objective: bool = True
     seen: int
     waiting: list[Waiting[P]]
     complete: bool
+    _least: float
+
+    @property
+    def enough(self) -> float:
+        """Bound from which a part is not divided."""
+        return self.value
+
+    @property
+    def level(self) -> float:
+        """Least objective that designs may have which bounds cut off; infinite where none are."""
+        return math.inf
+
+    def holds(self, _: P) -> bool:
+        """Return whether the known design lies in a part."""
+        return False
 
     def look(self, part: P) -> None:
         """Seek a design in a part whose turn it is."""
@@ -85,22 +119,26 @@ class Division(Generic[P]):
         """So many of the parts that wait, those that come next first."""
         return heapq.nsmallest(count, self.waiting)
 
-    def divide(self, root: tuple[float, P] | None, most: int) -> float:
+    def divide(self, root: tuple[float, P] | Over, most: int) -> float:
         """Divide parts until the least bound is high enough, no part is left, or as often as is worth it.
 
         Parameters
         ----------
         root
-            Bound of all that is open, and that; None where nothing in it is allowed.
+            Bound of all that is open, and that; or that nothing is left of it.
         most
             Parts, the root one of them.
 
         Returns
         -------
-        The least bound of what is left, infinite where nothing is.
+        What no design goes under, raw: the least of the bounds of all parts that are left, or were not worth dividing.
         """
-        self.waiting = [] if root is None else [Waiting(root[0], 0, root[1])]
-        self.seen = 1
+        self.waiting, self.seen, self._least = [], 1, math.inf
+        if isinstance(root, Over):
+            self._least = root.level
+        else:
+            self._check(*root)
+            self.waiting.append(Waiting(root[0], 0, root[1]))
         return self.further(most)
 
     def further(self, most: int) -> float:
@@ -120,9 +158,22 @@ class Division(Generic[P]):
                 taken.append(heapq.heappop(queue))
             for found in self.parts(taken):
                 self.seen += 1
-                if found is not None:
-                    heapq.heappush(queue, Waiting(found[0], self.seen, found[1]))
-        return queue[0].bound if queue else math.inf
+                if isinstance(found, Over):
+                    self._least = min(self._least, found.level)
+                    continue
+                bound, part = found
+                self._check(bound, part)
+                # the one place where parts are left out by what is known
+                if bound < self.enough:
+                    heapq.heappush(queue, Waiting(bound, self.seen, part))
+                else:
+                    self._least = min(self._least, bound)
+        return min(queue[0].bound if queue else math.inf, self._least, self.level)
+
+    def _check(self, bound: float, part: P) -> None:
+        """Report a bound that lies over a known design of its part."""
+        if self.known is not None and is_over(bound, self.known.value) and self.holds(part):
+            self.known.check(self.what, bound)
 
 
 class Box(NamedTuple):
@@ -154,7 +205,7 @@ class Divided:
     Attributes
     ----------
     bound
-        No design allowed has a smaller objective; zero where nothing is known.
+        No design allowed has a smaller objective, raw; zero where nothing is known.
     boxes
         That were looked at.
     places
@@ -169,25 +220,33 @@ class Divided:
 class Halving(Division[Box]):
     """Boxes halved until none may hold a design that is `room` better than `value`."""
 
-    def __init__(self, value: float, room: float) -> None:
-        self.value = value
-        self.enough = value - NEARLY * room if value < math.inf else math.inf
+    def __init__(self, value: float, room: float, known: Known | None = None) -> None:
+        self.value, self.room, self.known = value, room, known
+
+    @property
+    def enough(self) -> float:
+        """Bound from which no design of a box is better by the room."""
+        return self.value - NEARLY * self.room if self.value < math.inf else math.inf
+
+    def holds(self, box: Box) -> bool:
+        """Return whether the known design lies in a box."""
+        at = None if self.known is None else self.known.place
+        return at is not None and bool(np.all(box.lower <= at) and np.all(at <= box.upper))
 
     def is_done(self, one: Waiting[Box]) -> bool:
         """Whether no design in it is better by the room."""
         return not one.bound < self.enough
 
-    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
-        """Halves of boxes and their own bounds; None for those that hold no design allowed."""
+    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | Over]:
+        """Halves of boxes and their own bounds, or what is proven of those of which nothing is left."""
         raise NotImplementedError
 
     def parts(self, taken: Sequence[Waiting[Box]]) -> Parts[Box]:
         """Halves, of which none has a bound under that of the whole."""
         for k, found in enumerate(self.halved([one.part for one in taken])):
-            bound = math.inf if found is None else max(taken[k // 2].bound, found[0])
-            yield (bound, found[1]) if found is not None and bound < self.enough else None
+            yield found if isinstance(found, Over) else (max(taken[k // 2].bound, found[0]), found[1])
 
-    def run(self, root: tuple[float, Box] | None, most: int) -> Divided:
+    def run(self, root: tuple[float, Box] | Over, most: int) -> Divided:
         """What is proven, and where the least of the boxes that are left are."""
         return self.found(self.divide(root, most))
 
@@ -195,7 +254,7 @@ class Halving(Division[Box]):
         """With the least bound of what is left."""
         least = [one.part for one in self.coming(MOST_PLACES) if one.bound < self.enough]
         places = tuple(0.5 * (box.lower + box.upper) for box in least)
-        return Divided(min(bound, self.enough), self.seen, places)
+        return Divided(bound, self.seen, places)
 
 
 class BoxBounds(Protocol):
@@ -214,12 +273,12 @@ class BoxBounds(Protocol):
 class Bounded(Halving):
     """Boxes with bounds found by someone else."""
 
-    def __init__(self, search: BoxBounds, value: float, room: float) -> None:
-        super().__init__(value, room)
+    def __init__(self, search: BoxBounds, value: float, room: float, known: Known | None = None) -> None:
+        super().__init__(value, room, known)
         # two halves make two boxes of a round
         self._search, self.what, self.at_once = search, search.what, -(-search.at_once // 2)
 
-    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
+    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | Over]:
         """Of all boxes together."""
         return [*self.bounded([half for box in boxes for half in halves(box)])]
 
@@ -230,17 +289,46 @@ class Bounded(Halving):
         return [(float(bound), Box(*box, int(side))) for box, bound, side in found]
 
 
-def divide(search: BoxBounds, lower: Array, upper: Array, value: float, room: float, most: int) -> Divided:
+@dataclass(frozen=True, eq=False)
+class Around:
+    """Bounder of thin boxes, by whoever bounds boxes."""
+
+    search: BoxBounds
+    lower: Array
+    upper: Array
+
+    @property
+    def what(self) -> str:
+        """What is bounded, in words."""
+        return self.search.what
+
+    def around(self, place: Array) -> tuple[Array, Array]:
+        """Return a thin box around a place."""
+        return thin(place, self.lower, self.upper)
+
+    def bound(self, box: tuple[Array, Array]) -> float:
+        """Return the bound of a box."""
+        low, high = box
+        return float(self.search.bounds(low[None], high[None])[0][0])
+
+
+def divide(
+    search: BoxBounds, lower: Array, upper: Array, value: float, room: float, most: int, known: Known | None = None
+) -> Divided:  # fmt: skip
     """Halve boxes, the least first, until none may hold a design that is `room` better than `value`."""
-    return next(divided_on(search, lower, upper, value, room, [most]))
+    return next(divided_on(search, lower, upper, value, room, [most], known))
 
 
 def divided_on(
-    search: BoxBounds, lower: Array, upper: Array, value: float, room: float, most: Sequence[int]
+    search: BoxBounds, lower: Array, upper: Array, value: float, room: float, most: Sequence[int],
+    known: Known | None = None,
 ) -> Iterator[Divided]:  # fmt: skip
     """The same up to each of these numbers of boxes, one after the other."""
-    division = Bounded(search, value, room)
+    division = Bounded(search, value, room, known)
     for k, count in enumerate(most):
-        yield (
+        found = (
             division.found(division.further(count)) if k else division.run(division.bounded([(lower, upper)])[0], count)
         )
+        if known is not None and not k:
+            check_around(Around(search, lower, upper), known.place, known)
+        yield found

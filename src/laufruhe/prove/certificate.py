@@ -16,6 +16,7 @@ import numpy as np
 
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.witness import check_bound, is_over
 
 
 def gap_of(value: float, bound: float, nothing: float) -> float:
@@ -66,10 +67,26 @@ NEAR = 0.05
 
 
 def certified(
-    value: float, bound: float, nothing: float, tolerance: float, reach: Reach, kkt_residual: float, method: str
-) -> Certificate:
-    """The certificate of a value by a bound, where `nothing` counts as zero."""
-    value, bound = float(value), float(min(max(bound, 0.0), value))
+    value: float, bound: float, nothing: float, tolerance: float, reach: Reach, kkt_residual: float, method: str,
+    doubt: float = 0.0,
+) -> Certificate:  # fmt: skip
+    """Return the certificate of a design; a bound that contradicts its value is reported, and proves nothing.
+
+    Parameters
+    ----------
+    value
+        Objective of a design that keeps all limits.
+    bound
+        What no design goes under, raw: it is never brought to the value.
+    nothing
+        Difference that counts as zero.
+    doubt
+        By how much the value may be read too low: between samples, and where limits are exceeded by a rounding.
+    """
+    # no norm lies under zero
+    value, bound = float(value), max(float(bound), 0.0)
+    if not check_bound(method, bound, value, nothing + doubt):
+        return withheld(value, kkt_residual, method)
     gap = gap_of(value, bound, nothing)
     if gap <= tolerance:
         kind = Proof.GLOBAL
@@ -78,6 +95,11 @@ def certified(
     else:
         kind = Proof.LOCAL
     return Certificate(kind, bound, gap, kkt_residual, method)
+
+
+def withheld(value: float, kkt_residual: float, method: str) -> Certificate:
+    """Return the certificate of a design of which nothing is claimed."""
+    return Certificate(Proof.NONE, 0.0, gap_of(value, 0.0, 0.0), kkt_residual, method)
 
 
 @dataclass(frozen=True)
@@ -218,11 +240,38 @@ def best_bound(fine: AffineProblem, x: Array, found: Multipliers) -> Bound:
         ),
         own.limits,
     )
-    best = max((lower_bound(fine, m) for m in (own, direct)), key=lambda bound: bound.value)
+    best, value = max((lower_bound(fine, m) for m in (own, direct)), key=lambda bound: bound.value), fine.objective(x)
     for _ in range(LEVELLINGS):
-        if fine.objective(x) - best.value > LEVEL * best.value:
+        if value - best.value > LEVEL * best.value:
             best = max(best, lower_bound(fine, levelled(fine, x, best)), key=lambda bound: bound.value)
+    check_dual("dual rows", best.value, fine, x, best)
     return best
+
+
+def check_dual(what: str, value: float, problem: AffineProblem, x: Array, bound: Bound) -> None:
+    """Report a value of dual rows over what they say of a decision vector, whatever limits that keeps (P4).
+
+    Parameters
+    ----------
+    value
+        What the rows of a bound are said to prove of every design [SI].
+    x
+        Decision vector, in its sets but for a rounding.
+    """
+    most = problem.objective(x)
+    if not is_over(value, most):
+        return
+    prices = bound.multipliers.shadow_prices(problem)
+    most += sum(price * (norm.value(x) - edge) for price, (edge, norm) in zip(prices, problem.limits, strict=True))
+    inside = np.concatenate([np.zeros(0), *(domain.project(x) for domain in problem.domains)])
+    sizes = [weight * _size(norm, x) for weight, norm in problem.terms]
+    sizes += [price * (edge + _size(norm, x)) for price, (edge, norm) in zip(prices, problem.limits, strict=True)]
+    check_bound(what, value, most, float(np.abs(bound.gradient) @ np.abs(inside - x)) + ROUNDING * sum(sizes))
+
+
+def _size(norm: AffineNorm, x: Array) -> float:
+    """Norm of rows of which no parts cancel."""
+    return norm.norm.value(norm.grid, np.abs(norm.constant) + np.abs(norm.slope) @ np.abs(x))
 
 
 def spread(fine: AffineProblem, found: Multipliers) -> Multipliers:

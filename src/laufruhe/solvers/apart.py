@@ -10,13 +10,15 @@ from dataclasses import replace
 from functools import partial
 
 from laufruhe.errors import ModelError
+from laufruhe.numerics.witness import check_bound
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import STRENGTH, Certificate, Proof
+from laufruhe.prove.certificate import STRENGTH, Certificate, Proof, withheld
 from laufruhe.solvers.accuracy import largest_error
 from laufruhe.solvers.conclusion import none_within
 from laufruhe.solvers.result import Result, Status
@@ -118,8 +120,11 @@ def _together(found: list[Result], value: float) -> Certificate:
     bound = sum(own if certificate is None else certificate.lower_bound for certificate, own in shown)
     told = [certificate for certificate, _ in shown if certificate is not None]
     kind = min((certificate.kind for certificate in told), key=STRENGTH)
+    residual = max(certificate.kkt_residual for certificate in told)
+    method = "; beside it ".join(certificate.method for certificate in told)
+    if not check_bound(method, bound, value, sum(nothing_of(r.problem, r.final.engine) for r in found)):
+        return withheld(value, residual, method)
     gap = (value - bound) / value if value > 0.0 else 0.0
     # what cancels in a part counts as zero there
     gap = gap if any(certificate.gap for certificate in told) else 0.0
-    residual = max(certificate.kkt_residual for certificate in told)
-    return Certificate(kind, bound, gap, residual, "; beside it ".join(certificate.method for certificate in told))
+    return Certificate(kind, bound, gap, residual, method)

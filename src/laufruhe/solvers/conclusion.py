@@ -13,14 +13,16 @@ import numpy as np
 
 from laufruhe.fidelity.error_bounds import missed, relative
 from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.witness import is_over
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.evaluation import Evaluation, evaluate, finely, objective_value
-from laufruhe.problem.measure import Limit, Side
+from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Proof, Reach, certified
+from laufruhe.prove.certificate import Certificate, Proof, Reach, certified, gap_of
+from laufruhe.prove.witness import Known
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import none_of_given
@@ -31,6 +33,8 @@ FEASIBLE = 1e-6
 KEPT = 10.0 * FEASIBLE
 """Relative excess that a design may have and be called one."""
 ACTIVE = 1e-5
+READINGS = 3
+"""Times that an objective is read at more angles where a bound lies over it."""
 # share of the objective under which a price is a rounding
 _FELT = 1e-7
 # share of the objective from which a price tells that a limit holds the design, whatever room its tolerance left
@@ -121,6 +125,81 @@ def better(design: Design, other: Design | None) -> Design:
     return min((design, other), key=lambda each: (max(each.excess, KEPT), each.value))
 
 
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """Objective of a design beside a bound of all.
+
+    Attributes
+    ----------
+    evaluation
+        At the angles at which the objective was read.
+    value
+        Objective.
+    doubt
+        By how much it may be read too low: between these angles, and where limits are exceeded by a rounding.
+    """
+
+    evaluation: Evaluation
+    value: float
+    doubt: float
+
+
+def read_under(
+    problem: Problem, evaluation: Evaluation, value: float, bound: float, nothing: float,
+    prices: Mapping[Side, float] | None = None,
+) -> Reading:  # fmt: skip
+    """Return the objective of a design, read at so many angles that what bounds all of a cycle lies under it (P7).
+
+    Means averaged about angles bound those of the whole cycle, and a mean at few angles may lie under them.
+    """
+    for _ in range(READINGS):
+        if not is_over(bound, value, nothing) or not any(is_sampled(term.measure) for term in problem.objective):
+            break
+        evaluation = finely(evaluation)
+        value = objective_value(problem, evaluation)
+    return Reading(evaluation, value, _doubt(problem, evaluation, prices) if is_over(bound, value, nothing) else 0.0)
+
+
+def result_under(result: Result, bound: float, nothing: float) -> tuple[Result, float]:
+    """Return a result read at so many angles that a bound lies under it, and by how much it may be read too low."""
+    if result.objective is None:
+        return result, 0.0
+    read = read_under(result.problem, result.final, result.objective.value, bound, nothing, result.prices)
+    return replace(result, final=read.evaluation, objective=replace(result.objective, value=read.value)), read.doubt
+
+
+def known_of(design: Design, place: Array, excess: float = FEASIBLE) -> Known | None:
+    """Return a design as a witness of bounds in coordinates of theirs; None where it exceeds a limit by more."""
+    if design.excess > excess:
+        return None
+    problem, evaluation = design.problem, design.evaluation
+
+    def read() -> float:
+        nothing = nothing_of(problem, evaluation.engine)
+        found = read_under(problem, evaluation, design.value, math.inf, nothing)
+        return found.value + found.doubt + nothing
+
+    return Known(place, design.value, read)
+
+
+def is_sampled(measure: Measure) -> bool:
+    """Return whether more angles tell more of a measure."""
+    return measure.is_load and not measure.norm.is_euclidean
+
+
+def _doubt(problem: Problem, evaluation: Evaluation, prices: Mapping[Side, float] | None) -> float:
+    """What a value may be read too low by; without end where many angles tell that its design breaks limits (P7)."""
+    many = finely(evaluation) if problem.limits else evaluation
+    if many.excess(problem.limits) > FEASIBLE:
+        return math.inf
+    missing = sum(term.weight * missed(term.measure, evaluation) for term in problem.objective)
+    for (limit, side), price in (prices or {}).items():
+        found = many.standing(limit)
+        if found.side == side and price > 0.0:
+            missing += price * max(found.excess, 0.0) * abs(found.edge)
+    return missing
+
+
 def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[str, float]) -> Result:
     """The result of a design, or of the one given where that is better."""
     problem = design.problem
@@ -128,18 +207,19 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
     as_given = Design(problem, problem.start, initial, given, initial.excess(problem.limits))
     design = min(design, as_given, key=lambda each: each.rank)
     met = design.excess <= KEPT
-    certificate = certified(
-        design.value,
-        shown.bound,
-        nothing_of(problem, design.evaluation.engine),
-        problem.tolerance,
-        shown.reach,
-        shown.kkt_residual,
-        shown.method,
-    )
-    if not met:
+    nothing = nothing_of(problem, design.evaluation.engine)
+    if met:
+        read = read_under(problem, design.evaluation, design.value, shown.bound, nothing, shown.prices)
+        design = replace(design, evaluation=read.evaluation, value=read.value)
+        certificate = certified(
+            design.value, shown.bound, nothing, problem.tolerance, shown.reach, shown.kkt_residual, shown.method,
+            read.doubt,
+        )  # fmt: skip
+    else:
         # the bound is of designs, and this is none
-        certificate = replace(certificate, kind=Proof.NONE)
+        bound = max(shown.bound, 0.0)
+        gap = gap_of(design.value, bound, nothing)
+        certificate = Certificate(Proof.NONE, bound, gap, shown.kkt_residual, shown.method)
     # prices under what the proof leaves open are those of its rounding
     unfelt = max(_FELT, min(certificate.gap, problem.tolerance))
     limits = limit_values(problem, design.evaluation, shown.prices, design.value, unfelt)

@@ -16,6 +16,7 @@ from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.norms import Norm
 from laufruhe.numerics.processes import called
 from laufruhe.numerics.progress import Listener, listening, tell
+from laufruhe.numerics.witness import collected
 from laufruhe.problem.channels import (
     ABSORBER_HEAT,
     AT_EACH_MOUNT,
@@ -54,6 +55,7 @@ from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.rooms import surely_broken, with_room
 from laufruhe.solvers.told_limits import solve_told, told_excess
 from laufruhe.solvers.walk import walked
+from laufruhe.solvers.withheld import without_proof
 
 LIBRARIES = ("casadi", "clarabel", "cvxpy", "pyscipopt")
 """Packages that are imported where something open needs them, named as their modules."""
@@ -306,7 +308,7 @@ def solve(
     ModelError
         If the engine as given cannot be evaluated, or nothing decides what is open.
     """
-    with limited(time_limit), listening(listener):
+    with limited(time_limit), listening(listener), collected() as reports:
         begun, spent = time.perf_counter(), time.thread_time()
         found: Result | None
         try:
@@ -323,12 +325,15 @@ def solve(
         found = found if found is not None and not passed() else _cut_short(problem, found)
         # what a method made of the problem is of the same file
         found = replace(found, problem=replace(found.problem, origin=problem.origin))
+        if reports:
+            return without_proof(found, reports[0])
         found = walked(problem, found, time.thread_time() - spent)
         if not further or found.status is Status.FEASIBLE:
             return found
         if found.status is Status.OPTIMAL:
             return replace(found, free=free_decisions(found))
-        return with_reachable(found, problem, kinds_of(problem), time.perf_counter() - begun, _decided)
+        found = with_reachable(found, problem, kinds_of(problem), time.perf_counter() - begun, _decided)
+        return without_proof(found, reports[0]) if reports else found
 
 
 def _cut_short(problem: Problem, found: Result | None) -> Result:

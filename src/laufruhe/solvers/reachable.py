@@ -31,6 +31,7 @@ from laufruhe.solvers.conclusion import (
     nearest_of,
     none_within,
     quoted,
+    read_under,
 )
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result, Status
@@ -239,11 +240,14 @@ def _extreme(result: Result, limit: Limit, high: bool) -> float:
 
 def _recovered(found: Result, problem: Problem, result: Result) -> Result:
     """A design that keeps all limits after all, by what bounds are known of the objective."""
-    value = objective_value(problem, result.final)
-    proof = certified(
-        value, found.certificate.lower_bound if found.certificate else 0.0, nothing_of(problem, result.final.engine),
-        problem.tolerance, Reach.ASIDE, math.inf, f"found while {result.problem.objective_name} was minimised",
-    )  # fmt: skip
+    bound, nothing = (
+        found.certificate.lower_bound if found.certificate else 0.0,
+        nothing_of(problem, result.final.engine),
+    )
+    read = read_under(problem, result.final, objective_value(problem, result.final), bound, nothing)
+    result, value = replace(result, final=read.evaluation), read.value
+    how = f"found while {result.problem.objective_name} was minimised"
+    proof = certified(value, bound, nothing, problem.tolerance, Reach.ASIDE, math.inf, how, read.doubt)
     own = result.problem.changed(objective=problem.objective, limits=problem.limits)
     return replace(
         result,

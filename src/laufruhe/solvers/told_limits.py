@@ -10,7 +10,9 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+from laufruhe.fidelity.error_bounds import missed
 from laufruhe.numerics.budget import rounds
+from laufruhe.numerics.witness import check_bound
 from laufruhe.problem.evaluation import FINE, Evaluation, at_many, finely, finer, is_of_few, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
@@ -51,7 +53,10 @@ def _as_many_tell(result: Result) -> Result:
         return result
     value = told.value - _misread(problem, result.measured)
     final = result.final if result.robust else finely(result.final)
-    gap = gap_of(value, proof.lower_bound, nothing_of(problem, final.engine))
+    nothing = nothing_of(problem, final.engine)
+    gap = gap_of(value, proof.lower_bound, nothing)
+    doubt = sum(term.weight * missed(term.measure, final) for term in problem.objective)
+    check_bound(proof.method, proof.lower_bound, value, nothing + doubt)
     weaker = Proof.WITHIN_GAP if proof.kind is Proof.GLOBAL else proof.kind
     met = told_excess(problem, result.final) <= KEPT or result.robust is not None
     kind = Proof.NONE if not met else Proof.GLOBAL if gap <= problem.tolerance else weaker
@@ -60,7 +65,7 @@ def _as_many_tell(result: Result) -> Result:
         result,
         status=status,
         objective=replace(told, value=value),
-        certificate=replace(proof, kind=kind, gap=gap, lower_bound=min(proof.lower_bound, value)),
+        certificate=replace(proof, kind=kind, gap=gap),
         limits=result.limits if result.robust else limit_values(problem, final, result.prices, value),
         final=final,
         message=result.message if met else broken_message(problem, final),

@@ -15,7 +15,9 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.roots import parted
-from laufruhe.prove.best_first import Box, Divided, Halving, halves, widest
+from laufruhe.numerics.witness import EXCESS
+from laufruhe.prove.best_first import Box, Divided, Halving, Over, halves, widest
+from laufruhe.prove.witness import Known, check_around, thin
 
 MOST_BOXES = 4000
 # halvings of a side that is cut
@@ -80,25 +82,52 @@ class _OneWayBoxes(Halving):
 
     what = "boxes"
 
-    def __init__(self, problem: OneWayProblem, value: float, room: float) -> None:
-        super().__init__(value, room)
-        self._problem = problem.under(self.enough)
+    def __init__(self, problem: OneWayProblem, value: float, room: float, known: Known | None = None) -> None:
+        super().__init__(value, room, known)
+        self._given, self._problem = problem, problem.under(self.enough)
 
-    def bounded(self, lower: Array, upper: Array) -> tuple[float, Box] | None:
+    @property
+    def level(self) -> float:
+        """Boxes are cut as far as no design in what is cut off is better than enough."""
+        return self.enough if self._problem is not self._given else math.inf
+
+    def bounded(self, lower: Array, upper: Array) -> tuple[float, Box] | Over:
         """A box without what breaks limits, and its least sum."""
         kept = _cut(self._problem, lower, upper)
         if kept is None:
-            return None
+            return Over(self.level)
         return self._problem.least(*kept), Box(*kept, widest(*kept, self._problem.upper - self._problem.lower))
 
-    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
+    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | Over]:
         """Halves by the middle of the side that is longest beside its bounds."""
         return [self.bounded(*half) for box in boxes for half in halves(box)]
 
 
-def divided(problem: OneWayProblem, value: float, room: float, most: int = MOST_BOXES) -> Divided:
+@dataclass(frozen=True, eq=False)
+class _Around:
+    """Bounder of thin boxes, cut by designs that are no better than the known one."""
+
+    problem: OneWayProblem
+    known: Known
+    what: str = _OneWayBoxes.what
+
+    def around(self, place: Array) -> tuple[Array, Array]:
+        """Return a thin box around a place."""
+        return thin(place, self.problem.lower, self.problem.upper)
+
+    def bound(self, box: tuple[Array, Array]) -> float:
+        """Return the least sum of a box, infinite where limits cut off all of it."""
+        found = _OneWayBoxes(self.problem, self.known.value * (1.0 + EXCESS), 0.0).bounded(*box)
+        return math.inf if isinstance(found, Over) else found[0]
+
+
+def divided(
+    problem: OneWayProblem, value: float, room: float, most: int = MOST_BOXES, known: Known | None = None
+) -> Divided:  # fmt: skip
     """Halve boxes, the least first, until none may hold a design that is `room` better than `value` (T9)."""
-    boxes = _OneWayBoxes(problem, value, room)
+    boxes = _OneWayBoxes(problem, value, room, known)
+    if known is not None:
+        check_around(_Around(problem, known), known.place, known)
     return boxes.run(boxes.bounded(problem.lower, problem.upper), most)
 
 

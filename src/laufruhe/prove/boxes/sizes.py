@@ -13,6 +13,7 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -22,9 +23,10 @@ from laufruhe.load_models.sized_model import SizeModel
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Limit, Measure
-from laufruhe.prove.best_first import Box, Divided, Halving, halves, widest
+from laufruhe.prove.best_first import Box, Divided, Halving, Over, halves, widest
 from laufruhe.prove.boxes.size_bundles import Bundle, Number, Reach, Ways, corner
 from laufruhe.prove.boxes.size_programs import Ask, SizePrograms, Together
+from laufruhe.prove.witness import Known, check_around, thin
 
 MOST_BOXES = 3000
 # a limit counts as broken beyond so much of it; halvings of a side that is cut, rounds of that, and bounds of a load
@@ -202,7 +204,7 @@ class SizeBoxes:
             return None
         for _ in range(ROUNDS):
             before = (upper - lower).sum()
-            known = self._learned(lower, upper, enough, known)
+            known = self.learned(lower, upper, enough, known)
             if self.objective(lower, upper, known) >= enough:
                 return None
             for k in range(len(lower)):
@@ -214,7 +216,7 @@ class SizeBoxes:
             return None
         return Cut(lower, upper, bound, self._side(lower, upper, known, bound, enough), known)
 
-    def _learned(self, lower: Array, upper: Array, enough: float, known: tuple[Together, ...]) -> tuple[Together, ...]:
+    def learned(self, lower: Array, upper: Array, enough: float, known: tuple[Together, ...]) -> tuple[Together, ...]:
         """What dual rows of the box tell, and those of the last one; exact ones where little is to be shown."""
         if self._together is None:
             return ()
@@ -278,25 +280,55 @@ class _Sizes(Halving):
 
     what = "boxes of sizes"
 
-    def __init__(self, boxes: SizeBoxes, value: float, room: float) -> None:
-        super().__init__(value, room)
+    def __init__(self, boxes: SizeBoxes, value: float, room: float, known: Known | None = None) -> None:
+        super().__init__(value, room, known)
         self._boxes = boxes
 
-    def bounded(self, lower: Array, upper: Array, known: tuple[Together, ...] = ()) -> tuple[float, Box] | None:
+    @property
+    def level(self) -> float:
+        """Boxes are cut as far as no design in what is cut off is better than enough."""
+        return self.enough
+
+    def bounded(self, lower: Array, upper: Array, told: tuple[Together, ...] = ()) -> tuple[float, Box] | Over:
         """A box without what is cut off."""
-        found = self._boxes.cut(lower, upper, self.enough, known)
+        found = self._boxes.cut(lower, upper, self.enough, told)
         if found is None:
-            return None
+            return Over(self.level)
         box = _SizeBox(found.lower, found.upper, found.side)
         box.known = found.known
         return found.bound, box
 
-    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
+    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | Over]:
         """Each half by itself."""
         return [self.bounded(*half, getattr(box, "known", ())) for box in boxes for half in halves(box)]
 
 
-def divided_sizes(boxes: SizeBoxes, value: float, room: float, most: int = MOST_BOXES) -> Divided:
+@dataclass(frozen=True, eq=False)
+class _Around:
+    """Bounder of thin boxes."""
+
+    boxes: SizeBoxes
+    known: Known
+    what: str = _Sizes.what
+
+    def around(self, place: Array) -> tuple[Array, Array]:
+        """Return a thin box around sizes."""
+        return thin(place, self.boxes.model.lower, self.boxes.model.upper)
+
+    def bound(self, box: tuple[Array, Array]) -> float:
+        """Return the bound of a box by the dual rows that it suggests, infinite where it breaks a limit."""
+        self.boxes.touch(*box)
+        if self.boxes.breaks(*box):
+            return math.inf
+        return self.boxes.objective(*box, self.boxes.learned(*box, self.known.value, ()))
+
+
+def divided_sizes(
+    boxes: SizeBoxes, value: float, room: float, most: int = MOST_BOXES, known: Known | None = None
+) -> Divided:  # fmt: skip
     """Halve boxes, the least first, until none may hold a design that is `room` better than `value` (Z12)."""
-    division = _Sizes(boxes, value, room)
-    return division.run(division.bounded(boxes.model.lower, boxes.model.upper), most)
+    division = _Sizes(boxes, value, room, known)
+    found = division.run(division.bounded(boxes.model.lower, boxes.model.upper), most)
+    if known is not None:
+        check_around(_Around(boxes, known), known.place, known)
+    return found

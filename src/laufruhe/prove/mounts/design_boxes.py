@@ -28,7 +28,7 @@ from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import at_many
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import NEARLY, Bounded, Box, Divided
+from laufruhe.prove.best_first import Around, Bounded, Box, Divided
 from laufruhe.prove.certificate import Multipliers
 from laufruhe.prove.mounts.box_series import balanced, rest_of
 from laufruhe.prove.mounts.mount_loops import Loop, is_looped, mount_loop
@@ -36,6 +36,7 @@ from laufruhe.prove.mounts.mounted_loads import MountedLoads, Pairing
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.rest_limits import RestLimits, priced
 from laufruhe.prove.mounts.subdivision import EVEN
+from laufruhe.prove.witness import Known, check_around
 
 MOST_OPEN = 5
 """Open numbers of mounts, whose corners and coefficients are 2 and 4 to their power."""
@@ -322,21 +323,22 @@ def _bent(values: Array) -> Array:
 class _Designing(Bounded):
     """Boxes halved until none may hold a better design, those met at corners included."""
 
-    def __init__(self, search: DesignBoxes, room: float) -> None:
-        super().__init__(search, search.value, room)
-        self._boxes, self._room = search, room
+    def __init__(self, search: DesignBoxes, room: float, known: Known | None = None) -> None:
+        super().__init__(search, search.value, room, known)
+        self._boxes = search
 
     def look(self, _: Box) -> None:
         """At the best corner so far."""
-        if self._boxes.value < self.value:
-            self.value = self._boxes.value
-            self.enough = self.value - NEARLY * self._room
+        self.value = min(self.value, self._boxes.value)
 
 
-def designed_bound(boxes: DesignBoxes, room: float) -> Divided:
+def designed_bound(boxes: DesignBoxes, room: float, known: Known | None = None) -> Divided:
     """Halve boxes of a problem that `mixes_corners`, until no design is more than `room` better than the best known."""
-    division = _Designing(boxes, room)
+    division = _Designing(boxes, room, known)
     most = boxes.most_boxes
     if not most:
         return Divided(0.0, 0)
-    return division.run(division.bounded([(boxes.lower, boxes.upper)])[0], most)
+    found = division.run(division.bounded([(boxes.lower, boxes.upper)])[0], most)
+    if known is not None:
+        check_around(Around(boxes, boxes.lower, boxes.upper), known.place, known)
+    return found

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import Bounded, Box, Waiting
+from laufruhe.prove.best_first import Around, Bounded, Box, Waiting
 from laufruhe.prove.mounts.box_lines import BoxLines
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, worth_halving
+from laufruhe.prove.witness import Known, check_around
 
 Keeps = Callable[[Array], bool]
 """Whether a design keeps the limits, by the exact model."""
@@ -123,4 +124,7 @@ def excluded(problem: Problem, keeps: Keeps, share: float = 1.0) -> Exclusion:
         return Exclusion(False, None, 0)
     division = _Excluding(search, keeps)
     left = division.divide(division.bounded([search.whole])[0], most)
+    if division.design is not None:
+        # of a design that keeps all limits nothing is exceeded
+        check_around(Around(search, *search.whole), division.design, Known(division.design, 0.0))
     return Exclusion(left == math.inf, division.design, division.seen)

@@ -31,6 +31,7 @@ from laufruhe.prove.mounts.box_response import BoxModel, Lines
 from laufruhe.prove.mounts.box_runs import run_boxes
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.ranges import SLACK
+from laufruhe.prove.witness import Known
 
 # open numbers that are divided without being asked for, and what all boxes may cost together
 MOST_OPEN = 6
@@ -53,7 +54,7 @@ def divides(problem: Problem) -> bool:
     return bool(problem.decisions) and stiffness
 
 
-def divided_bound(problem: Problem, value: float, room: float) -> Divided:
+def divided_bound(problem: Problem, value: float, room: float, known: Known | None = None) -> Divided:
     """Divide the bounds until no design is more than `room` better than `value`, or as often as is worth it.
 
     Parameters
@@ -64,11 +65,15 @@ def divided_bound(problem: Problem, value: float, room: float) -> Divided:
         Objective of the best design known; infinite where none is, and then the bound tells whether there is one.
     room
         Difference that counts as none [SI].
+    known
+        The design, the witness of bounds.
     """
-    return next(divided_bounds(problem, value, room, [1.0]))
+    return next(divided_bounds(problem, value, room, [1.0], known))
 
 
-def divided_bounds(problem: Problem, value: float, room: float, shares: Sequence[float]) -> Iterator[Divided]:
+def divided_bounds(
+    problem: Problem, value: float, room: float, shares: Sequence[float], known: Known | None = None
+) -> Iterator[Divided]:  # fmt: skip
     """The same by each of these shares of what is worth it, one after the other."""
     search = StiffnessBoxes(problem, LEFT_OUT * room, value - NEARLY * room if value < math.inf else math.inf)
     most = search.most_boxes
@@ -76,7 +81,7 @@ def divided_bounds(problem: Problem, value: float, room: float, shares: Sequence
         yield from (Divided(0.0, 0) for _ in shares)
         return
     counts = [math.ceil(share * most) for share in shares]
-    yield from divided_on(search, search.model.lower, search.model.upper, value, room, counts)
+    yield from divided_on(search, search.model.lower, search.model.upper, value, room, counts, known)
 
 
 def worth_halving(pull: Array, lower: Array, upper: Array) -> NDArray[np.intp]:

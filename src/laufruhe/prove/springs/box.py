@@ -78,7 +78,7 @@ class Searched(Protocol):
 
 
 class SpringBox:
-    """One box, for designs of which a norm is not over a number; no more is proven than is enough.
+    """One box, for designs of which a norm is not over a number: what is proven is so of these alone.
 
     Attributes
     ----------
@@ -108,14 +108,14 @@ class SpringBox:
         Of several heads each is bounded by itself; the roots of all are then at least straight lines between what
         they are at least and at most, and these are bounded together (E54).
         """
-        pull, most = np.zeros(len(self.lower)), self.most
+        pull = np.zeros(len(self.lower))
         self.roots = known
         if not heads:
             return 0.0, pull, None
         if len(heads) == 1 and not heads[0].beside:
             bound, pull, middle = self._together(heads, np.ones(1))
             found = heads[0].unit * math.sqrt(max(bound, 0.0)) - heads[0].loss
-            return min(max(found, 0.0), most), pull, middle
+            return max(found, 0.0), pull, middle
         self.roots = self._alone(heads, known)
         shown = self._shown(heads, self.roots)
         if shown[0] < self.enough and self._is_whole:
@@ -134,9 +134,9 @@ class SpringBox:
         """What a mean is not under where its roots are not under these."""
         mean, pull = self._mean(heads, roots), np.zeros(len(self.lower))
         if mean.floor >= self.enough:
-            return min(mean.floor, self.most), pull, None
+            return mean.floor, pull, None
         bound, pull, middle = self._together(heads, mean.prices, mean)
-        bound = max(min(bound + mean.constant, self.most), mean.floor)
+        bound = max(bound + mean.constant, mean.floor)
         return bound, self._with_hidden(heads, pull, self.most - bound), middle
 
     def _with_hidden(self, heads: Sequence[Head], pull: Array, lacking: float) -> Array:

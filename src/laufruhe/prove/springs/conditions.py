@@ -19,6 +19,9 @@ from laufruhe.prove.springs.lines import Line, product
 from laufruhe.prove.springs.open_mounts import OpenMounts
 from laufruhe.prove.springs.opened import Place, Spring
 
+ROUNDING = 1e-13
+"""Share of parts that cancel, which is left to their rounding."""
+
 
 @dataclass(frozen=True, eq=False)
 class Held:
@@ -67,8 +70,8 @@ def _spring_sides(order: int, numbers: int, spring: Spring, seen: ComplexArray, 
     ]
     spans = [((low @ seen + added) / spring.size, (high @ seen - added) / spring.size) for low, high in spring.spans]
     if len(seen) > 1:
-        return [*found, *(_between(order, numbers, product(*pair)[None, None]) for pair in spans)]
-    return [*found, *(_between(order, numbers, _in_parts(*pair)) for pair in spans)]
+        return [*found, *(_between(order, numbers, product(*pair)[None, None], _whole(*pair)) for pair in spans)]
+    return [*found, *(_between(order, numbers, _in_parts(*pair), _whole(*pair)) for pair in spans)]
 
 
 def _in_parts(first: ComplexArray, second: ComplexArray) -> Array:
@@ -79,10 +82,16 @@ def _in_parts(first: ComplexArray, second: ComplexArray) -> Array:
     return np.asarray(0.25 * (across + across.transpose(0, 1, 3, 2)))
 
 
-def _between(order: int, numbers: int, moments: Array) -> Held:
-    """Moments alone, in their own size."""
+def _between(order: int, numbers: int, moments: Array, whole: float) -> Held:
+    """Moments alone, in their own size, with room for the rounding of parts of a size that cancel in them."""
     count, size = len(moments), float(np.abs(moments).max()) or 1.0
-    return Held(order, np.zeros((count, count)), np.zeros((numbers, count, count)), moments / size)
+    room = min(ROUNDING * whole / size, 1.0) * np.eye(count)
+    return Held(order, room, np.zeros((numbers, count, count)), moments / size)
+
+
+def _whole(first: ComplexArray, second: ComplexArray) -> float:
+    """Size of the parts of a product."""
+    return float(np.linalg.norm(first) * np.linalg.norm(second))
 
 
 def held(order: int, given: Array, slopes: Array, seen: ComplexArray, pressed: ComplexArray) -> Held:
@@ -112,7 +121,8 @@ def _place_sides(order: int, numbers: int, place: Place, seen: ComplexArray, mov
         found.append(Held(order, _bordered(np.eye(1), len(plain)), _bordered(slopes, len(plain)), moments))
     squares = [np.einsum("ax,by->abxy", each, each) for each in (plain, rows)]
     left = squares[0] - squares[1]
-    return [*found, _between(order, numbers, 0.5 * (left + left.transpose(0, 1, 3, 2)))]
+    whole = float(np.square(plain).sum() + np.square(rows).sum())
+    return [*found, _between(order, numbers, 0.5 * (left + left.transpose(0, 1, 3, 2)), whole)]
 
 
 def _rows(seen: ComplexArray, moved: ComplexArray) -> tuple[Array, Array]:
@@ -175,7 +185,9 @@ def _ranges(order: int, mounts: OpenMounts, line: Line) -> list[Held]:
     unit, least = mounts.highest, max(mounts.lowest, 0.0)
     pairs = [(line.carried - a * line.motion, line.carried - b * line.motion) for a, b in mounts.bands]
     pairs.append((line.carried - least * line.motion, unit * line.motion - line.carried))
-    return [_between(order, mounts.numbers, product(first, second)[None, None]) for first, second in pairs]
+    # both of a pair are differences of these
+    whole = (unit * float(np.linalg.norm(line.motion))) ** 2
+    return [_between(order, mounts.numbers, product(first, second)[None, None], whole) for first, second in pairs]
 
 
 def _bordered(matrices: Array, count: int) -> Array:

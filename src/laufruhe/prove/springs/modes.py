@@ -106,6 +106,9 @@ def shapes_of(mounts: OpenMounts, mode: Mode, lower: Array, upper: Array) -> Sha
     for matrix in ranges:
         whole = np.zeros((1 + count, d, d))
         whole[0] = matrix
+        if not count:
+            # on a box of no width, where no Z_j says it
+            sides.append(whole)
         for j in range(1, 1 + count):
             for sign in (1.0, -1.0):
                 whole[j] = sign * matrix

@@ -10,14 +10,16 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
+from laufruhe.numerics.witness import EXCESS
 from laufruhe.problem.evaluation import at_many
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import NEARLY, Box, Divided, Halving, Parts, Waiting, halves
+from laufruhe.prove.best_first import EMPTY, NEARLY, Box, Divided, Halving, Over, Parts, Waiting, halves
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.springs.ends import Aims, ends_ahead
 from laufruhe.prove.springs.open_mounts import is_lifted
 from laufruhe.prove.springs.search import SpringBoxes
+from laufruhe.prove.witness import Known, check_around, thin
 
 # shares of the value that are shown one after the other to be out of reach
 LEVELS = (0.1, 0.05, 0.02, 0.01, 0.003, 0.0)
@@ -35,7 +37,7 @@ WON = 0.3
 
 def spring_bound(
     problem: Problem, value: float, room: float, near: Sequence[Value], of_many: bool = False,
-    whole: bool = False,
+    whole: bool = False, known: Known | None = None,
 ) -> Divided:  # fmt: skip
     """Divide the bounds until no design is more than `room` better than `value`, or as often as is worth it.
 
@@ -51,6 +53,8 @@ def spring_bound(
         Whether the same will be asked of other problems, so that a bound that is nearly as good comes first.
     whole
         Whether all that is open is looked at alone.
+    known
+        The best design, the witness of bounds.
     """
     problem = named_part(problem)
     if not is_bounded(problem) or not 0.0 < value < math.inf:
@@ -61,10 +65,30 @@ def spring_bound(
             if not boxes.most_boxes or not boxes.is_sampled_fully:
                 return Divided(0.0, 0)
             ladder = _ladder(boxes, of_many)
-            return _by_levels(boxes, room, replace(ladder, most=1) if whole else ladder)
+            return _by_levels(boxes, room, replace(ladder, most=1) if whole else ladder, known)
     except np.linalg.LinAlgError:
         # a middle on a resonance that nothing damps
         return Divided(0.0, 0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Around:
+    """Bounder of thin boxes of mounts, all modes in them, for designs that are no better than the best known."""
+
+    boxes: SpringBoxes
+    known: Known
+    what: str = "spring forces"
+
+    def around(self, place: Array) -> tuple[Array, Array]:
+        """Return a thin box of numbers of mounts; what else is divided keeps its bounds."""
+        lower, upper = self.boxes.lower.copy(), self.boxes.upper.copy()
+        own = slice(0, len(place))
+        lower[own], upper[own] = thin(place, lower[own], upper[own])
+        return lower, upper
+
+    def bound(self, box: tuple[Array, Array]) -> float:
+        """Return the bound of a box, for designs that are not over the value by more than a rounding."""
+        return self.boxes.up_to(self.known.most * (1.0 + EXCESS)).look(*box)[0]
 
 
 def is_bounded(problem: Problem) -> bool:
@@ -98,18 +122,22 @@ def _ladder(boxes: SpringBoxes, of_many: bool) -> _Ladder:
     return found if asked_for is None else replace(found, most=asked_for)
 
 
-def _by_levels(boxes: SpringBoxes, room: float, ladder: _Ladder) -> Divided:
+def _by_levels(boxes: SpringBoxes, room: float, ladder: _Ladder, known: Known | None) -> Divided:
     """Show that no design is under a value, and then under one that is nearer to that of the best (E59)."""
-    first = boxes.under(_level(boxes, ladder.look, room))
+    first = _under(boxes, ladder.look, room, known)
     looked = first.look(boxes.lower, boxes.upper)
-    bound, spent, places = looked[0], 1, tuple[Array, ...]()
+    if known is not None and first.level > known.most:
+        known.check(_Narrowing.what, looked[0])
+    # what is shown is so of designs that are not over the level
+    bound, spent, places = min(looked[0], first.level), 1, tuple[Array, ...]()
     for share in ladder.shares:
         shown, left = _level(boxes, share, room), ladder.most - spent
         if shown <= bound:
             continue
         if (spent > 1 and AHEAD * spent > ladder.most) or left <= 0 or passed():
             break
-        narrowing = _Narrowing(first if share == ladder.look else boxes.under(shown), left)
+        search = first if share == ladder.look else _under(boxes, share, room, known)
+        narrowing = _Narrowing(search, left, known)
         if share == ladder.look:
             narrowing.looked = looked
         found = narrowing.run(narrowing.looked_at(boxes.lower, boxes.upper), left)
@@ -118,9 +146,18 @@ def _by_levels(boxes: SpringBoxes, room: float, ladder: _Ladder) -> Divided:
         if found.bound < shown:
             places = found.places
             break
+    if known is not None and 0.0 < bound < boxes.enough:
+        # where the last level was shown, the box of the best design was compared with it
+        check_around(_Around(first, known), known.place, known)
     count = len(boxes.problem.mount_decisions)
     kept = (*boxes.places, *places) if bound < boxes.enough else ()
     return Divided(bound, spent, tuple(place[:count] for place in kept))
+
+
+def _under(boxes: SpringBoxes, share: float, room: float, known: Known | None) -> SpringBoxes:
+    """Of designs under a level; at the last one the best design itself is among them."""
+    found = boxes.under(_level(boxes, share, room))
+    return found if share or known is None else found.up_to(known.most * (1.0 + EXCESS))
 
 
 def _level(boxes: SpringBoxes, share: float, room: float) -> float:
@@ -141,24 +178,43 @@ class _Narrowing(Halving):
 
     what = "boxes of mounts and modes, by spring forces"
 
-    def __init__(self, search: SpringBoxes, most: int) -> None:
-        super().__init__(search.value, 0.0)
+    def __init__(self, search: SpringBoxes, most: int, known: Known | None) -> None:
+        super().__init__(search.value, 0.0, known if known is not None and search.value > known.most else None)
         self._search, self._most, self.spent = search, most, 0
         self.looked: tuple[float, Array] | None = None
 
-    def looked_at(self, lower: Array, upper: Array, narrows: bool = True) -> tuple[float, Box] | None:
-        """A box as small as it becomes where it narrows, and its bound; None where it holds no better design."""
+    @property
+    def enough(self) -> float:
+        """Bound from which a box holds no design that is worth looking for."""
+        return self._search.enough
+
+    def holds(self, box: Box) -> bool:
+        """Return whether the known design lies in a box, whatever its modes are."""
+        own, beside = slice(0, self._search.mount_numbers), slice(self._search.mount_numbers, None)
+        kept = np.array_equal(box.lower[beside], self._search.lower[beside])
+        kept = kept and np.array_equal(box.upper[beside], self._search.upper[beside])
+        return kept and super().holds(Box(box.lower[own], box.upper[own], 0))
+
+    @property
+    def level(self) -> float:
+        """All that is shown is so of designs that are not over it."""
+        return self._search.level
+
+    def looked_at(self, lower: Array, upper: Array, narrows: bool = True) -> tuple[float, Box] | Over:
+        """A box as small as it becomes where it narrows, and its bound; or that it holds no better design."""
         before = best = -math.inf
         while True:
             kept = self._search.kept(lower, upper)
             if kept is None:
-                return None
+                return EMPTY
             lower, upper = kept
             (bound, pull), self.looked = self.looked or self._search.look(lower, upper), None
             self.spent += 1
             before, best = best, max(best, bound)
+            if self.known is not None and self.holds(Box(lower, upper, 0)):
+                self.known.check(self.what, best)
             if best >= self.enough:
-                return None
+                return Over(min(best, self.level))
             over = self.spent >= self._most or passed()
             if before > -math.inf:
                 narrows = best - before >= PROGRESS * (self.enough - before)
@@ -167,10 +223,10 @@ class _Narrowing(Halving):
             found, solved = narrowed(self._search, lower, upper, pull)
             self.spent += solved
             if found is None:
-                return None
+                return Over(self.level)
             lower, upper = found
 
-    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | None]:
+    def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | Over]:
         """Halves, each looked at by itself, and narrowed where that paid for the whole."""
         return [self.looked_at(*half, box.narrows) for box in boxes for half in halves(box)]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
@@ -143,6 +144,11 @@ class SpringBoxes:
         return bool(abs(apart) < AT_END * (upper[side] - lower[side]))
 
     @property
+    def level(self) -> float:
+        """Objective that designs are not over of which anything is shown."""
+        return self.value
+
+    @property
     def mount_numbers(self) -> int:
         """How many numbers of mounts are open."""
         return len(self.problem.mount_decisions)
@@ -176,10 +182,10 @@ class SpringBoxes:
         return int(min(WORK / max(cost, 1), MOST_BOXES)) if asked_for is None else asked_for
 
     def look(self, lower: Array, upper: Array) -> tuple[float, Array]:
-        """The better of both bounds of one box, and the pull of its sides."""
+        """The better bound of the designs of a box that are not over the value, and the pull of its sides."""
         known, whole = 0.0, self.kept(lower, upper)
         if whole is None:
-            return self.value, np.zeros(len(lower))
+            return math.inf, np.zeros(len(lower))
         lower, upper = whole
         if self._plain is not None:
             count = len(self._near)
@@ -188,7 +194,7 @@ class SpringBoxes:
         return max(known, bound), pull
 
     def relaxed(self, lower: Array, upper: Array) -> tuple[float, Array]:
-        """Bound of one box, and how far each side keeps the relaxation from a design."""
+        """Bound of the designs of one box that are not over the value, and how far each side keeps it from one."""
         total, pull = self._constant, np.zeros(len(lower))
         for k, (weight, each) in enumerate(self._terms):
             whole = not self.places and k == 0
@@ -200,8 +206,7 @@ class SpringBoxes:
             pull += own
             if whole and middle is not None:
                 self.places.append(middle)
-        # a design that is worse than the best known is above it
-        return min(total, self.value), pull * (upper > lower)
+        return total, pull * (upper > lower)
 
     def left(self, lower: Array, upper: Array) -> tuple[Program, OpenMounts]:
         """Conditions of designs of a box of which the first term leaves that they are better than the best known."""
@@ -222,11 +227,21 @@ class SpringBoxes:
         found.felt_at_most = dict(self.felt_at_most)
         return found
 
+    def up_to(self, value: float) -> SpringBoxes:
+        """The same for designs that are not over a value, of the same orders and with what is enough as before."""
+        found = copy(self)
+        found.value = value
+        found._least = [np.zeros_like(least) for least in self._least]
+        found._looked = self.lower, self.upper, found._least[0]
+        found.felt_at_most = {}
+        return found
+
     def _needed(self, head: Head, value: float) -> tuple[Order, ...]:
         """Those without which a tenth of what is to be shown is not lost."""
         size = np.array([float(np.sum(np.abs(order.felt) ** 2)) for order in head.orders])
         left = 1.0 - np.cumsum(size) / max(float(size.sum()), 1e-300)
-        return head.orders[: int(np.argmax(left <= NEEDED * (1.0 - value / self.value))) + 1]
+        enough = left <= NEEDED * (1.0 - value / self.value)
+        return head.orders[: int(np.argmax(enough)) + 1] if enough.any() else head.orders
 
     def _ends(self, weight: float) -> tuple[float, float]:
         """What this term of a design that is better than the best known is not over, and what is enough alone."""

@@ -7,14 +7,19 @@ arcs, and what is left free is bounded from above. Every bound comes from rows o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from laufruhe.errors import BoundError
 from laufruhe.numerics.arrays import Array
-from laufruhe.prove.best_first import Division, Parts, Waiting
-from laufruhe.prove.tolerances.error_parts import ROUNDING, Block, Known, Terms, bounded
+from laufruhe.numerics.witness import is_over, report
+from laufruhe.prove.best_first import Division, Over, Parts, Waiting
+from laufruhe.prove.tolerances.error_parts import ROUNDING, Block, Terms, bounded
+from laufruhe.prove.tolerances.error_parts import Known as Told
+from laufruhe.prove.witness import THIN, Known, check_around
 
 MOST_NODES = 5000
 STARTS, CLIMBS = 12, 30
@@ -32,7 +37,7 @@ class WorstCase:
     value
         At these errors.
     bound
-        Of all errors allowed; never under the value.
+        Of all errors allowed, raw.
     nodes
         Parts that the errors were divided into.
     """
@@ -68,11 +73,35 @@ def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, most: i
         return WorstCase(np.zeros(0), best[0], best[0], 0)
     search = _Errors(terms, tolerance, best)
     whole = [Block(own, np.eye(own.stop - own.start)) for own in columns]
-    first = bounded(terms, np.zeros(count), whole, best[0], search.known)
+    first = bounded(terms, np.zeros(count), whole, best[0], search.told)
     search.better(_climbed(terms, columns, first.errors))
     bound = search.divide((-first.bound, _Part(np.zeros(count), whole, first.split)), most)
     value, errors = search.best
-    return WorstCase(errors, value, max(value, -bound), search.seen)
+    if is_over(bound, -value):
+        report(BoundError("errors that no engine exceeds", -bound, value))
+    return WorstCase(errors, value, -bound, search.seen)
+
+
+@dataclass(frozen=True, eq=False)
+class _Around:
+    """Bounder of thin parts of the errors; the largest sum is the least of its negative."""
+
+    terms: Terms
+    columns: Sequence[slice]
+    what: str = "errors that no engine exceeds"
+
+    def around(self, errors: Array) -> tuple[Array, list[Block]]:
+        """Return a centre and blocks about it that reach some errors."""
+        return (1.0 - THIN) * errors, [Block(own, THIN * np.eye(own.stop - own.start)) for own in self.columns]
+
+    def bound(self, part: tuple[Array, list[Block]]) -> float:
+        """Return the bound of a part."""
+        return -bounded(self.terms, *part, -math.inf, [{} for _ in self.terms]).bound
+
+
+def check_worst(terms: Terms, columns: Sequence[slice], found: WorstCase) -> None:
+    """Report a bound of a part around the worst errors found that these exceed."""
+    check_around(_Around(terms, columns), found.errors, Known(found.errors, -found.value))
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +120,16 @@ class _Errors(Division[_Part]):
 
     def __init__(self, terms: Terms, tolerance: float, best: tuple[float, Array]) -> None:
         self._terms, self._tolerance, self.best = terms, tolerance, best
-        self.known: Known = [{} for _ in terms]
+        self.told: Told = [{} for _ in terms]
 
     def better(self, found: tuple[float, Array]) -> None:
         """The worse of the worst errors so far and others."""
         self.best = max(self.best, found, key=lambda each: each[0])
+
+    @property
+    def enough(self) -> float:
+        """Bound from which no errors of a part are worse than the worst known."""
+        return -self.best[0] * (1.0 + ROUNDING)
 
     def is_done(self, one: Waiting[_Part]) -> bool:
         """Whether no errors are worse by the tolerance."""
@@ -107,12 +141,11 @@ class _Errors(Division[_Part]):
         rest = [block for k, block in enumerate(own.blocks) if k != own.split]
         for middle, free in own.blocks[own.split].parts(own.centre):
             blocks = rest if free is None else [*rest, free]
-            part = bounded(self._terms, middle, blocks, self.best[0] * (1.0 + self._tolerance), self.known)
+            part = bounded(self._terms, middle, blocks, self.best[0] * (1.0 + self._tolerance), self.told)
             self.better((value_at(self._terms, part.errors), part.errors))
             # a part is never worse than the whole
             bound = min(part.bound, -above)
-            is_left = blocks and bound > self.best[0] * (1.0 + ROUNDING)
-            yield (-bound, _Part(middle, blocks, part.split)) if is_left else None
+            yield (-bound, _Part(middle, blocks, part.split)) if blocks else Over(-bound)
 
 
 def _starts(columns: Sequence[slice], count: int) -> Array:

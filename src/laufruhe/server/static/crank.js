@@ -14,8 +14,6 @@ export class Crank {
    */
   constructor(root, moved) {
     this.moved = moved;
-    /** @type {string | null} what the ranking is about */
-    this.about = null;
     this.said = element("p", { class: "said" });
     this.list = element("ol", { id: "ranking", "aria-label": "Cranks, best first" });
     this.all = element("button", { type: "button", id: "rank-all" }, "Rank all cranks");
@@ -39,25 +37,12 @@ export class Crank {
   /**
    * @param {Star[]} ranking
    * @param {string} chosen the star of the state, as JSON
-   * @param {string} about what they were ranked for
    */
-  tell(ranking, chosen, about) {
+  tell(ranking, chosen) {
     if (!ranking.length) return;
-    this.about = about;
-    this.check(about);
+    this.said.textContent = `${ranking.length} best, each with all else at its optimum:`;
     this.list.replaceChildren(...ranking.map((star) => this.entry(star)));
     this.choose(chosen);
-  }
-
-  /**
-   * Say whether the ranking is about the settings that stand now.
-   * @param {string} about
-   */
-  check(about) {
-    if (this.about === null) return;
-    const isOld = about !== this.about;
-    this.box.classList.toggle("outdated", isOld);
-    this.said.textContent = isOld ? "Ranked for earlier settings:" : "Best cranks found, all else decided for each:";
   }
 
   /** @param {string} chosen */

@@ -15,10 +15,11 @@ from laufruhe.problem.decision import Numbers, moved_numbers
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.boxes.monotone import OneWay, OneWayProblem, divided
 from laufruhe.prove.certificate import Reach
-from laufruhe.solvers.conclusion import concluded, none_within
+from laufruhe.solvers.conclusion import Design, concluded, known_of, none_within
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, proven, searched, shown
@@ -71,6 +72,14 @@ class _Coordinates:
         if self.width is None:
             return x
         return np.clip(np.insert(x[:-1], self.width, self.wheel(x).ring.width), *self.bounds)
+
+    def place(self, values: Sequence[Value]) -> Array:
+        """Return the point of a design."""
+        own = np.array([float(value.real) for value in values])
+        if self.width is None:
+            return own
+        mass = replace(self, width=None).wheel(own).ring.mass
+        return np.append(np.delete(own, self.width), mass)
 
     def _width(self, sign: float, ways: Array) -> OneWay:
         return OneWay(lambda x: sign * self.wheel(x).ring.width, sign * ways)
@@ -133,8 +142,9 @@ def solve_flywheel(problem: Problem) -> Result:
     program = _WheelProgram(problem, *whole.bounds, whole.asked(initial, problem.limits))
     best = searched(program, [program.shares(problem.start), *looks(problem)], problem.search.starts)
 
-    def bounded(value: float, room: float) -> Divided:
-        found = divided(asked, value, (SHARPER if asked.goes_one_way else 1.0) * room)
+    def bounded(value: float, room: float, design: Design) -> Divided:
+        known = None if math.isinf(value) else known_of(design, boxes.place(design.values), excess=0.0)
+        found = divided(asked, value, (SHARPER if asked.goes_one_way else 1.0) * room, known=known)
         return replace(found, places=tuple(boxes.decided(x) for x in found.places))
 
     found = proven(program, best, bounded)

@@ -6,14 +6,20 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
 
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
+from laufruhe.prove.best_first import Over
 from laufruhe.prove.certificate import Reach
-from laufruhe.solvers.boxes.search import B, Search, divided
-from laufruhe.solvers.conclusion import Design, Shown, concluded, judged, none_within, unbalances_of
+from laufruhe.prove.witness import Known
+from laufruhe.solvers.boxes.search import Box, Search, divided
+from laufruhe.solvers.conclusion import Design, Shown, concluded, judged, known_of, none_within, unbalances_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.result import Result, Status
 
@@ -39,7 +45,22 @@ class HeldDesign:
         return self.design.rank
 
 
-class HeldDesigns(Search[B, HeldDesign]):
+class Sided(Box, Protocol):
+    """A box with sides."""
+
+    @property
+    def lower(self) -> Array:
+        """Lower ends."""
+
+    @property
+    def upper(self) -> Array:
+        """Upper ends."""
+
+
+S = TypeVar("S", bound=Sided)
+
+
+class HeldDesigns(Search[S, HeldDesign]):
     """What a search over boxes knows of its designs, and of the limits that were not met in boxes."""
 
     conflict: tuple[str, ...] = ()
@@ -47,18 +68,32 @@ class HeldDesigns(Search[B, HeldDesign]):
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
 
+    def known(self, found: HeldDesign) -> Known | None:
+        """Return a design as a witness of bounds; None where it breaks limits."""
+        return known_of(found.design, self.place(found))
+
+    def place(self, found: HeldDesign) -> Array:
+        """Return what boxes are of, of a design."""
+        held = zip(self.problem.decisions, found.design.values, strict=True)
+        return np.array([float(value.real) for decision, value in held if not decision.is_affine])
+
+    def holds(self, box: S, found: HeldDesign) -> bool:
+        """Return whether a design lies in a box."""
+        at = self.place(found)
+        return bool(np.all(box.lower <= at) and np.all(at <= box.upper))
+
     def told(self, conflict: Sequence[str]) -> None:
         """What cannot be met in one box may be in another: all boxes together tell."""
         told = {*self.conflict, *conflict}
         self.conflict = tuple(limit.name for limit in self.problem.limits if limit.name in told)
 
-    def solved(self, root: B | None, first: HeldDesign | None, most: int, what: str, how: str) -> Result:
+    def solved(self, root: S | Over, first: HeldDesign | None, most: int, what: str, how: str) -> Result:
         """The best design that dividing the boxes comes to, proven as far as that goes.
 
         Parameters
         ----------
         root
-            All that is open; None where no design is allowed.
+            All that is open, or that no design is allowed.
         first
             A design to begin with.
         most
@@ -68,7 +103,7 @@ class HeldDesigns(Search[B, HeldDesign]):
         """
         started, problem = time.perf_counter(), self.problem
         initial, best, bound, boxes = evaluate(problem), first, math.inf, 1
-        if root is not None and first is not None:
+        if not isinstance(root, Over) and first is not None:
             most = most if problem.search.boxes is None else problem.search.boxes
             nothing = nothing_of(problem)
             best, bound, boxes = divided(self, root, first, nothing, problem.tolerance, most, f"boxes of {what}")
@@ -77,7 +112,7 @@ class HeldDesigns(Search[B, HeldDesign]):
             return none_within(problem, initial, self.conflict, timing)
         own, design = best.result, best.design
         shown = Shown(
-            bound=0.0 if design.rank[0] else min(bound, design.value),
+            bound=0.0 if design.rank[0] else bound,
             reach=Reach.WHOLE,
             kkt_residual=own.certificate.kkt_residual if own is not None and own.certificate is not None else math.inf,
             method=f"{how} {boxes} box{'es' * (boxes > 1)} of {what}",

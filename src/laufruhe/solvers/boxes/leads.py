@@ -19,9 +19,10 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import Box, halves
+from laufruhe.prove.best_first import EMPTY, Box, Over, halves
 from laufruhe.prove.boxes.leads import SLACK, LeadBound, LeadBoxes
 from laufruhe.prove.certificate import Multipliers, best_bound
+from laufruhe.prove.witness import thin
 from laufruhe.solvers.boxes.held_designs import SHARE, HeldDesign, HeldDesigns, best_with
 from laufruhe.solvers.boxes.search import searched
 from laufruhe.solvers.conclusion import judged
@@ -77,22 +78,23 @@ class _Search(HeldDesigns[_Box]):
         self.boxes = LeadBoxes(self.model)
         self.samples = max(problem.fidelity.samples // COARSE, 24) * COARSE
 
-    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | None, HeldDesign | None]]:
+    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | Over, HeldDesign | None]]:
         """Halves of a box, each with the best design at its middle where that may be better than a value."""
         for low, high in halves(Box(box.lower, box.upper, box.side)):
             half = self.box(low, high, box.bound, value)
-            worth = half is not None and half.at_middle < value * (1.0 - SHARE * self.problem.tolerance)
-            yield half, self.at(half.middle) if half is not None and worth else None
+            level = value * (1.0 - SHARE * self.problem.tolerance)
+            is_worth = not isinstance(half, Over) and half.bound < value and half.at_middle < level
+            yield half, self.at(0.5 * (low + high)) if is_worth else None
 
-    def box(self, lower: Array, upper: Array, floor: float = 0.0, value: float = math.inf) -> _Box | None:
-        """The bound of a box; None where no design is allowed. Near a value the program stands at all angles."""
+    def box(self, lower: Array, upper: Array, floor: float = 0.0, value: float = math.inf) -> _Box | Over:
+        """The bound of a box, or that no design is allowed in it. Near a value the program stands at all angles."""
         middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
         found = self._bound(middle, half, COARSE)
         if self.model.domains and value * (1.0 - NEAR * self.problem.tolerance) < found.value < value:
             found = self._bound(middle, half, 1)
         if math.isinf(found.value):
             self.told(found.broken)
-            return None
+            return EMPTY
         side = int(np.argmax(found.pull + 1e-12 * half))
         bound, room = max(found.value, floor), EXACT * self.problem.tolerance * found.at_middle
         return _Box(lower, upper, bound, found.at_middle, side, found.at_middle - bound <= room < math.inf)
@@ -133,6 +135,10 @@ class _Search(HeldDesigns[_Box]):
             return None
         self.told([x.name for x, z in zip(self.problem.load_limits, limits, strict=True) if z.any()])
         return found
+
+    def around(self, found: HeldDesign) -> _Box | Over:
+        """Return a thin box around the leads of a design, and its bound."""
+        return self.box(*thin(self.place(found), self.model.lower, self.model.upper), 0.0, found.value)
 
     # designs
 

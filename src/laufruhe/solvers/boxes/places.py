@@ -12,7 +12,8 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import Box, halves
+from laufruhe.prove.best_first import EMPTY, Box, Over, halves
+from laufruhe.prove.witness import thin
 from laufruhe.solvers.boxes.held_designs import SHARE, HeldDesign, HeldDesigns, best_with
 from laufruhe.solvers.boxes.place_boxes import Relaxation
 from laufruhe.solvers.cones.unbalances import solve_unbalances
@@ -61,7 +62,7 @@ def solve_places(problem: Problem) -> Result:
     """
     search = _Search(problem)
     root = search.box(*search.bounds)
-    first = None if root is None else search.at(root.middle)
+    first = None if isinstance(root, Over) else search.at(root.middle)
     return search.solved(root, first, MOST_BOXES, "places", "second-order cones over")
 
 
@@ -81,12 +82,12 @@ class _Search(HeldDesigns[_Box]):
         """Of all places."""
         return np.array([p.lower for p in self.places]), np.array([p.upper for p in self.places])
 
-    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | None, HeldDesign | None]]:
+    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | Over, HeldDesign | None]]:
         """Halves of a box, each with the best design at its middle if it may be better than a value."""
         for half in self._halves(box):
-            yield half, None if half is None or half.bound >= value else self.at(half.middle)
+            yield half, None if isinstance(half, Over) or half.bound >= value else self.at(half.middle)
 
-    def _halves(self, box: _Box) -> Iterator[_Box | None]:
+    def _halves(self, box: _Box) -> Iterator[_Box | Over]:
         """A box cut where what was left out pulls most."""
         width, whole = box.upper - box.lower, self.bounds[1] - self.bounds[0]
         pulled = box.spread if box.spread.max(initial=0.0) > 1e-9 * whole.max() else width / whole
@@ -94,24 +95,28 @@ class _Search(HeldDesigns[_Box]):
         for half in halves(Box(box.lower, box.upper, side), float(box.middle[side])):
             yield self.box(*half, box.bound)
 
-    def box(self, lower: Array, upper: Array, floor: float = 0.0) -> _Box | None:
-        """The bound of a box, and where its program puts the places; None where no design is allowed."""
+    def box(self, lower: Array, upper: Array, floor: float = 0.0) -> _Box | Over:
+        """The bound of a box, and where its program puts the places; or that no design is allowed."""
         beyond = self._beyond(lower, upper)
         if beyond:
             self.told(beyond)
-            return None
+            return EMPTY
         lower, upper = self._shrunk(lower, upper)
         relaxed = self.relaxation.program(lower, upper)
         result = solve_unbalances(relaxed)
         if result.status is Status.INFEASIBLE:
             self.told(result.conflict)
-            return None
+            return EMPTY
         bound = result.certificate.lower_bound if result.certificate is not None else 0.0
         middle, spread = self.relaxation.placing(relaxed, result, lower, upper)
         allowed = self._pushed(middle, lower, upper)
         # what the program does not know of moves the places too
         moved = upper - lower if allowed is None else np.abs(allowed - middle)
         return _Box(lower, upper, max(bound, floor), middle if allowed is None else allowed, np.maximum(spread, moved))
+
+    def around(self, found: HeldDesign) -> _Box | Over:
+        """Return a thin box around the places of a design, and its bound."""
+        return self.box(*thin(self.place(found), *self.bounds))
 
     def _spans(self, lower: Array, upper: Array) -> Iterator[tuple[Limit, float, float]]:
         """Least and largest of each distance that is limited, with its places in a box."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -11,8 +13,9 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.foresight import Foresight, foresight
-from laufruhe.prove.best_first import Division, Parts, Waiting
+from laufruhe.prove.best_first import Division, Over, Parts, Waiting
 from laufruhe.prove.certificate import gap_of
+from laufruhe.prove.witness import Bounder, Known, check_around
 
 # of the tolerance that counts as met
 NEARLY = 0.99
@@ -66,11 +69,27 @@ class Search(Generic[B, F]):
         """Limits that were not met in boxes."""
         raise NotImplementedError
 
-    def parts(self, box: B, value: float) -> Iterator[tuple[B | None, F | None]]:
+    def parts(self, box: B, value: float) -> Iterator[tuple[B | Over, F | None]]:
         """Boxes that cover one together, and a design from each, None where none was sought.
 
-        Of a box in which no design is allowed, or none better than a value, there is None.
+        Of a box in which no design is allowed, or none under a level, there is what is proven of it.
         """
+        raise NotImplementedError
+
+    def level(self, _: float) -> float:
+        """Least objective that designs may have which bounds cut off where one of a value is known."""
+        return math.inf
+
+    def known(self, _: F) -> Known | None:
+        """Return a design as a witness of bounds; None where it is none."""
+        raise NotImplementedError
+
+    def holds(self, _box: B, _design: F) -> bool:
+        """Return whether a design lies in a box."""
+        return False
+
+    def around(self, _: F) -> B | Over | None:
+        """Return a thin box that holds a design, and its bound; None where the box cannot be stated."""
         raise NotImplementedError
 
     def told(self, conflict: Sequence[str]) -> None:
@@ -84,13 +103,28 @@ class _Designed(Division[B], Generic[B, F]):
         self, search: Search[B, F], best: F, nothing: float, tolerance: float, what: str, ahead: Foresight[Any, Any]
     ) -> None:  # fmt: skip
         self.what, self.best, self.value = what, best, best.value
+        self.known = search.known(best)
         self._search, self._nothing, self._tolerance, self._ahead = search, nothing, tolerance, ahead
+
+    @property
+    def level(self) -> float:
+        """Least objective that designs may have which bounds cut off; infinite where none are."""
+        return self._search.level(self.value)
+
+    def holds(self, box: B) -> bool:
+        """Return whether the best design lies in a box."""
+        return self._search.holds(box, self.best)
 
     def is_done(self, one: Waiting[B]) -> bool:
         """Whether it meets the best design."""
         gap = gap_of(self.value, one.bound, self._nothing)
         # a box that left nothing out has no better design, only a bound as near as its program came
         return gap <= NEARLY * self._tolerance or (gap < np.inf and one.part.is_exact)
+
+    def _take(self, found: F) -> None:
+        """The better of the best design and another."""
+        if found.rank < self.best.rank:
+            self.best, self.value, self.known = found, found.value, self._search.known(found)
 
     def parts(self, taken: Sequence[Waiting[B]]) -> Parts[B]:
         """Parts of a box, worked out ahead where others divide boxes too."""
@@ -102,11 +136,9 @@ class _Designed(Division[B], Generic[B, F]):
         parts, conflict = self._ahead.wanted(name, step)
         search.told(conflict)
         for part, found in parts:
-            left = None if part is None or part.bound >= self.value else (part.bound, part)
-            if left is not None and found is not None:
-                self.best = min(self.best, found, key=lambda each: each.rank)
-                self.value = self.best.value
-            yield left
+            if found is not None:
+                self._take(found)
+            yield part if isinstance(part, Over) else (part.bound, part)
             if not search.is_shared and passed():
                 # what is left of the box is bounded by its own bound
                 yield known, box
@@ -129,12 +161,31 @@ def divided(
 
     Returns
     -------
-    The best design; what bounds the boxes that are left, infinite where none is; and how many there were.
+    The best design; what no design goes under, infinite where none is allowed; and how many boxes there were.
     """
     with foresight(_parted) as ahead:
         boxes = _Designed(search, best, nothing, tolerance, what, ahead)
         bound = boxes.divide((root.bound, root), most)
+    if boxes.known is not None:
+        around: Bounder[F, B | Over] = _Around(search, what)
+        check_around(around, boxes.best, boxes.known)
     return boxes.best, bound, boxes.seen
+
+
+@dataclass(frozen=True, eq=False)
+class _Around(Generic[B, F]):
+    """Bounder of thin boxes of a search."""
+
+    search: Search[B, F]
+    what: str
+
+    def around(self, design: F) -> B | Over | None:
+        """Return a thin box around a design, with its bound."""
+        return self.search.around(design)
+
+    def bound(self, box: B | Over) -> float:
+        """Return the bound of a box."""
+        return box.level if isinstance(box, Over) else box.bound
 
 
 def _parted(step: tuple[Any, Any, float]) -> tuple[Iterable[tuple[Any, Any]], tuple[str, ...]]:

@@ -16,7 +16,7 @@ from laufruhe.prove.best_first import divide
 from laufruhe.prove.boxes.shared_gas import SharedGasBoxes
 from laufruhe.prove.certificate import Reach
 from laufruhe.solvers.boxes.search import searched
-from laufruhe.solvers.conclusion import KEPT, Design, Shown, better, concluded, judged, none_within
+from laufruhe.solvers.conclusion import KEPT, Design, Shown, better, concluded, judged, known_of, none_within
 from laufruhe.solvers.result import Result
 
 MOST_BOXES = 20_000
@@ -35,12 +35,13 @@ def solve_shared_leads(problem: Problem) -> Result:
     value = best.value if best is not None and allowed else math.inf
     most = MOST_BOXES if problem.search.boxes is None else problem.search.boxes
     room = SHARE * problem.tolerance * max(value, nothing_of(problem)) if allowed else 0.0
-    found = divide(boxes, lower, upper, value, room, most)
+    known = known_of(best, np.array([float(x.real) for x in best.values])) if best is not None and allowed else None
+    found = divide(boxes, lower, upper, value, room, most, known)
     timing = {"solve": time.perf_counter() - started}
     if best is None or (not allowed and math.isinf(found.bound)):
         return none_within(problem, initial, tuple(limit.name for limit in problem.limits), timing)
     method = f"local searches; lower bound on {found.boxes} box{'es' * (found.boxes > 1)} of leads"
-    return concluded(best, initial, Shown(min(found.bound, best.value), Reach.WHOLE, math.inf, method), timing)
+    return concluded(best, initial, Shown(found.bound, Reach.WHOLE, math.inf, method), timing)
 
 
 def _best(problem: Problem, lower: Array, upper: Array) -> Design | None:

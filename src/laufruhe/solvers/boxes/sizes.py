@@ -21,7 +21,7 @@ from laufruhe.prove.best_first import Divided
 from laufruhe.prove.boxes.sizes import MOST_BOXES, SizeBoxes, divided_sizes
 from laufruhe.prove.certificate import Multipliers, Reach
 from laufruhe.solvers.boxes.held_designs import best_with
-from laufruhe.solvers.conclusion import concluded, none_within
+from laufruhe.solvers.conclusion import Design, concluded, known_of, none_within
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result
@@ -96,7 +96,7 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
     best = _proposed(program)
     boxes = _boxes(model)
 
-    def bounded(value: float, room: float) -> Divided:
+    def bounded(value: float, room: float, design: Design) -> Divided:
         usual = MOST_WITH_ROD if model.moves_rod else MOST_PROGRAMS if model.domains else MOST_BOXES
         most = usual if problem.search.boxes is None else problem.search.boxes
         if boxes is None:
@@ -104,7 +104,8 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
         if known < value < math.inf:
             # a room is a share of the value
             value, room = known, room * known / value
-        return divided_sizes(boxes, value, room, most)
+        place = program.columns(program.shares(design.values))[program.sized]
+        return divided_sizes(boxes, value, room, most, known_of(design, place) if value < math.inf else None)
 
     found = proven(program, best, bounded)
     if boxes is not None and found.excludes_all:

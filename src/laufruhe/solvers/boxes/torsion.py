@@ -6,12 +6,14 @@ import math
 import time
 from dataclasses import replace
 
+import numpy as np
+
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided, divide
 from laufruhe.prove.boxes.twist import TwistBoxes
 from laufruhe.prove.certificate import Reach
-from laufruhe.solvers.conclusion import KEPT, concluded, none_within
+from laufruhe.solvers.conclusion import KEPT, Design, concluded, known_of, none_within
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, proven, searched, shown
 
@@ -32,11 +34,13 @@ def solve_torsion(problem: Problem) -> Result:
     boxes = TwistBoxes(problem, initial)
     most = _most_boxes(problem) if boxes.coordinates.is_exact and boxes.is_sampled_fully else 0
 
-    def bounded(value: float, room: float) -> Divided:
+    def bounded(value: float, room: float, design: Design) -> Divided:
         if not most or (value < math.inf and not boxes.has_terms):
             return Divided(0.0, 0)
         own = boxes.coordinates
-        divided = divide(boxes, own.lower, own.upper, value, room, most)
+        place = own.of(np.array([float(x.real) for x in design.values]))
+        known = known_of(design, place) if value < math.inf else None
+        divided = divide(boxes, own.lower, own.upper, value, room, most, known)
         return replace(divided, places=tuple(own.decisions(x) for x in divided.places))
 
     found = proven(program, best, bounded)

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from laufruhe.load_models.run_look import asks_runs
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import at_least, in_time, passed
@@ -17,7 +19,8 @@ from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.prove.mounts.design_boxes import DesignBoxes, designed_bound, mixes_corners
 from laufruhe.prove.mounts.subdivision import divided_bound, divided_bounds, divides
 from laufruhe.prove.springs.proof import spring_bound
-from laufruhe.solvers.conclusion import KEPT, values_of
+from laufruhe.prove.witness import Known
+from laufruhe.solvers.conclusion import KEPT, Design, known_of, values_of
 from laufruhe.solvers.mounts.corners import best_at
 from laufruhe.solvers.mounts.places import started_at
 from laufruhe.solvers.mounts.search import MountSearch
@@ -29,6 +32,12 @@ MOST_DIVISIONS = 3
 EARLY = 0.2
 # seconds that a first bound has where time is over
 LEAST_SECONDS = 0.5
+
+
+def mount_numbers(design: Design) -> Array:
+    """Return the open numbers of the mounts of a design."""
+    pairs = zip(design.problem.decisions, design.values, strict=True)
+    return np.array([float(value.real) for decision, value in pairs if not decision.is_affine])
 
 
 def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
@@ -50,9 +59,10 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
         value = found.design.value - over_read(problem, found.design.evaluation) if found and met else math.inf
         room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine if found else None))
         near = found.design.values if found is not None else ()
+        known = None if found is None or not met else known_of(found.design, mount_numbers(found.design))
         if found is not None and met and mixes_corners(problem) and not divides(problem):
-            return _by_corners(problem, search, value, room, near)
-        divided = _by_boxes(problem, value, room, near)
+            return _by_corners(problem, search, value, room, near, known)
+        divided = _by_boxes(problem, value, room, near, known)
         places = [(place.tolist(), None) for place in divided.places]
         if not places or passed() or not divides(problem) or not search.again(places):
             break
@@ -63,7 +73,7 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
 
 
 def _by_corners(
-    problem: Problem, search: MountSearch, value: float, room: float, near: Sequence[Value]
+    problem: Problem, search: MountSearch, value: float, room: float, near: Sequence[Value], known: Known | None
 ) -> Divided:  # fmt: skip
     """By multipliers of corners, which meet better designs on their way; else by the forces of springs."""
 
@@ -75,35 +85,35 @@ def _by_corners(
 
     boxes = DesignBoxes(problem, value, best_at, judge)
     with at_least(LEAST_SECONDS):
-        found = designed_bound(boxes, room)
+        found = designed_bound(boxes, room, known)
     if boxes.best is not None:
         mounts, columns = boxes.best
         search.again([(mounts.tolist(), columns)])
     if passed() or found.bound >= boxes.value - room:
         return found
-    few = spring_bound(problem, value, room, near)
+    few = spring_bound(problem, value, room, near, known=known)
     return Divided(max(few.bound, found.bound), few.boxes + found.boxes)
 
 
-def _by_boxes(problem: Problem, value: float, room: float, near: Sequence[Value]) -> Divided:
+def _by_boxes(problem: Problem, value: float, room: float, near: Sequence[Value], known: Known | None) -> Divided:
     """By the forces of springs, a few boxes of which close many stiffnesses; by expansions what these leave open.
 
     Expansions need more boxes of less time: some are tried once the springs of all that is open do not close it. Of
     run-ups they alone tell anything, and springs have told what they know without these.
     """
     if asks_runs(problem):
-        of_runs = divided_bound(problem, value, room)
+        of_runs = divided_bound(problem, value, room, known)
         if of_runs.boxes or passed():
             return of_runs
     alone = divides(problem)
     with at_least(LEAST_SECONDS):
-        few = spring_bound(problem, value, room, near, whole=alone)
+        few = spring_bound(problem, value, room, near, whole=alone, known=known)
     if passed() or not alone or (few.boxes and few.bound >= value - room):
         return few
-    expanded = divided_bounds(problem, value, room, (EARLY, 1.0))
+    expanded = divided_bounds(problem, value, room, (EARLY, 1.0), known)
     many = next(expanded)
     if few.boxes and many.bound < value - room and not passed():
-        few = spring_bound(problem, value, room, near)
+        few = spring_bound(problem, value, room, near, known=known)
         if few.bound >= value - room:
             return few
     if many.bound < value - room and not passed():

@@ -29,7 +29,7 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
-from laufruhe.solvers.conclusion import contradiction
+from laufruhe.solvers.conclusion import contradiction, result_under
 from laufruhe.solvers.mounts.bounds import bounded_under
 from laufruhe.solvers.mounts.nonlinear import solve_mounts, solve_moved
 from laufruhe.solvers.mounts.starts import place_of
@@ -236,24 +236,28 @@ def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs
     whole = len(found) == designs and not phasing.continuous
     ranking = [_entry(phasing, each, whole and each is best) for each in found if not _rank(each)[0]]
     details = ranking_result(phasing, best.candidate, ranking, designs, len(found), _method(found, designs))
-    certificate = _certificate(
-        found, whole, details.method, nothing_of(problem, best.result.final.engine), problem.tolerance
-    )
+    nothing = nothing_of(problem, best.result.final.engine)
+    bound = _bound(found) if whole else 0.0
+    result, doubt = result_under(best.result, bound, nothing)
+    best = replace(best, result=result)
+    certificate = _certificate(best, bound, doubt, details.method, nothing, problem.tolerance)
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 
 
+def _bound(found: list[StarDesign]) -> float:
+    """The least of the bounds of all stars; zero where one has none."""
+    return min(each.result.certificate.lower_bound if each.result.certificate else 0.0 for each in found)
+
+
 def _certificate(
-    found: list[StarDesign], whole: bool, method: str, nothing: float, tolerance: float
+    best: StarDesign, bound: float, doubt: float, method: str, nothing: float, tolerance: float
 ) -> Certificate | None:  # fmt: skip
-    """By the least of the bounds of all stars; by zero where some were left out."""
-    own = [each.result.certificate for each in found]
-    best = own[0]
-    if best is None:
+    """By a bound of all stars."""
+    own = best.result.certificate
+    if own is None:
         return None
-    bounds = [c.lower_bound for c in own if c is not None]
-    bound = min(bounds) if whole and len(bounds) == len(own) else 0.0
-    text = f"{method}; of the best: {best.method}"
-    return certified(found[0].value, bound, nothing, tolerance, Reach.NEAR, best.kkt_residual, text)
+    text = f"{method}; of the best: {own.method}"
+    return certified(best.value, bound, nothing, tolerance, Reach.NEAR, own.kkt_residual, text, doubt)
 
 
 def _method(found: list[StarDesign], designs: int) -> str:

@@ -177,8 +177,8 @@ def _rank(numbers: Array) -> tuple[float, float]:
     return max(-min(rooms, default=0.0), KEPT), float(value)
 
 
-Bounded: TypeAlias = Callable[[float, float], Divided]
-"""What no design goes under, where one of this value is known and another by less than this room no better."""
+Bounded: TypeAlias = Callable[[float, float, Design], Divided]
+"""What no design goes under, where one of this value is known and another by less than this room no better; the one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -213,7 +213,7 @@ def proven(program: LocalProgram, best: Array, bounded: Bounded) -> Proven:
             room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine))
             # boxes do not make good what few angles read too much
             value -= over_read(problem, found.design.evaluation)
-        found = replace(found, divided=bounded(value, room))
+        found = replace(found, divided=bounded(value, room, found.design))
         places = [program.place(x) for x in found.divided.places]
         if not places or found.divided.bound >= value - room:
             break

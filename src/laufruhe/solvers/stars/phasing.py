@@ -20,7 +20,7 @@ from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.prove.throws.firing_share import firing_bound
-from laufruhe.solvers.conclusion import quoted
+from laufruhe.solvers.conclusion import quoted, result_under
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.answers import Answer, Decided, searched
 from laufruhe.solvers.stars.conclusion import no_star, with_star
@@ -188,7 +188,9 @@ def by_each_order(
     proof = best.result.certificate
     how, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
     reach = Reach.WHOLE if most is None else Reach.ASIDE
-    certificate = certified(best.value, bound, nothing, problem.tolerance, reach, residual, how)
+    result, doubt = result_under(best.result, bound, nothing)
+    best = replace(best, result=result)
+    certificate = certified(best.value, bound, nothing, problem.tolerance, reach, residual, how, doubt)
     ranking = _entries(phasing, [best, *sorted(solved, key=lambda one: one.value)], orders, bound, complete)
     details = ranking_result(phasing, best.candidate, ranking, count * len(sets), len(solved), method)
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
@@ -258,11 +260,13 @@ def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
     else:
         why = f"each of the best {counted(len(fired), 'star')} breaks a limit between angles that the search looks at"
         return no_star(problem, f"{why}; raise phasing.best or fidelity.samples", Status.FAILED)
-    value = result.objective.value if result.objective else best.value
     shared = firing_bound(problem, result.final) if result.objective and not any(phasing.opened) else 0.0
+    bound, nothing = max(answer.bound, shared), nothing_of(problem)
+    result, doubt = result_under(result, bound, nothing)
+    value = result.objective.value if result.objective else best.value
     certificate = certified(
-        value, max(answer.bound, shared), nothing_of(problem), problem.tolerance, Reach.WHOLE,
-        result.certificate.kkt_residual if result.certificate else 0.0, answer.method,
+        value, bound, nothing, problem.tolerance, Reach.WHOLE,
+        result.certificate.kkt_residual if result.certificate else 0.0, answer.method, doubt,
     )  # fmt: skip
     ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in left)]
     count = sum(family.size for family in families_of(phasing, problem.feels_order)[0])

@@ -10,7 +10,8 @@ import numpy as np
 
 from laufruhe.load_models.affine import FEASIBLE, AffineNorm, AffineProblem
 from laufruhe.load_models.star_model import StarModel, StarProblem
-from laufruhe.prove.certificate import Multipliers, best_bound, gap_of
+from laufruhe.numerics.arrays import Array
+from laufruhe.prove.certificate import Bound, Multipliers, best_bound, check_dual, gap_of
 from laufruhe.prove.throws.star_cut import Cut, cut_of
 from laufruhe.solvers.conclusion import KEPT
 from laufruhe.solvers.cones.conic import solve_cones
@@ -76,7 +77,7 @@ def solve_design(
         return None, None
     if not any(kept):
         return _fixed(sound, whole, star, built)
-    best: tuple[Solved, Multipliers] | None = None
+    best: tuple[Solved, Bound, Array] | None = None
     for samples in _grids(full):
         solution = solve_cones(_acting(_only(model.at(samples).at(star), kept), idle))
         if solution.x is None:
@@ -89,14 +90,18 @@ def solve_design(
                 continue
         bound = best_bound(_acting(averaged, idle), solution.x, solution.multipliers)
         value, excess = whole.objective(solution.x), _acting(whole, idle).excess(solution.x)
-        # where the angles forbid what averages allow, what is proven at the angles is too much
-        least = bound.value if excess <= FEASIBLE else min(bound.value, value)
-        best = (Solved(star, built, value, least), _with_idle(bound.multipliers, sound, idle))
+        best = (Solved(star, built, value, bound.value), bound, solution.x)
         # what averages fall short by, no grid of this fidelity gains; a design alone is as good at few angles
-        enough = gap_of(averaged.objective(solution.x), least, nothing) <= 0.25 * tolerance or not proves
+        enough = gap_of(averaged.objective(solution.x), bound.value, nothing) <= 0.25 * tolerance or not proves
         if enough and excess <= FEASIBLE:
             break
-    return (None, None) if best is None else (best[0], cut_of(sound, best[1]))
+    if best is None:
+        return None, None
+    solved, bound, x = best
+    cut = cut_of(sound, _with_idle(bound.multipliers, sound, idle))
+    own = float(cut.bounds(np.array([star]), [built], owners)[0, 0])
+    check_dual("cuts of stars, at their own star", own, _acting(averaged, idle), x, bound)
+    return solved, cut
 
 
 def coarse_value(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int]) -> float:
@@ -171,7 +176,7 @@ def _fixed(
     value = whole.objective(np.zeros(whole.size))
     terms = tuple(n.subgradient(x) for _, n in averaged.terms)
     limits = tuple(np.zeros_like(n.constant) for _, n in averaged.limits)
-    return Solved(star, built, value, min(averaged.objective(x), value)), cut_of(sound, Multipliers(terms, limits))
+    return Solved(star, built, value, averaged.objective(x)), cut_of(sound, Multipliers(terms, limits))
 
 
 def _grids(full: int) -> list[int]:

@@ -118,7 +118,7 @@ def search_stars(
         search.run()
     least = float(best.values[0]) if len(best.values) else float("inf")
     bound = objective.least(space) if search.ended else least
-    return StarsFound(best.stars, best.values, min(bound, least), not search.ended, search.looked_at)
+    return StarsFound(best.stars, best.values, bound, not search.ended, search.looked_at)
 
 
 def best_starts(space: StarSpace, objective: CoupleObjective, count: int, known: Stars | None = None) -> BestStars:

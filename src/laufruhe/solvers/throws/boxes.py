@@ -20,7 +20,7 @@ from laufruhe.load_models.throw_waves import ThrowWaves, WaveNorm
 from laufruhe.machine.firing_windows import SLACK, FiringBounds, FiringWindow
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, Grid
-from laufruhe.prove.best_first import Box, halves
+from laufruhe.prove.best_first import EMPTY, Box, Over, halves
 from laufruhe.prove.certificate import ROUNDING, Multipliers, minorant
 from laufruhe.prove.throws.arcs import ArcBox, Arcs
 from laufruhe.solvers.cones.conic import solve_cones
@@ -185,44 +185,46 @@ class ThrowPrograms:
 
     def box(
         self, program: Program, lower: Array, upper: Array, floor: float, cut: float, is_new: bool = False
-    ) -> ThrowBox | None:
-        """The bound of a box, cut down to where a design may be better than `cut`; None where none is."""
-        found = None
+    ) -> ThrowBox | Over:
+        """The bound of a box, cut down to where a design may be better than `cut`; or that none is."""
+        found: ThrowBox | Over = EMPTY
         for _ in range(_ROUNDS):
             within = program.window.within(lower, upper)
             if within is None:
-                return None
+                return EMPTY
             lower, upper = within
             found = self._bounded(program, lower, upper, floor, cut, is_new)
-            if found is None or float(np.sum(found.upper - found.lower)) > _WORTH * float(np.sum(upper - lower)):
+            if isinstance(found, Over) or float(np.sum(found.upper - found.lower)) > _WORTH * float(
+                np.sum(upper - lower)
+            ):
                 return found
             lower, upper, floor = found.lower, found.upper, found.bound
         return found
 
     def _bounded(
         self, program: Program, lower: Array, upper: Array, floor: float, cut: float, is_new: bool
-    ) -> ThrowBox | None:
+    ) -> ThrowBox | Over:
         """By one program."""
         columns = self._riders.columns(*self.waves.arcs(lower, upper))
         arcs_of = ArcBox(self.waves.orders[: self._low], lower, upper)
         if is_new and self._is_known(program, columns, arcs_of, cut):
-            return None
+            return Over(cut)
         mixed = Mixed(program, columns, lower, upper, self.waves.orders[: self._low])
         solution = solve_cones(mixed.problem)
         found = solution.multipliers
         if solution.x is None:
             if self._is_excluded(program, columns, found, arcs_of):
                 self._remember(found)
-                return None
+                return EMPTY
             return ThrowBox(program, lower, upper, floor, 0.5 * (lower + upper), upper - lower)
         value, arcs = self._under(program.rows, columns, found, arcs_of)
         value -= self.left_out
         if value >= cut:
             self._remember(found)
-            return None
+            return Over(value)
         kept = arcs.kept(cut - value)
         if kept is None:
-            return None
+            return Over(cut)
         middle, spread = mixed.middle(solution.x)
         middle = np.clip(middle, *kept)
         at, _ = self.waves.arcs(middle, middle)
@@ -230,7 +232,7 @@ class ThrowPrograms:
             spread[pin] += float(program.pulls[column]) * distance
         return ThrowBox(program, *kept, max(value, floor), middle, spread)
 
-    def parts(self, box: ThrowBox, cut: float) -> Iterator[ThrowBox | None]:
+    def parts(self, box: ThrowBox, cut: float) -> Iterator[ThrowBox | Over]:
         """A box cut where its mixture is farthest from standing at one angle."""
         width = box.upper - box.lower
         pulled = np.where(width > NARROWEST, box.spread, 0.0)

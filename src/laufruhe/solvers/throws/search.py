@@ -7,18 +7,24 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 
+import numpy as np
+
 from laufruhe.errors import ModelError
 from laufruhe.load_models.throw_waves import ThrowWaves, averaged, averages
 from laufruhe.load_models.uneven_model import rides_of
 from laufruhe.machine.firing_windows import FiringWindow
 from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.witness import EXCESS
 from laufruhe.problem.evaluation import over
 from laufruhe.problem.measure import load_rows
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.prove.best_first import Over
 from laufruhe.prove.certificate import room_of
+from laufruhe.prove.witness import Known, thin
 from laufruhe.solvers.boxes.search import Search, divided
+from laufruhe.solvers.conclusion import FEASIBLE, read_under
 from laufruhe.solvers.stars.design import StarDesign
 from laufruhe.solvers.stars.ranking import ranked_orders
 from laufruhe.solvers.throws.boxes import ThrowBox, ThrowPrograms
@@ -29,6 +35,7 @@ from laufruhe.solvers.throws.windows import (
     design_at,
     firing_of,
     nearest,
+    place_in,
     stay,
     turn_freely,
     windows_of,
@@ -142,7 +149,7 @@ def search_throws(
         return None
     most = len(search.roots) + (MOST_BOXES if problem.search.boxes is None else problem.search.boxes)
     found, bound, boxes = divided(search, _Part(floor), _Best(best), nothing, search.reached, most, search.what)
-    return Searched(min(bound, search.cut(found.value)), found.design, boxes, search.conflict, search.what)
+    return Searched(bound, found.design, boxes, search.conflict, search.what)
 
 
 def loss_of(waves: ThrowWaves, problem: Problem) -> Callable[[int], float]:
@@ -169,6 +176,7 @@ class ThrowSearch(Search[_Part, _Best]):
         self._best, self._not_met = _Best(best), set[str]()
         # of one angle there are few boxes, so that steps may be many
         self.most_samples, self.steps_cost = (6144, 2e-5) if self._is_one_angle else (MOST_SAMPLES, STEPS_COST)
+        self._finest: Stage | None = None
         self.roots: list[tuple[Stage, FiringWindow, tuple[str, ...]]] = []
         free = all(decision.set.lower <= 0.0 for decision in problem.unbalances)
         for built in phasing.shafts.largest if free else phasing.shafts.allowed:
@@ -269,7 +277,37 @@ class ThrowSearch(Search[_Part, _Best]):
         """What a design has to be better than."""
         return value * (1.0 - SHARE * self._problem.tolerance)
 
-    def parts(self, part: _Part, value: float) -> Iterator[tuple[_Part | None, _Best | None]]:
+    def known(self, found: _Best) -> Known | None:
+        """Return the best design as a witness of bounds; None where there is none."""
+        best = found.design
+        if best is None or best.result.final.excess(best.result.problem.limits) > FEASIBLE:
+            return None
+        return Known(np.array(best.candidate.throws), best.value, lambda: self._most(best))
+
+    def _most(self, best: StarDesign) -> float:
+        """Return what the objective of a design is not over, with what its samples may have missed."""
+        nothing, result = nothing_of(self._problem), best.result
+        read = read_under(result.problem, result.final, best.value, math.inf, nothing)
+        return read.value + read.doubt + nothing
+
+    def around(self, found: _Best) -> _Part | Over | None:
+        """Return a thin box of throws around a design, and its bound; None where it is an image of one that is kept."""
+        best, stage = found.design, self._finest
+        if best is None or stage is None:
+            return None
+        for _, window, left_out in self.roots:
+            place = place_in(self._phasing, window, best.candidate)
+            if left_out == best.candidate.left_out and place is not None:
+                programs, most = stage.programs, self._most(best) * (1.0 + EXCESS)
+                box = programs.box(programs.program(window), *thin(place, *window.box), 0.0, most)
+                return box if isinstance(box, Over) else _Part(box.bound, box, stage, left_out)
+        return None
+
+    def level(self, value: float) -> float:
+        """Boxes are cut as far as no design in what is cut off is better than that."""
+        return self.cut(value)
+
+    def parts(self, part: _Part, value: float) -> Iterator[tuple[_Part | Over, _Best | None]]:
         """Windows of all throws, halves of a box."""
         box, stage, cut = part.box, part.stage, self.cut(value)
         if box is None or stage is None:
@@ -288,12 +326,13 @@ class ThrowSearch(Search[_Part, _Best]):
                 yield self._looked(stage, half, part.left_out)
 
     def _looked(
-        self, stage: Stage, found: ThrowBox | None, left_out: tuple[str, ...]
-    ) -> tuple[_Part | None, _Best | None]:
+        self, stage: Stage, found: ThrowBox | Over, left_out: tuple[str, ...]
+    ) -> tuple[_Part | Over, _Best | None]:
         """A box, and a better design near its middle."""
         self._not_met |= stage.programs.told
-        if found is None:
-            return None, None
+        self._finest = stage
+        if isinstance(found, Over):
+            return found, None
         self._seen += 1
         moving = self._tried < _MOST_TRIED and (self._seen <= _TRIED_FIRST or self._seen % _TRIED_EACH == 0)
         stands = self._stood < _MOST_STANDING and float(found.spread.max()) < _STANDING

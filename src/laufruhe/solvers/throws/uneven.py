@@ -28,7 +28,7 @@ from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified
 from laufruhe.prove.throws.uneven import steady_bound, uneven_bound
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, quoted, unbalances_of
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, quoted, result_under, unbalances_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.nonlinear import solve_nonlinear, try_all
 from laufruhe.solvers.smooth.program import TURN, SmoothProgram
@@ -97,7 +97,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         return no_star(problem, why, Status.FAILED)
     if not found:
         return _none(problem, phasing, searched)
-    trade = [replace(point, lower_bound=max(point.lower_bound, min(floor, point.value))) for point in trade]
+    trade = [replace(point, lower_bound=max(point.lower_bound, floor)) for point in trade]
     return _result(problem, phasing, even, found, tuple(trade), floor, source)
 
 
@@ -283,12 +283,12 @@ def _result(
     problem: Problem, phasing: Phasing, even: Result | None, found: Sequence[StarDesign],
     trade: tuple[TradePoint, ...], bound: float, source: str,
 ) -> Result:  # fmt: skip
-    best = found[0]
+    nothing = nothing_of(problem)
+    result, doubt = result_under(found[0].result, bound, nothing)
+    best = replace(found[0], result=result)
     method = f"IPOPT from {counted(len(found), 'start')}, firing orders kept; bound from {source}"
     # no norm lies under zero: who reaches it is done
-    certificate = certified(
-        best.value, bound, nothing_of(problem), problem.tolerance, Reach.NEAR, best.kkt_residual, method
-    )
+    certificate = certified(best.value, bound, nothing, problem.tolerance, Reach.NEAR, best.kkt_residual, method, doubt)
     ranking = [
         ranked_star(replace(phasing, firing_order=d.candidate.firing_order), d.candidate, None, d.value, 0.0, False)
         for d in _different(found)

@@ -13,12 +13,13 @@ import numpy as np
 from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.uneven_model import rotor_states
 from laufruhe.machine.firing import from_one
-from laufruhe.machine.firing_windows import FiringBounds, FiringWindow
+from laufruhe.machine.firing_windows import SLACK, FiringBounds, FiringWindow
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Term
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Sector
+from laufruhe.prove.witness import thin
 
 MOST_WINDOWS = 6_000
 
@@ -63,6 +64,24 @@ def design_at(phasing: Phasing, angles: Array) -> Candidate:
     turned = layout.side(0) * float(angles[count:].sum()) if phasing.throw_bounds is None else 0.0
     throws = tuple(float(angle + turned) % math.tau for angle in angles[:count])
     return Candidate(throws, None, geometry[0], geometry[1])
+
+
+def place_in(phasing: Phasing, window: FiringWindow, candidate: Candidate) -> Array | None:
+    """Return throws and open angles of a design as boxes of a window have them; None where it does not keep that."""
+    if window.order and window.order != candidate.firing_order:
+        return None
+    layout = phasing.layout(*phasing.least_geometry)
+    geometry = (candidate.bank_angle, candidate.split_pin)
+    beside = [float(angle or 0.0) for angle, is_open in zip(geometry, phasing.opened, strict=True) if is_open]
+    turned = layout.side(0) * sum(beside) if phasing.throw_bounds is None else 0.0
+    low, high = window.box
+    throws = np.array(candidate.throws) - turned
+    # the same throw, at the turn that is nearest to the middle of its box
+    own = slice(0, len(throws))
+    throws = throws + math.tau * np.round((0.5 * (low[own] + high[own]) - throws) / math.tau)
+    place = np.append(throws, beside)
+    inside = np.all(place >= low - SLACK) and np.all(place <= high + SLACK)
+    return np.clip(place, low, high) if inside and window.within(*thin(place, low, high)) is not None else None
 
 
 def stay(phasing: Phasing, candidate: Candidate) -> bool:

@@ -17,7 +17,7 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.tolerances.error_parts import Terms
-from laufruhe.prove.tolerances.worst_case import MOST_NODES, worst_case
+from laufruhe.prove.tolerances.worst_case import MOST_NODES, check_worst, worst_case
 from laufruhe.solvers.conclusion import KEPT
 
 QUICK = 1
@@ -86,6 +86,8 @@ class EveryError:
         built = BuiltEngines(self.problem, values, self.samples)
         columns, most = self.problem.tolerances.columns, MOST_NODES if proven else QUICK
         found = worst_case(built.terms, columns, self.tolerance, most=most)
+        if proven:
+            check_worst(built.terms, columns, found)
         errors, limits, divisions = [found.errors], [], found.nodes
         broken: list[str] = []
         finely = {self.samples: built}

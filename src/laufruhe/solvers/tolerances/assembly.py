@@ -29,6 +29,7 @@ from laufruhe.prove.best_first import Division, Parts, Waiting
 from laufruhe.prove.certificate import Proof, Reach, certified
 from laufruhe.prove.tolerances.error_parts import Terms
 from laufruhe.prove.tolerances.worst_case import value_at
+from laufruhe.prove.witness import Known, check_around
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import KEPT, limit_values
 from laufruhe.solvers.result import Result, Status
@@ -38,6 +39,8 @@ from laufruhe.solvers.values import ObjectiveValue
 
 MOST_NODES, STEPS, RANDOM = 20_000, 8, 2000
 """Parts of all assemblies that are bounded, steps of each bound, and assemblies at random that are shown."""
+FREE = 3
+"""Cylinders that are left without a part around a known assembly."""
 LENGTHS = np.linspace(0.0, 1.0, 9)[1:]
 PER_KILOGRAM = 0.01
 """Mass that is added to find what a kilogram does [kg]: small beside a piston."""
@@ -136,15 +139,25 @@ class _Search(Division[Chosen]):
     def run(self) -> float:
         """The best assembly, and what none goes under."""
         free: Chosen = tuple((-1,) * self.cylinders for _ in self.lots)
-        return min(self.divide((self._bound(free), free), MOST_NODES), self._enough)
+        found = self.divide((self.bound(free), free), MOST_NODES)
+        check_around(self, self.best, Known(self._mass(self.best), self.value))
+        return found
+
+    def around(self, chosen: Chosen) -> Chosen:
+        """Return assemblies that differ from one in the last few cylinders that are chosen for alone."""
+        free = set(self.order[-FREE:])
+        return tuple(
+            tuple(-1 if (lot, k) in free else part for k, part in enumerate(own)) for lot, own in enumerate(chosen)
+        )
 
     @property
-    def _enough(self) -> float:
+    def enough(self) -> float:
+        """Bound from which no assembly of a node is better by half the tolerance."""
         return self.value * (1.0 - 0.5 * self.tolerance)
 
     def is_done(self, one: Waiting[Chosen]) -> bool:
         """Whether no assembly of it is better by half the tolerance."""
-        return one.bound >= self._enough
+        return one.bound >= self.enough
 
     def parts(self, taken: Sequence[Waiting[Chosen]]) -> Parts[Chosen]:
         """Every part that is left in the cylinder that counts most of those without one."""
@@ -155,8 +168,7 @@ class _Search(Division[Chosen]):
                 continue
             own = tuple(part if k == cylinder else old for k, old in enumerate(node[lot]))
             child = (*node[:lot], own, *node[lot + 1 :])
-            bound = max(self._bound(child), under)
-            yield (bound, child) if bound < self._enough else None
+            yield max(self.bound(child), under), child
 
     def _mass(self, chosen: Chosen) -> Array:
         """What every cylinder has more: to and fro, then turning."""
@@ -171,8 +183,8 @@ class _Search(Division[Chosen]):
             self.best, self.value = chosen, value
         return value
 
-    def _bound(self, node: Chosen) -> float:
-        """What no assembly of a node goes under; those that come up are tried."""
+    def bound(self, node: Chosen) -> float:
+        """Return what no assembly of a node goes under; those that come up are tried."""
         if all(part >= 0 for parts in node for part in parts):
             return self._try(node)
         point, best = self._middle(node), -math.inf
@@ -185,7 +197,7 @@ class _Search(Division[Chosen]):
             end = self._mass(corner)
             best = max(best, value + float(slope @ (end - point)))
             self._try(corner)
-            if best >= self._enough or value - best <= 0.1 * self.tolerance * value:
+            if best >= self.enough or value - best <= 0.1 * self.tolerance * value:
                 break
             tried = [(value_at(self.terms, point + share * (end - point)), share) for share in LENGTHS]
             point = point + min(tried)[1] * (end - point)

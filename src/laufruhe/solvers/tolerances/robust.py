@@ -21,15 +21,16 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.numerics.progress import tell, within
 from laufruhe.numerics.spectrum import common_base
+from laufruhe.numerics.witness import is_over
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.evaluation import finely, objective_value
+from laufruhe.problem.evaluation import fine_samples, finely, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.problem.tolerance import Over
 from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, judged, unbalances_of
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, READINGS, Shown, judged, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import conflict_of, is_empty, tightened
 from laufruhe.solvers.result import Result, Status
@@ -137,7 +138,14 @@ def _found(problem: Problem, over: Over, start: tuple[Value, ...], drawing: Resu
     found = _least_share(problem, drawn, start, over.share, nothing)
     # of errors that lie alike to both sides half of all engines are no better than the drawing (R9)
     bound = drawing.certificate.lower_bound if drawing.certificate and tolerances.is_affine else 0.0
-    return drawn, replace(found, bound=bound if problem.decisions else found.found.bound)
+    found = replace(found, bound=bound if problem.decisions else found.found.bound)
+    for _ in in_time(range(READINGS)):
+        if not is_over(found.bound, found.found.bound, nothing):
+            break
+        drawn = replace(drawn, samples=fine_samples(found.samples))
+        level = _level(drawn, found.values, over.share)
+        found = replace(found, found=replace(found.found, value=level, bound=level), samples=drawn.samples)
+    return drawn, found
 
 
 def _check(problem: Problem) -> None:
@@ -259,7 +267,8 @@ def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], 
     if not problem.decisions:
         # an engine that was found is built, whatever else is: what it breaks is broken, and what it has is had
         built = evaluated(problem.built(found.errors[0]), start, seeker.samples)
-        return replace(best, bound=objective_value(problem, finely(built)), conflict=found.broken)
+        best = replace(best, bound=objective_value(problem, finely(built)), conflict=found.broken)
+        return _read_under(seeker, best, nothing)
     program, values, bound = _Program(problem, nothing), start, 0.0
     program.add([np.zeros(problem.tolerances.count)])
     samples, level, before, known = program.angles // COARSER, 0.0, math.inf, True
@@ -295,7 +304,17 @@ def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], 
             break
     if not best.found.proven or best.samples < seeker.samples:
         best = replace(best, found=seeker.at(best.values, proven=True), samples=seeker.samples)
-    return replace(_kept(program, seeker, best), bound=bound)
+    return _read_under(seeker, replace(_kept(program, seeker, best), bound=bound), nothing)
+
+
+def _read_under(seeker: Adversary, best: Least, nothing: float) -> Least:
+    """Return a design with its engines measured at so many angles that the bound of all designs lies under them."""
+    for _ in in_time(range(READINGS)):
+        if not is_over(best.bound, best.found.bound, nothing):
+            break
+        seeker = replace(seeker, samples=fine_samples(best.samples))
+        best = replace(best, found=seeker.at(best.values, proven=True), samples=seeker.samples)
+    return best
 
 
 def _kept(program: _Program, seeker: Adversary, best: Least) -> Least:
@@ -315,6 +334,11 @@ def _kept(program: _Program, seeker: Adversary, best: Least) -> Least:
     return best
 
 
+def _level(seeker: DrawnEngines, values: Sequence[Value], share: float) -> float:
+    """Return the objective that a share of the drawn engines stays below."""
+    return float(np.sort(seeker.objective(values))[math.ceil(share * len(seeker.errors)) - 1])
+
+
 def _least_share(
     problem: Problem, seeker: DrawnEngines, start: tuple[Value, ...], share: float, nothing: float
 ) -> Least:
@@ -330,5 +354,5 @@ def _least_share(
         best, values = each, each.values
     if best is None:
         raise ModelError("no design was found within the time limit; raise it")
-    level = float(np.sort(seeker.objective(best.values))[below - 1])
-    return replace(best, found=replace(best.found, value=level, bound=level))
+    level = _level(seeker, best.values, share)
+    return replace(best, found=replace(best.found, value=level, bound=level), samples=seeker.samples)

@@ -1,0 +1,207 @@
+"""Bounders broken on purpose, one of each family: what they say of a known design gives them away."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import laufruhe
+from attack.families import problem as random_problem
+from laufruhe.errors import BoundError
+from laufruhe.files.reader import load_tables, tables_of
+from laufruhe.load_models.affine import AffineNorm
+from laufruhe.numerics.processes import Processes
+from laufruhe.numerics.witness import STRICT, check_bound, collected
+from laufruhe.numerics.workers import each
+from laufruhe.prove import certificate
+from laufruhe.prove.boxes.leads import LeadBoxes
+from laufruhe.prove.boxes.monotone import OneWayProblem
+from laufruhe.prove.boxes.shared_gas import SharedGasBoxes
+from laufruhe.prove.boxes.sizes import SizeBoxes
+from laufruhe.prove.boxes.twist import TwistBoxes
+from laufruhe.prove.certificate import Proof
+from laufruhe.prove.mounts.design_boxes import DesignBoxes
+from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bound
+from laufruhe.prove.springs.search import SpringBoxes
+from laufruhe.prove.throws.star_cut import Cut
+from laufruhe.prove.tolerances import worst_case
+from laufruhe.solvers.boxes import places
+from laufruhe.solvers.conclusion import judged, known_of
+from laufruhe.solvers.mounts import convex
+from laufruhe.solvers.mounts.bounds import mount_numbers
+from laufruhe.solvers.result import Status
+from laufruhe.solvers.stars import answers
+from laufruhe.solvers.throws import uneven
+from laufruhe.solvers.throws.boxes import ThrowPrograms
+from laufruhe.solvers.tolerances import assembly
+from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft, written
+
+INPUTS = Path(__file__).parent / "inputs"
+Break = Callable[[pytest.MonkeyPatch], None]
+
+
+def scaled(owner: Any, name: str, change: Callable[[Any], Any]) -> Break:
+    """Change whatever a function returns."""
+    whole = getattr(owner, name)
+
+    def broken(*given: Any, **named: Any) -> Any:
+        return change(whole(*given, **named))
+
+    return lambda patch: patch.setattr(owner, name, broken)
+
+
+def times(factor: float) -> Callable[[Any], Any]:
+    return lambda found: found * factor
+
+
+def first_times(factor: float) -> Callable[[Any], Any]:
+    return lambda found: (found[0] * factor, *found[1:])
+
+
+def value_times(factor: float) -> Callable[[Any], Any]:
+    return lambda found: replace(found, value=found.value * factor)
+
+
+def least_times(factor: float) -> Callable[[Any], Any]:
+    return lambda found: replace(found, lower_bound=found.lower_bound * factor)
+
+
+def bound_times(factor: float) -> Callable[[Any], Any]:
+    return lambda found: replace(found, bound=found.bound * factor)
+
+
+BROKEN = {
+    "dual rows": ("flat-four", scaled(certificate, "lower_bound", value_times(1.001))),
+    "half a price": ("locomotive-balanced-share", scaled(AffineNorm, "dual_norm", times(0.5))),
+    "cuts of stars": ("two-stroke-four-open", scaled(Cut, "_sums", times(1.02))),
+    "stars by their couples": ("vee-twenty-open", scaled(answers, "search_stars", least_times(1.02))),
+    "windows of throws": ("inline-nine-uneven", scaled(uneven, "uneven_bound", lambda found: found + 1e3)),
+    "throws": ("steam-two-crank", scaled(ThrowPrograms, "_under", first_times(1.02))),
+    "the flywheel": ("scotch-yoke-steam-pump", scaled(OneWayProblem, "least", times(1.02))),
+    "discs and shafts": ("inline-five-damper", scaled(TwistBoxes, "_bound", first_times(1.01))),
+    "sizes": ("worked-diesel-sizes", scaled(SizeBoxes, "objective", times(1.01))),
+    "leads": ("geared-three-leads", scaled(LeadBoxes, "bound", value_times(1.01))),
+    "places": ("tractor-four-shaft-heights", scaled(places._Search, "box", bound_times(1.01))),
+    "spring forces": ("powertrain-joined-springs", scaled(SpringBoxes, "relaxed", first_times(1.01))),
+    "matrix inequalities": ("powertrain-torque-roll", scaled(convex, "dual_bound", first_times(1.001))),
+    "assemblies": ("selective-assembly", scaled(assembly._Search, "bound", times(1.001))),
+}
+"""A ready problem of a family, and what breaks its bounder."""
+
+ROBUST = (
+    changed(FOUR, "1.25 kg", "2 kg ± 2 %")
+    + """[[operating_points]]
+speed = "2500 rpm"
+[objective]
+minimise = "rms mount force"
+[fidelity]
+samples = 48
+[robust]
+"""
+    + MOUNTS
+    + shaft("left", 2, "60 mm", 'unbalance = { between = ["0 kg m", "0.05 kg m"] }\nradius = "20 mm"\nangle = 180')
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BROKEN)
+def test_a_broken_bounder_is_an_error(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    problem, broken = BROKEN[name]
+    broken(monkeypatch)
+    with pytest.raises(BoundError, match="contradicts a known design"):
+        laufruhe.solve(PROBLEMS / f"{problem}.toml")
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [scaled(worst_case, "bounded", bound_times(0.99)), scaled(certificate, "lower_bound", value_times(1.001))],
+    ids=["the worst engine", "dual rows"],
+)
+def test_a_broken_bounder_of_built_engines(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, broken: Break) -> None:
+    problem = written(tmp_path, ROBUST)
+    broken(monkeypatch)
+    with pytest.raises(BoundError):
+        laufruhe.solve(problem)
+
+
+def test_a_broken_bounder_by_expansions(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = laufruhe.load(INPUTS / "zero-width.toml")
+    problem = replace(problem, search=replace(problem.search, boxes=None))
+    design = judged(problem, [250e3])
+    known = known_of(design, mount_numbers(design))
+    found = divided_bound(problem, design.value, 1e-4 * design.value, known)
+    assert 0.999 * design.value <= found.bound <= design.value * (1.0 + 1e-9)
+    scaled(StiffnessBoxes, "_bounds", first_times(1.001))(monkeypatch)
+    with pytest.raises(BoundError, match="boxes of stiffness"):
+        divided_bound(problem, design.value, 1e-4 * design.value, known)
+
+
+@pytest.mark.slow
+def test_a_broken_bounder_of_mounts_with_unbalances(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = laufruhe.load(random_problem("joint", 780003)[0])
+    scaled(DesignBoxes, "_bound", first_times(1.05))(monkeypatch)
+    with pytest.raises(BoundError, match="boxes of mounts, with unbalances"):
+        laufruhe.solve(problem)
+
+
+@pytest.mark.slow
+def test_a_broken_bounder_of_leads_between_shared_chambers(monkeypatch: pytest.MonkeyPatch) -> None:
+    told = dict(tables_of(PROBLEMS / "opposed-pistons-lead.toml"))
+    told.pop("counterweights", None)
+    told["engine"] = {**told["engine"], "crank_lead": {"between": [4, 16]}}
+    told |= {"objective": {"minimise": "rms roll moment"}, "tolerance": 1e-2, "fidelity": {"samples": 180}}
+    scaled(SharedGasBoxes, "_bounded", times(1.01))(monkeypatch)
+    with pytest.raises(BoundError):
+        laufruhe.solve(load_tables(told, Path("shared.toml")))
+
+
+def test_parts_are_left_out_in_one_place_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever a search says of what is enough, its bound is that of all parts: the gap grows, and no more."""
+    monkeypatch.setattr(assembly._Search, "enough", property(lambda _: -math.inf))
+    found = laufruhe.solve(PROBLEMS / "selective-assembly.toml")
+    assert found.certificate is not None
+    assert found.certificate.kind is Proof.WITHIN_GAP
+    assert found.objective is not None
+    assert found.certificate.lower_bound < found.objective.value
+
+
+def test_a_proof_that_contradicts_a_design_is_withheld(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(STRICT)
+    scaled(certificate, "lower_bound", value_times(1.001))(monkeypatch)
+    found = laufruhe.solve(PROBLEMS / "flat-four.toml")
+    assert found.status is Status.FEASIBLE
+    assert found.certificate is not None
+    assert found.objective is not None
+    assert (found.certificate.kind, found.certificate.lower_bound) == (Proof.NONE, 0.0)
+    assert "its proof is withheld" in found.message
+    assert "please report it" in found.message
+    (bound, value) = map(float, re.findall(r"bound of (\S+) contradicts a known design of (\S+)", found.message)[0])
+    assert bound > value > 0.0
+
+
+def test_workers_report_what_they_met(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No report leaves a worker process by itself: it comes with the answer."""
+    monkeypatch.delenv(STRICT)
+    with Processes(1) as executor, collected() as reports:
+        assert [answer for _, answer in each(contradicted, [2.0], executor)] == [2.0]
+    assert [(error.bound, error.value) for error in reports] == [(2.0, 1.0)]
+
+
+def contradicted(bound: float) -> float:
+    check_bound("a piece of work", bound, 1.0)
+    return bound
+
+
+def test_bounds_and_values_are_compared_to_a_rounding() -> None:
+    assert check_bound("", 1.0 + 5e-10, 1.0)
+    assert check_bound("", 1.0 + 5e-4, 1.0, nothing=1e-3)
+    for bound, value in ((1.0 + 2e-9, 1.0), (math.nan, 1.0), (math.inf, 1.0), (1.0, math.nan)):
+        with pytest.raises(BoundError):
+            check_bound("a bound", bound, value)
+    assert check_bound("", math.inf, math.inf)

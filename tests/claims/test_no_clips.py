@@ -1,0 +1,99 @@
+"""No bound is brought down to a value: what is proven is said raw, and compared with what is known."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import laufruhe
+
+SOURCE = Path(laufruhe.__file__).parent
+ROOMS = ("prove", "solvers")
+LEAST, MOST = {"min", "minimum", "fmin", "clip"}, {"max", "maximum", "fmax"}
+VALUES = {"value", "enough", "known", "best", "level", "most"}
+"""Names of what is known of designs."""
+BOUNDS = ("bound", "divide", "floor", "found", "least", "looked", "total")
+"""What names of bounds have in them."""
+ALLOWED = {
+    # what is shown of designs under a level is so of all up to it, and parts that are cut off are not under theirs
+    "min(looked[0], first.level)",
+    "min(best, self.level)",
+    "min(self._least, found.level)",
+    "min(queue[0].bound if queue else math.inf, self._least, self.level)",
+    # the least of the bounds of several stars
+    "min(known, float(star_bounds(costs, stars[[np.argmin(over)]])[0]))",
+    # what springs do at most, and how much is worth looking at
+    "min(most, line.largest)",
+    "min(firing.most, firing.cycle.angle - (len(constants) - 1) * firing.least)",
+    "min(most, bounds[name].work(value / term.weight))",
+    "min(first, enough)",
+    "min(second, enough)",
+}
+"""Calls that look alike and bring no bound down."""
+
+
+def names_of(node: ast.expr) -> set[str]:
+    """Names in an expression."""
+    found = {each.attr for each in ast.walk(node) if isinstance(each, ast.Attribute)}
+    return found | {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
+
+
+def is_value(node: ast.expr) -> bool:
+    """Whether an expression is what is known of a design, as it stands or a share of it."""
+    if isinstance(node, ast.Call) and node.args:
+        return is_value(node.args[-1])
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult):
+        return is_value(node.left)
+    name = node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")
+    return name.strip("_") in VALUES
+
+
+def clips(text: str) -> Iterator[str]:
+    """Calls of least and largest in which a bound and something that is known of a design meet."""
+    for node in ast.walk(ast.parse(text)):
+        if not isinstance(node, ast.Call) or len(node.args) < 2 or node.keywords:
+            continue
+        called = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        values = [each for each in node.args if is_value(each)]
+        bounds = [each for each in node.args if each not in values and is_bound(each)]
+        # an upper bound is a lower one with the other sign
+        raised = called in MOST and any(isinstance(each, ast.UnaryOp) for each in bounds)
+        if values and bounds and (called in LEAST or raised):
+            yield ast.unparse(node)
+
+
+def is_bound(node: ast.expr) -> bool:
+    """Whether an expression has the name of a bound in it."""
+    return any(part in name for name in names_of(node) for part in BOUNDS)
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_no_bound_is_brought_to_a_value(room: str) -> None:
+    found = {
+        (path.relative_to(SOURCE).as_posix(), clip)
+        for path in sorted((SOURCE / room).rglob("*.py"))
+        for clip in clips(path.read_text(encoding="utf-8"))
+        if clip not in ALLOWED
+    }
+    assert not found
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "bound = float(min(max(bound, 0.0), value))",
+        "return min(max(found, 0.0), most), pull, middle",
+        "bound = max(min(bound + mean.constant, self.most), mean.floor)",
+        "return min(total, self.value), pull",
+        "found = Searched(min(bound, search.cut(found.value)), found.design)",
+        "shown = Shown(bound=min(bound, design.value))",
+        "return min(self.divide(root, 10), self._enough.value)",
+        "return WorstCase(errors, value, max(value, -bound), seen)",
+        "least = np.minimum(bounds, value)",
+    ],
+)
+def test_clips_are_found(line: str) -> None:
+    assert list(clips(line))
