@@ -63,7 +63,7 @@ def measured(name: str, control: str, folder: Path) -> np.ndarray:
         with launched() as browser, watched(browser, viewport={"width": 1400, "height": 1000}) as seen:
             page = seen.page
             page.goto(address)
-            page.locator('#optimum[data-stage="settled"]').wait_for(timeout=PATIENCE)
+            page.locator('#claim[data-last="true"]').wait_for(timeout=PATIENCE)
             asked = {"control": control, "moves": MOVES, "spacing": SPACING}
             page.evaluate(SLIDE, {**asked, "moves": 10})
             found = page.evaluate(SLIDE, asked)

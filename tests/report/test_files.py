@@ -161,13 +161,29 @@ def test_an_error_leaves_all_as_it_was(tmp_path: Path) -> None:
     assert held(tmp_path / "set") == (set(NAMES), {"old"})
 
 
-@pytest.mark.parametrize("noted", ["{}", "[]", "", '{"made_by": "solve"}', "\0"])
+@pytest.mark.parametrize(
+    "noted",
+    ["{}", "[]", "", '{"made_by": "solve"}', "\0", "[" * 9999, '{"made_by": "solve", "files": 5}',
+     '{"made_by": [1], "files": ["file-0"]}'],
+)  # fmt: skip
 def test_a_spoilt_note_owns_nothing(noted: str, tmp_path: Path) -> None:
     make(tmp_path / "set", "old")
     (tmp_path / "set" / MADE).write_text(noted)
     with pytest.raises(InputError, match="did not make"):
         make(tmp_path / "set", "new")
     assert held(tmp_path / "set") == (set(NAMES), {"old"})
+
+
+@pytest.mark.parametrize("named", ['["gone"]', '["../other"]', "[1, null, [2]]", '["a\\u0000b", "/etc/hostname", "."]'])
+def test_a_note_of_what_is_not_there_brings_nothing(named: str, tmp_path: Path) -> None:
+    """A file of results that a user took away stood in the way of the next run, and others were copied in."""
+    (tmp_path / "other").write_text("mine")
+    (tmp_path / "set").mkdir()
+    (tmp_path / "set" / MADE).write_text(f'{{"made_by": "trade", "files": {named}}}')
+    with staged(Set(tmp_path / "set", "--out", "trade", ["new"], adds=True)) as stage:
+        files.write(stage / "new", "new")
+    assert sorted(path.name for path in (tmp_path / "set").iterdir()) == [MADE, "new"]
+    assert json.loads((tmp_path / "set" / MADE).read_text())["files"] == ["new"]
 
 
 def test_what_came_in_the_meantime_stays(tmp_path: Path) -> None:

@@ -41,25 +41,27 @@ def tight() -> dict[str, Any]:
     return settle(LANCHESTER, edits=(TIGHT,))
 
 
-def test_what_follows_brackets_what_is_proven(tight: dict[str, Any]) -> None:
+def test_what_follows_is_an_estimate_of_what_is_proven(tight: dict[str, Any]) -> None:
     found = follow(LANCHESTER, edits=(TIGHT,))
-    proven = tight["optimum"]
-    assert tight["status"] == "optimal"
-    assert found["stage"] == "following"
-    assert found["optimum"]["bound"] <= proven["value"] * (1 + 1e-6)
-    assert found["optimum"]["value"] == pytest.approx(proven["value"], rel=2e-3)
-    assert found["optimum"]["proof"] == "global within gap"
+    proven = tight["claim"]
+    assert proven["kind"] == "proven"
+    assert found["claim"]["kind"] == "estimate"
+    assert not found["claim"]["is_last"]
+    assert found["claim"]["value"] == pytest.approx(proven["value"], rel=2e-3)
+    assert found["claim"]["value"] >= proven["value"] * (1 - 1e-6)
     (limit,) = found["limits"]
     assert limit["active"]
     assert limit["price"] == pytest.approx(tight["limits"][0]["price"], rel=0.02)
     assert limit["value"] <= 0.5 * (1 + 1e-6)
+    assert "about " in limit["words"]
+    assert "about " not in tight["limits"][0]["words"]
 
 
 def test_what_is_proven_is_what_the_command_finds(tight: dict[str, Any]) -> None:
     result = laufruhe.solve(load(LANCHESTER).with_values({"constraints.balancer mass.max": "0.5 kg"}))
     assert result.objective is not None
-    assert tight["optimum"]["value"] == pytest.approx(result.objective.value, rel=1e-9)
-    assert tight["optimum"]["design"] == pytest.approx({d.name: d.value for d in result.decisions})
+    assert tight["claim"]["value"] == pytest.approx(result.objective.value, rel=1e-9)
+    assert tight["design"] == pytest.approx({d.name: d.value for d in result.decisions})
 
 
 def test_a_model_is_sent_once_and_again_where_loads_are_others() -> None:
@@ -68,20 +70,21 @@ def test_a_model_is_sent_once_and_again_where_loads_are_others() -> None:
     assert "model" not in follow(LANCHESTER, has=first["key"], edits=(TIGHT,))
     faster = follow(LANCHESTER, has=first["key"], edits=(Edit("set", "operating_points.1.speed", "3000 rpm"),))
     assert faster["model"]["designs"]["given"] != first["model"]["designs"]["given"]
-    assert faster["optimum"]["value"] > first["optimum"]["value"]
+    assert faster["claim"]["value"] > first["claim"]["value"]
 
 
 @pytest.mark.parametrize(
-    ("name", "but"),
+    ("name", "kind", "words"),
     [
-        ("tractor-four-lanchester", []),
-        ("study-soft-mounts", ["what loads are not affine in held as given"]),
-        ("tractor-four-robust", ["no tolerances"]),
-        ("single-three-balances", ["the first objective alone"]),
+        ("tractor-four-lanchester", "estimate", "mean mount force"),
+        ("tractor-four-elastic", "held", "mean mount force of order 2, 4, 6, 8 for these mounts"),
+        ("tractor-four-robust", "held", "mean mount force without tolerances"),
+        ("deltic-row", "held", "rms shaking force without later objectives"),
     ],
 )
-def test_what_is_left_out_while_sliders_move_is_said(name: str, but: list[str]) -> None:
-    assert follow(PROBLEMS / f"{name}.toml")["but"] == but
+def test_what_is_left_out_while_sliders_move_is_said(name: str, kind: str, words: str) -> None:
+    claim = follow(PROBLEMS / f"{name}.toml")["claim"]
+    assert (claim["kind"], claim["words"]) == (kind, words)
 
 
 def test_a_design_that_breaks_a_limit_is_no_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -89,9 +92,9 @@ def test_a_design_that_breaks_a_limit_is_no_optimum(monkeypatch: pytest.MonkeyPa
     broken = replace(result, status=Status.FAILED, message="the best design found breaks 'sag'")
     monkeypatch.setattr(answers, "solve", lambda *_, **__: broken)
     found = settle(PROBLEMS / "tractor-single.toml")
-    assert found["optimum"] is None
-    assert found["status"] == "failed"
-    assert "breaks 'sag'" in found["message"]
+    assert found["design"] is None
+    assert found["claim"]["kind"] == "no design"
+    assert "breaks 'sag'" in found["claim"]["words"]
 
 
 def test_limits_that_contradict_each_other_are_named() -> None:
@@ -103,10 +106,11 @@ def test_limits_that_contradict_each_other_are_named() -> None:
         json.loads(answers.follow(of, Asked(edits))),
         json.loads(answers.settle(of, Asked(edits), 600.0)),
     ):
-        assert found["optimum"] is None
+        assert found["design"] is None
+        assert found["claim"]["kind"] == "no design"
         assert sorted(found["conflict"]) == ["balancer mass", "maximum mount force"]
         assert len(found["limits"]) == 2
-    assert json.loads(answers.follow(of, Asked()))["optimum"] is not None
+    assert json.loads(answers.follow(of, Asked()))["design"] is not None
 
 
 @pytest.mark.parametrize(
@@ -139,7 +143,7 @@ def test_numbers_that_were_not_offered_are_refused(name: str) -> None:
         {"edits": [["set", 1, 1]]}, {"edits": [["set", "x", [[[1]]]]]}, {"edits": [["set", "x", "1" * 101]]},
         {"edits": [["set", "x", 1]] * 301}, {"edits": [["set", "x", True]]}, {"has": "x" * 101}, {"design": {"a": "b"}},
         {"design": []}, {"edits": [["set", "x", 10**400]]}, {"design": {"a": float("inf")}},
-        {"edits": [["set", "x", {"a": {"b": 1}}]]},
+        {"edits": [["set", "x", {"a": {"b": 1}}]]}, {"position": "1"}, {"position": 1.5}, {"position": True},
     ],
 )  # fmt: skip
 def test_what_no_page_asks_is_refused(given: object) -> None:
@@ -159,13 +163,16 @@ def test_what_a_page_asks_is_read() -> None:
 def test_a_crank_is_ranked_held_and_chosen() -> None:
     found = settle(VEE)
     assert len(found["ranking"]) == 5
-    assert found["optimum"]["value"] == pytest.approx(found["ranking"][0]["value"], rel=1e-4)
+    assert found["claim"]["value"] == pytest.approx(found["ranking"][0]["value"], rel=1e-4)
     held = tuple(Edit(*edit) for edit in found["holds"])
-    following = follow(VEE, held=held)["optimum"]
-    assert following["bound"] <= found["optimum"]["value"] <= following["value"] * (1 + 1e-3)
+    following = follow(VEE, held=held)["claim"]
+    assert following["kind"] == "held"
+    assert "for this crank" in following["words"]
+    assert found["claim"]["value"] <= following["value"] * (1 + 1e-6)
+    assert following["value"] == pytest.approx(found["claim"]["value"], rel=5e-3)
     second = found["ranking"][1]
     chosen = settle(VEE, edits=(Edit("star", "star", second["orders"][0]["star"]),))
-    assert chosen["optimum"]["value"] == pytest.approx(second["value"], rel=1e-4)
+    assert chosen["claim"]["value"] == pytest.approx(second["value"], rel=1e-4)
     assert chosen["ranking"] == []
 
 
@@ -189,14 +196,14 @@ def test_pictures_are_those_of_what_was_solved_last() -> None:
 
 
 def test_the_state_is_saved_as_a_problem_that_evaluates_alike(tight: dict[str, Any], tmp_path: Path) -> None:
-    asked = Asked(edits=(TIGHT,), design=tight["optimum"]["design"])
+    asked = Asked(edits=(TIGHT,), design=tight["design"])
     told = json.loads(answers.save(source(LANCHESTER), asked))
     path = tmp_path / told["file"]
     path.write_text(told["toml"], encoding="utf-8")
     found = laufruhe.evaluate(path)
     assert found.objective is not None
     # at fewer angles than it was proven at
-    assert found.objective.value == pytest.approx(tight["optimum"]["value"], rel=1e-5)
+    assert found.objective.value == pytest.approx(tight["claim"]["value"], rel=1e-5)
     assert found.problem.limits[0].maximum == pytest.approx(0.5)
     assert len(found.problem.decisions) == len(load(LANCHESTER).decisions)
 
@@ -207,8 +214,31 @@ def test_a_front_comes_as_a_whole_first_and_no_point_is_dominated() -> None:
     assert {by_mass[0]["across"], by_mass[-1]["across"]} == {point["across"] for point in points[:2]}
     values = [point["value"] for point in by_mass]
     assert values == sorted(values, reverse=True)
-    assert all(point["bound"] <= point["value"] for point in points)
+    assert all(point["bound"]["value"] <= point["value"] * (1 + 1e-6) for point in points)
+    assert all("no design has less than" in point["words"] for point in points)
     # the optimum under a limit is on the front of that limit
     found = follow(LANCHESTER, edits=(Edit("set", "constraints.1.max", f"{by_mass[4]['across']!r} kg"),))
-    assert found["optimum"]["value"] == pytest.approx(by_mass[4]["value"], rel=1e-4)
+    assert found["claim"]["value"] == pytest.approx(by_mass[4]["value"], rel=1e-4)
     assert "is no measure" in json.loads(answers.front(source(LANCHESTER), Asked(), "beauty", 0))["error"]
+
+
+def test_a_front_of_a_simpler_problem_has_no_bound() -> None:
+    path = PROBLEMS / "tractor-four-elastic.toml"
+    point = json.loads(answers.front(source(path), Asked(), "balancer mass", 0))
+    assert point["bound"] is None
+    assert point["simpler"] == " for these mounts"
+    assert "no design" not in point["words"]
+
+
+def test_files_that_a_problem_names_are_part_of_its_state() -> None:
+    first, other = (replace(source(LANCHESTER), content=content) for content in ("a", "b"))
+    keys = [json.loads(answers.follow(of, Asked(has="later")))["key"] for of in (first, other, first)]
+    assert keys[0] == keys[2] != keys[1]
+
+
+@pytest.mark.slow
+def test_pictures_of_other_files_are_not_shown() -> None:
+    first = replace(source(LANCHESTER), content="a")
+    answers.settle(first, Asked(), 600.0)
+    assert json.loads(answers.picture(first, Asked(), 0))["name"] == "engine"
+    assert json.loads(answers.picture(replace(first, content="b"), Asked(), 0)) == {"done": True}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -9,9 +10,10 @@ import pytest
 
 from laufruhe.errors import InputError
 from laufruhe.server.watched import Watched
-from problem_files import FOUR, MOUNTS, written
+from problem_files import FOUR, MOUNTS, PROBLEMS, written
 
 TEXT = FOUR + '[[operating_points]]\nspeed = "2500 rpm"\n' + MOUNTS
+INPUTS = Path(__file__).parents[1] / "claims" / "inputs"
 PATIENCE = 120.0
 
 
@@ -68,3 +70,39 @@ def test_nothing_beyond_the_folder_is_read(name: str, tmp_path: Path) -> None:
     gas = f'[gas]\nmodel = "trace"\nfile = "{name}"\n'
     with pytest.raises(InputError, match=r"gas\.file = .*outside the folder of the problem"):
         Watched(written(folder, TEXT + gas))
+
+
+@pytest.mark.parametrize(
+    ("name", "beside"),
+    [
+        ("rank-all-cranks", "page-trace.csv"),
+        ("car-four-willans", "car-four-fuel.csv"),
+        ("powertrain-measured-mount", "hydraulic-mount.csv"),
+        ("selective-assembly", "selective-assembly-rods.csv"),
+    ],
+)
+def test_every_file_that_a_problem_names_is_watched(name: str, beside: str, tmp_path: Path) -> None:
+    """A pressure trace, a fuel test, a dynamic stiffness and a list of parts."""
+    folder = INPUTS if name == "rank-all-cranks" else PROBLEMS
+    for path in folder.glob("*.csv"):
+        shutil.copy(path, tmp_path)
+    shutil.copy(folder / f"{name}.toml", tmp_path)
+    made = Watched(tmp_path / f"{name}.toml")
+    made.start()
+    try:
+        first, other = made.source, tmp_path / beside
+        text = other.read_text(encoding="utf-8")
+        saved(other, text + "# measured again\n")
+        assert made.later(1, PATIENCE) == 2
+        assert made.complaint == ""
+        assert made.source.tables == first.tables
+        assert made.source.content != first.content
+        other.unlink()
+        assert made.later(2, PATIENCE) == 3
+        assert beside in made.complaint
+        saved(other, text)
+        assert made.later(3, PATIENCE) == 4
+        assert made.complaint == ""
+        assert made.source.content == first.content
+    finally:
+        made.close()

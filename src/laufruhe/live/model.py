@@ -18,16 +18,16 @@ from laufruhe import units
 from laufruhe.errors import ModelError
 from laufruhe.files import edits
 from laufruhe.files.complaints import Refused
-from laufruhe.live.parts import Curve, Design, LiveModel, Proved, Shown, Slider
+from laufruhe.live.parts import Curve, Design, LiveModel, Reference, Shown, Slider
 from laufruhe.live.saving import saved
-from laufruhe.live.signals import Signal, signal_of
+from laufruhe.live.signals import NORMS_OF_PAGE, Signal, signal_of
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN
 from laufruhe.present.measures import places_of
-from laufruhe.problem.channels import CHANNELS
+from laufruhe.problem.channels import CHANNELS, Channel
 from laufruhe.problem.decision import Decision, Domain, Kind, vector_of
-from laufruhe.problem.dependence import depends
+from laufruhe.problem.dependence import Dependence, dependence, depends
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
@@ -39,7 +39,7 @@ from laufruhe.solvers.result import Result
 ON_BLOCK = ("shaking force", "rocking couple", "roll moment")
 HOW, HERE = "laufruhe page {file} follows it", "decided here, or moved beside"
 OBJECTIVE = "objective"
-NOTHING = "Forces are in proportion to nothing that is open here, so this page has no sliders."
+NOTHING = "Nothing that is open here can be moved live."
 
 
 def live_model(problem: Problem, result: Result, is_served: bool = False) -> LiveModel:
@@ -97,9 +97,9 @@ def _filled(
 ) -> LiveModel:
     model = AffineModel(moving)
     kinds = {decision.kind for decision in moving.decisions}
-    # why a measure does not follow sliders, and when its value is known
-    known = "it is measured when they rest" if is_served else f"its value is that of the design decided; {HOW}"
-    aside = f"does not follow sliders in proportion, so {known.format(file=bare.file)}"
+    # where the value of a measure is known that the page cannot follow
+    known = "it is measured when sliders rest" if is_served else f"its value is that of the design decided; {HOW}"
+    aside = f"cannot be followed live; {known.format(file=bare.file)}"
     collected = _Collected(model, kinds, result, aside)
     curves = _curves(collected, result)
     measures = collected.measures()
@@ -115,7 +115,7 @@ def _filled(
         curves=curves,
         measures=measures,
         designs=tuple(_design(name, x, moving, model.domains, collected.asked) for name, x in designs),
-        proved=_proved(result),
+        reference=None if is_served else _reference(result),
         unmoved=(*bare.unmoved, *collected.unmoved),
     )
 
@@ -149,25 +149,30 @@ class _Collected:
             found += self._shown(limit.measure, "limit", limit.name, limit)
         return tuple(found)
 
+    def _is_affine(self, channel: Channel) -> bool:
+        """Return True for a channel that is known to be affine in what slides, or constant."""
+        found = {dependence(channel, kind, self.model.problem) for kind in self.kinds}
+        return found <= {Dependence.NONE, Dependence.AFFINE}
+
     def _shown(
         self, measure: Measure, role: str, name: str, limit: Limit | None = None, weight: float = 1.0
     ) -> list[Shown]:
         stays = not depends(measure.channel, self.kinds, self.model.problem)
-        is_affine = measure.is_mass or (measure.is_load and not measure.channel.feels_inertia)
-        if not stays and not is_affine:
-            self.unmoved.append((name, self.aside))
-        self.asked.append(None if stays or not is_affine else measure)
+        follows = (measure.is_mass or measure.is_load) and self._is_affine(measure.channel)
+        follows = follows and measure.norm.name in NORMS_OF_PAGE
+        self.asked.append(measure if follows and not stays else None)
         base = Shown(role, name, measure.unit, measure.norm.name, measure.norm.refinement, None, weight, _sides(limit))
-        if not stays and not is_affine:
-            known = self.decided.get(name)
-            base = replace(base, followed=False)
-            return [replace(base, value=known.value, sides=((known.side, known.limit),)) if known else base]
-        if not stays:
-            return [replace(base, signal=self.signal(measure))]
-        if limit is None:
+        if stays and limit is None:
             return [replace(base, value=self.model.bare.value(measure))]
-        found = self.model.bare.standing(limit)
-        return [replace(base, sides=((found.side, found.edge),), value=found.value, met=found.excess <= 1e-6)]
+        if stays and limit is not None:
+            found = self.model.bare.standing(limit)
+            return [replace(base, sides=((found.side, found.edge),), value=found.value)]
+        if follows:
+            return [replace(base, signal=self.signal(measure))]
+        self.unmoved.append((name, self.aside))
+        known = self.decided.get(name)
+        base = replace(base, followed=False, value=math.nan)
+        return [replace(base, value=known.value, sides=((known.side, known.limit),)) if known else base]
 
 
 def _sides(limit: Limit | None) -> tuple[tuple[str, float], ...]:
@@ -221,8 +226,8 @@ def _design(name: str, x: Array, moving: Problem, domains: Sequence[Domain], ask
     return Design(name, tuple(map(float, x)), tuple(told))
 
 
-def _proved(result: Result) -> Proved | None:
-    """Of the objective as it is shown; None where something else was bounded."""
+def _reference(result: Result) -> Reference | None:
+    """Return what the objective is compared with as it is shown; None where another one was bounded."""
     if result.problem.over is not None or not result.decisions:
         return None
     certificate, objective = result.certificate, result.objective
@@ -230,8 +235,8 @@ def _proved(result: Result) -> Proved | None:
         return None
     if result.ranks:
         first = result.ranks[0]
-        return Proved(first.least, first.lower_bound, first.gap, str(first.proof))
-    return Proved(objective.value, certificate.lower_bound, certificate.gap, str(certificate.kind))
+        return Reference.of(first.least, first.proof, first.gap)
+    return Reference.of(objective.value, certificate.kind, certificate.gap)
 
 
 def _still(problem: Problem, how: str) -> Iterator[tuple[str, str]]:

@@ -12,6 +12,8 @@ import numpy as np
 from laufruhe.live.packing import Block, packed, with_unit
 from laufruhe.live.saving import NOT_SAVED, Saved
 from laufruhe.live.signals import Signal
+from laufruhe.present.numbers import trimmed
+from laufruhe.prove.certificate import Proof
 
 VERSION = 1
 MOST_MB = 2.0
@@ -68,8 +70,6 @@ class Shown:
         Sense and edge of a limit, "at most" or "at least" [SI].
     value
         Of what stays.
-    met
-        Whether what stays keeps the limit.
     followed
         Whether it is known of every design; else its value is that of the design decided.
     """
@@ -83,7 +83,6 @@ class Shown:
     weight: float = 1.0
     sides: tuple[tuple[str, float], ...] = ()
     value: float = 0.0
-    met: bool = True
     followed: bool = True
 
 
@@ -105,13 +104,21 @@ class Design:
 
 
 @dataclass(frozen=True)
-class Proved:
-    """What was proven of the objective [SI]."""
+class Reference:
+    """A design that others are compared with: its objective [SI], and what it is called."""
 
     value: float
-    bound: float
-    gap: float
-    kind: str
+    name: str
+    is_proven: bool
+
+    @classmethod
+    def of(cls, value: float, proof: Proof, gap: float) -> Reference:
+        """Name a design by what was proven of it."""
+        if proof is Proof.GLOBAL:
+            return cls(value, "the proven optimum", True)
+        if proof is Proof.WITHIN_GAP:
+            return cls(value, f"the best design found (gap {trimmed(100.0 * gap, 2)} %)", False)
+        return cls(value, "the best design found (a local optimum)", False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,6 +133,8 @@ class LiveModel:
         Of the crank in a cycle.
     designs
         As given, as decided where that is another, and one between the bounds that checks the page's own sums.
+    reference
+        What the objective is compared with; None where a server says it.
     unmoved
         What is open or asked and does not follow the sliders: a name, and why.
     why_not
@@ -144,7 +153,7 @@ class LiveModel:
     designs: tuple[Design, ...] = ()
     objective: str = ""
     unit: str = ""
-    proved: Proved | None = None
+    reference: Reference | None = None
     unmoved: tuple[tuple[str, str], ...] = ()
     save: Saved = NOT_SAVED
     why_not: str = ""
@@ -173,7 +182,7 @@ class LiveModel:
     def as_json(self) -> str:
         """What `show` of the page takes; safe inside an HTML element."""
         signals, data = self._packed
-        as_they_are = ("name", "title", "file", "points", "turns", "sliders", "curves", "proved", "save")
+        as_they_are = ("name", "title", "file", "points", "turns", "sliders", "curves", "reference", "save")
         plain = {
             "version": VERSION,
             **{key: getattr(self, key) for key in as_they_are},

@@ -18,6 +18,8 @@ from laufruhe.problem.evaluation import over
 from laufruhe.problem.measure import Measure, bends_of, selected
 
 PEAK = NORMS["maximum"]
+NORMS_OF_PAGE = frozenset({"mean", "maximum", "rms", "peak to peak", "worst mean"})
+"""Norms that the page's scripts know; a measure of another one cannot be followed live."""
 NOTHING = 1e-13
 """Share of the largest order that all orders left out come to at the most."""
 

@@ -233,13 +233,17 @@ def _note(folder: Path, verb: str, names: list[str] | None) -> None:
 
 
 def _made(folder: Path) -> tuple[str, frozenset[str]]:
-    """The command that made what is in a folder, and names; none where it is no folder of results."""
+    """Return the command that made what is in a folder, and names of its files there; none if it is no such folder."""
     try:
         noted: Any = json.loads((folder / MADE).read_text(encoding="utf-8"))
-        names = [entry.name for entry in folder.iterdir()] if noted["files"] is None else noted["files"]
-        return str(noted["made_by"]), frozenset(map(str, names))
+        verb, names = noted["made_by"], noted["files"]
+        here = {entry.name for entry in folder.iterdir() if names is None or entry.is_file()}
+        if isinstance(verb, str) and isinstance(names, list | None):
+            # a name that stands nowhere, or elsewhere, is nobody's
+            return verb, frozenset(here if names is None else here.intersection(map(str, names)))
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return "", frozenset()
+        pass
+    return "", frozenset()
 
 
 def _swept(left: Path, place: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -20,37 +19,38 @@ from laufruhe.files.toml_text import toml_text
 from laufruhe.live import decided
 from laufruhe.present.numbers import figure
 from laufruhe.present.pictures import PICTURES
-from laufruhe.problem.dependence import depends
+from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Proof
 from laufruhe.report.web_page import inlined
 from laufruhe.server import told
-from laufruhe.server.asked import CRANK, LATER, Asked, Edit
+from laufruhe.server.asked import CRANK, LATER, STAR, Asked, Edit
+from laufruhe.server.claims import Simpler, breaks_words, conflict_claim, given_claim, preview_claim, settled_claim
 from laufruhe.server.controls import as_json, as_typed, controls_of, offered_by
 from laufruhe.server.front import Front, partners, places
 from laufruhe.server.held import held_by, ranking_of
-from laufruhe.server.scenes import Scene, key_of, scene_of
-from laufruhe.solvers import kinds_of, solve
+from laufruhe.server.scenes import scene_of
+from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import decision_values, limit_values
-from laufruhe.solvers.following import Followed
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.values import LimitValue
 from laufruhe.units import readable
 
 P = ParamSpec("P")
 
-ROUNDING = 1e-5
-"""Share of the objective that a program at few angles does not tell from nothing."""
-
 
 @dataclass(frozen=True)
 class Source:
-    """The problem's file as it was last read."""
+    """The problem's file as it was last read.
+
+    Attributes
+    ----------
+    content
+        Hash of the files that it names.
+    """
 
     tables: Mapping[str, Any]
     path: Path
+    content: str = ""
 
 
 _fronts: dict[str, object] = {}
@@ -58,15 +58,27 @@ _solved: dict[str, Result] = {}
 
 
 @lru_cache(maxsize=4)
-def _offered(text: str, path: Path) -> tuple[str, ...]:
+def _as_filed(text: str, path: Path) -> tuple[tuple[str, ...], dict[str, Kind]]:
+    """Return the names that a page is offered, and the kinds of the open numbers, as the file has them."""
     tables = json.loads(text)
-    return tuple(offered_by(tables, load_tables(tables, path)))
+    problem = load_tables(tables, path)
+    return tuple(offered_by(tables, problem)), {decision.name: decision.kind for decision in problem.decisions}
+
+
+def _of_file(source: Source) -> tuple[tuple[str, ...], dict[str, Kind]]:
+    return _as_filed(json.dumps(source.tables, default=str), source.path)
+
+
+def _held_kinds(source: Source, asked: Asked) -> set[Kind]:
+    """Return the kinds of open numbers that the page holds as they were decided."""
+    _, kinds = _of_file(source)
+    return {Kind.STAR if edit.name == STAR else kinds[edit.name] for edit in asked.held}
 
 
 def _asked_about(source: Source, asked: Asked, with_held: bool) -> tuple[dict[str, Any], Problem]:
     """Tables and problem of a request, through the same reading as files (`InputError`)."""
     with in_file(source.path.name):
-        asked.check(_offered(json.dumps(source.tables, default=str), source.path))
+        asked.check(_of_file(source)[0])
         tables = asked.tables(source.tables, with_held)
     return tables, load_tables(tables, Path(source.path))
 
@@ -122,51 +134,35 @@ def follow(source: Source, asked: Asked) -> dict[str, Any]:
     """The optimum of what loads are affine in, all else as it stands, in milliseconds."""
     began, spent = time.perf_counter(), time.process_time()
     tables, problem = _asked_about(source, asked, with_held=True)
-    scene = scene_of(problem, tables)
-    follows = scene.follower.at(problem.limits) if scene.follower else None
-    own: dict[str, Any] = {"key": scene.key, "stage": "following" if follows else "given"}
-    own["but"] = list(scene.simplified(bool(asked.held)))
+    scene = scene_of(problem, tables, source.content)
+    found = scene.follower.at(problem.limits) if scene.follower else None
+    design, simpler = scene.evaluated(found), scene.simpler(_held_kinds(source, asked))
+    limits = scene.standing(problem.limits, design, found)
+    value = objective_value(scene.problem, design) if scene.problem.objective else None
+    if found is None:
+        claim = given_claim(asked.position, scene.problem, value, limits)
+    elif found.conflict:
+        claim = conflict_claim(asked.position, found.conflict, simpler)
+    else:
+        assert value is not None
+        claim = preview_claim(asked.position, scene.problem, value, simpler, limits)
+    decided = found is not None and not found.conflict
+    own: dict[str, Any] = {
+        **told.answer(claim, limits, problem, found.conflict if found else ()),
+        "key": scene.key,
+        "design": told.design(scene.problem, found.values) if found is not None and decided else None,
+    }
     if asked.has not in (scene.key, LATER):
-        own |= scene.drawn(follows)
-    if follows is None or follows.conflict:
-        standing = () if scene.given.resonance else limit_values(problem, scene.given)
-        own |= {"optimum": None, "limits": told.limits(standing, problem)}
-    if follows is None and scene.value is not None:
-        own["given"] = told.figures(scene.value, problem)
-    elif follows is not None and follows.conflict:
-        own["conflict"] = list(follows.conflict)
-    elif follows is not None:
-        own |= _followed(follows, problem, scene)
+        own |= scene.drawn(problem.limits, design, found)
     took = {"wall": time.perf_counter() - began, "processor": time.process_time() - spent}
     return {**own, "seconds": took}
-
-
-def _followed(found: Followed, problem: Problem, scene: Scene) -> dict[str, Any]:
-    limits = [
-        _standing(x, value, price, found, scene)
-        for x, value, price in zip(problem.limits, found.standing, found.prices, strict=True)
-    ]
-    # at few angles nothing is proven but the bound
-    own = told.optimum(scene.problem, found.values, found.value, found.bound, found.gap, str(Proof.WITHIN_GAP))
-    return {"optimum": own, "limits": told.limits(limits, problem)}
-
-
-def _standing(limit: Limit, value: float, price: float, found: Followed, scene: Scene) -> LimitValue:
-    """How a design that follows stands to a limit; no number where only the whole solve tells."""
-    if math.isfinite(value) and limit.maximum < math.inf:
-        # a price that would not move the objective by its rounding is none
-        active = price * limit.maximum > ROUNDING * found.value
-        return LimitValue(limit.name, value, limit.maximum, limit.measure.unit, active, price if active else 0.0)
-    (given,) = limit_values(scene.problem.changed(limits=(limit,)), scene.given)
-    moves = depends(limit.measure.channel, kinds_of(scene.problem), scene.problem)
-    return replace(given, value=math.nan, active=False, shadow_price=math.nan) if moves else given
 
 
 @_said
 def measure(source: Source, asked: Asked) -> dict[str, Any]:
     """The design that is shown by the exact model: objective and limits, those too that do not follow sliders."""
     tables, whole = _asked_about(source, asked, with_held=True)
-    problem = replace(scene_of(whole, tables).problem, limits=whole.limits)
+    problem = replace(scene_of(whole, tables, source.content).problem, limits=whole.limits)
     values = decided(problem, asked.design)
     evaluation = evaluate(problem.held([values[decision.name] for decision in problem.decisions]))
     limits = {limit.name: limit.value for limit in limit_values(problem, evaluation)}
@@ -183,21 +179,21 @@ def settle(source: Source, asked: Asked, seconds: float) -> dict[str, Any]:
     except SolverError as error:
         return {"error": f"{source.path.name}: {error}"}
     _solved.clear()
-    _solved[_state(asked)] = result
-    return {**_settled(result, tables), "seconds": time.perf_counter() - began}
+    _solved[_state(source, asked)] = result
+    return {**_settled(result, tables, asked.position), "seconds": time.perf_counter() - began}
 
 
-def _state(asked: Asked) -> str:
-    return repr(asked.edits)
+def _state(source: Source, asked: Asked) -> str:
+    return repr((source.content, source.tables, asked.edits))
 
 
 @_said
-def picture(_: Source, asked: Asked, k: int) -> dict[str, Any]:
+def picture(source: Source, asked: Asked, k: int) -> dict[str, Any]:
     """A picture of what was solved last, as its report has it; nothing where there is none any more."""
     from laufruhe import plots
     from laufruhe.plots.style import as_svg
 
-    result = _solved.get(_state(asked))
+    result = _solved.get(_state(source, asked))
     names = [] if result is None else plots.names(result)
     if result is None or k >= len(names):
         return {"done": True}
@@ -205,33 +201,23 @@ def picture(_: Source, asked: Asked, k: int) -> dict[str, Any]:
     return {"name": names[k], "caption": PICTURES[names[k]], "image": image, "of": len(names)}
 
 
-def _settled(result: Result, tables: Mapping[str, Any]) -> dict[str, Any]:
-    problem, own = result.problem, result.certificate
-    found: dict[str, Any] = {
-        "stage": "settled",
-        "status": str(result.status),
-        "message": result.message,
-        "conflict": list(result.conflict),
-        "limits": told.limits(result.limits, problem),
-        "optimum": None,
+def _settled(result: Result, tables: Mapping[str, Any], position: int) -> dict[str, Any]:
+    has_design = result.status.has_design
+    claim = settled_claim(position, result)
+    return {
+        **told.answer(claim, result.limits, result.problem, result.conflict),
+        "design": {entry.name: entry.value for entry in result.decisions} if has_design else None,
         "ranking": ranking_of(result),
         "holds": held_by(result, tables),
     }
-    designed = result.status.has_design
-    if designed and result.objective is not None and own is not None:
-        found["optimum"] = {
-            **told.optimum(problem, (), result.objective.value, own.lower_bound, own.gap, str(own.kind)),
-            "design": {entry.name: entry.value for entry in result.decisions},
-            "method": own.method,
-        }
-    return found
 
 
-def _front(source: Source, asked: Asked, across: str) -> Front:
+def _front(source: Source, asked: Asked, across: str) -> tuple[Front, Simpler]:
     tables, whole = _asked_about(source, asked, with_held=True)
-    problem = replace(scene_of(whole, tables).problem, limits=whole.limits)
-    limits = tuple((limit.name, limit.maximum) for limit in problem.limits)
-    key = f"{key_of(tables)} {across} {limits}"
+    scene = scene_of(whole, tables, source.content)
+    problem = replace(scene.problem, limits=whole.limits)
+    edges = [(limit.name, limit.minimum, limit.maximum, limit.outside) for limit in problem.limits]
+    key = f"{scene.key} {across} {edges}"
     if _fronts.get("key") != key:
         own = partners(problem)
         if across not in own:
@@ -240,13 +226,13 @@ def _front(source: Source, asked: Asked, across: str) -> Front:
         _fronts.update(key=key, front=Front(problem, own[across]))
     found = _fronts["front"]
     assert isinstance(found, Front)
-    return found
+    return found, scene.simpler(_held_kinds(source, asked))
 
 
 @_said
 def front(source: Source, asked: Asked, across: str, k: int) -> dict[str, Any]:
     """A point of the front against another measure; nothing where there is none any more."""
-    own = _front(source, asked, across)
+    own, simpler = _front(source, asked, across)
     most = next(islice(places(*own.ends()), k, None), None)
     if most is None:
         return {"done": True}
@@ -254,10 +240,25 @@ def front(source: Source, asked: Asked, across: str, k: int) -> dict[str, Any]:
     if point.conflict:
         return {"skipped": True}
     problem, unit = own.problem, own.across.unit
+    design = evaluate(problem.held(point.values))
     (shown_unit, factor), (of_unit, of_factor) = readable(unit), readable(problem.objective_unit or "")
-    axes = {"across": [shown_unit, factor], "value": [of_unit, of_factor]}
-    shown = told.optimum(problem, point.values, point.value, point.bound, point.gap, "")
-    return {**shown, "across": point.standing[-1], "axes": axes, "acrossText": figure(point.standing[-1], unit)}
+    # a bound of a simpler problem is none of the whole one
+    bound = None if simpler else {"at": most, "value": point.bound}
+    place, value = design.value(own.across), objective_value(problem, design)
+    text = f"{figure(place, unit)}: {figure(value, problem.objective_unit or '')}"
+    least = f"; no design has less than {figure(point.bound, problem.objective_unit or '')}" if bound else ""
+    # limits on numbers are not asked of a front
+    breaks = breaks_words(limit_values(replace(problem, limits=own.others), design))
+    return {
+        "across": place,
+        "value": value,
+        "bound": bound,
+        "design": told.design(problem, point.values),
+        "axes": {"across": [shown_unit, factor], "value": [of_unit, of_factor]},
+        "name": problem.objective_name,
+        "words": "; ".join(part for part in (f"{text}{least}", breaks) if part),
+        "simpler": simpler.phrase,
+    }
 
 
 @_said

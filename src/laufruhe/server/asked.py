@@ -43,25 +43,30 @@ class Asked:
         Numbers of the design that is shown, by name [SI].
     has
         Key of the model that the page has; `LATER` where it wants none yet.
+    position
+        Number that the page gives its settings; claims about them carry it.
     """
 
     edits: tuple[Edit, ...] = ()
     held: tuple[Edit, ...] = ()
     design: Mapping[str, float] = field(default_factory=dict)
     has: str = ""
+    position: int = 0
 
     @classmethod
     def of(cls, given: object) -> Asked:
         """From what a request holds; `Refused` where it is nothing that a page asks."""
-        if not isinstance(given, dict) or not set(given) <= {"edits", "held", "design", "has"}:
-            raise _strange("request", "is no table of edits, held, design and has")
-        design, has = given.get("design", {}), given.get("has", "")
+        if not isinstance(given, dict) or not set(given) <= {"edits", "held", "design", "has", "position"}:
+            raise _strange("request", "is no table of edits, held, design, has and position")
+        design, has, position = given.get("design", {}), given.get("has", ""), given.get("position", 0)
         if not isinstance(design, dict) or len(design) > MOST_EDITS or not all(map(_is_number, design.values())):
             raise _strange("design", "is no table of names and numbers")
         if not isinstance(has, str) or len(has) > LONGEST:
             raise _strange("has", "is no key of a model")
+        if not isinstance(position, int) or not _is_number(position):
+            raise _strange("position", "is no whole number")
         told = {str(name): float(value) for name, value in design.items()}
-        return cls(_edits(given.get("edits", []), "edits"), _edits(given.get("held", []), "held"), told, has)
+        return cls(_edits(given.get("edits", []), "edits"), _edits(given.get("held", []), "held"), told, has, position)
 
     def tables(self, tables: Tables, with_held: bool) -> dict[str, Any]:
         """The tables of the problem as it is asked about."""

@@ -44,7 +44,7 @@ class Front:
         others = tuple(limit for limit in problem.limits if limit.measure != across)
         top = 1e300
         self._limit = Limit(across.name, across, top)
-        self._others = others
+        self.others = others
         alone = problem.changed(limits=(*others, self._limit), ranks=())
         self.problem, self.across = alone, across
         self._follower = Follower(alone)
@@ -52,15 +52,15 @@ class Front:
 
     def ends(self) -> tuple[float, float]:
         """Least of the other measure, and what it is where the objective is least."""
-        least = self._least.at(self._others)
+        least = self._least.at(self.others)
         if least.conflict:
             raise ModelError(f"no design keeps {' and '.join(least.conflict)}")
-        free = self._follower.at((*self._others, self._limit))
+        free = self._follower.at((*self.others, self._limit))
         return least.value, max(free.standing[-1], least.value)
 
     def at(self, most: float) -> Followed:
         """The least objective with no more of the other than this, where the last limit stands; a conflict else."""
-        return self._follower.at((*self._others, replace(self._limit, maximum=most)))
+        return self._follower.at((*self.others, replace(self._limit, maximum=most)))
 
 
 def places(low: float, high: float, count: int = POINTS) -> Iterator[float]:

@@ -4,28 +4,43 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from laufruhe.errors import ModelError
 from laufruhe.files.asked import EDGES
 from laufruhe.live import live_model
+from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import depends
-from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.tolerance import NO_TOLERANCES
-from laufruhe.prove.certificate import Certificate, Proof
+from laufruhe.server.claims import Simpler, listed
 from laufruhe.server.drawing import drawing_of
 from laufruhe.server.front import partners
 from laufruhe.solvers import kinds_of
 from laufruhe.solvers.conclusion import decision_values, limit_values
 from laufruhe.solvers.following import Followed, Follower, can_follow
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.values import LimitValue, ObjectiveValue
+from laufruhe.solvers.values import LimitValue
 
+ROUNDING = 1e-5
+"""Share of the objective that a program at few angles does not tell from nothing."""
+STILL: Mapping[Kind, str] = {
+    Kind.PLACE: "these shaft positions",
+    Kind.STIFFNESS: "these mounts",
+    Kind.MOUNT: "these mounts",
+    Kind.STAR: "this crank",
+    Kind.FLYWHEEL: "this flywheel",
+    Kind.TORSION: "this crankshaft",
+    Kind.SIZE: "these sizes",
+    Kind.LEAD: "these phases of geared shafts",
+}
+"""Words for numbers that stand still while sliders move."""
 _KEPT = 6
 
 
@@ -49,66 +64,75 @@ class Scene:
                 # an engine on mounts in time has no loads that are affine in anything
                 self.follower = None
 
-    @property
-    def value(self) -> float | None:
-        """Objective of the design as given; None where there is none."""
-        return objective_value(self.problem, self.given) if self.problem.objective else None
+    def evaluated(self, found: Followed | None) -> Evaluation:
+        """Return the exact model's answer to the design that follows, or to that given where none does."""
+        if found is None or found.conflict:
+            return self.given
+        return evaluate(self.problem.held(found.values))
 
-    def drawn(self, found: Followed | None) -> dict[str, Any]:
-        """What the page draws from, with the optimum where it is known; why there is nothing to slide else."""
-        model = live_model(self.whole, self._result(found), is_served=True)
+    def standing(self, limits: Sequence[Limit], design: Evaluation, found: Followed | None) -> tuple[LimitValue, ...]:
+        """Return how a design stands to limits, with the prices of those that follow [SI]."""
+        if design.resonance:
+            return ()
+        stands = limit_values(replace(self.problem, limits=tuple(limits)), design)
+        if found is None or found.conflict:
+            return stands
+        pairs = zip(limits, stands, found.prices, strict=True)
+        return tuple(self._priced(limit, stand, price, found.value) for limit, stand, price in pairs)
+
+    def _priced(self, limit: Limit, stand: LimitValue, price: float, value: float) -> LimitValue:
+        if limit.measure not in {own.measure for own in self.problem.load_limits}:
+            return replace(stand, shadow_price=math.nan) if stand.active else stand
+        # a price that would not move the objective by its rounding is none
+        active = price * abs(limit.maximum) > ROUNDING * value
+        return replace(stand, active=active, shadow_price=price if active else 0.0)
+
+    def drawn(self, limits: tuple[Limit, ...], design: Evaluation, found: Followed | None) -> dict[str, Any]:
+        """Return what the page draws from; why there is nothing to slide else."""
+        problem = replace(self.problem, limits=limits)
+        result = Result(problem=problem, status=Status.FEASIBLE, initial=self.given, final=design)
+        if found is not None and not found.conflict:
+            pairs = zip(problem.decisions, found.values, strict=True)
+            entries = tuple(entry for decision, value in pairs for entry in decision_values(decision, value))
+            result = replace(result, decisions=entries, limits=self.standing(limits, design, found))
+        model = live_model(self.whole, result, is_served=True)
         about = {"engine": drawing_of(self.problem), "partners": list(partners(self.problem))}
         return {**about, "unshown": model.why_not} if model.why_not else {**about, "model": model.as_json()}
 
-    def _result(self, found: Followed | None) -> Result:
-        """The design that follows, as far as a model of the page asks; nothing of it is proven but the bound."""
-        problem, known = self.problem, found is not None and not found.conflict
-        bare = Result(problem=problem, status=Status.FEASIBLE, initial=self.given, final=self.given)
-        if found is None or not known:
-            return bare
-        entries = [e for d, v in zip(problem.decisions, found.values, strict=True) for e in decision_values(d, v)]
-        unread = [limit for limit in problem.limits if not self._reads(limit)]
-        limits: tuple[LimitValue, ...] = ()
-        if unread:
-            design = evaluate(problem.held(found.values))
-            limits = limit_values(problem.changed(limits=tuple(unread)), design)
-        return replace(
-            bare,
-            objective=ObjectiveValue.of(problem, found.value, self.value or 0.0),
-            certificate=Certificate(Proof.WITHIN_GAP, found.bound, found.gap, 0.0, "second-order cones at few angles"),
-            decisions=tuple(entries),
-            limits=limits,
-        )
+    def simpler(self, held: Collection[Kind]) -> Simpler:
+        """Return what of the whole problem stands still or is left out while sliders move.
+
+        Parameters
+        ----------
+        held
+            Kinds of open numbers that the page holds as they were decided.
+        """
+        whole = self.whole
+        still = {*held, *(decision.kind for decision in whole.decisions if not decision.is_affine)}
+        if whole.phasing is not None:
+            still.add(Kind.STAR)
+        unread = [limit.name for limit in self.problem.limits if not self._reads(limit)]
+        left_out = [
+            *(["tolerances"] if whole.over is not None else []),
+            *(["the choice of parts"] if whole.assembly is not None else []),
+            *(["later objectives"] if whole.ranks else []),
+            *([f"the limit{'s' if len(unread) > 1 else ''} on {listed(unread)}"] if unread else []),
+        ]
+        phrases = dict.fromkeys(STILL.get(kind, "these other numbers") for kind in sorted(still))
+        return Simpler(tuple(phrases), tuple(left_out))
 
     def _reads(self, limit: Limit) -> bool:
-        """Whether a limit stands still, or is one that follows."""
-        return limit in self.problem.load_limits or not depends(
-            limit.measure.channel, kinds_of(self.problem), self.problem
-        )
-
-    def simplified(self, is_held: bool) -> Iterator[str]:
-        """What of the whole problem is left out while sliders move: a bound holds for the rest alone."""
-        whole = self.whole
-        if is_held:
-            yield "what loads are not affine in held as it was decided"
-        elif whole.phasing is not None or any(not decision.is_affine for decision in whole.decisions):
-            yield "what loads are not affine in held as given"
-        if whole.over is not None:
-            yield "no tolerances"
-        if whole.assembly is not None:
-            yield "no parts assigned"
-        if whole.ranks:
-            yield "the first objective alone"
-        if not all(map(self._reads, self.problem.limits)):
-            yield "limits on numbers left out"
+        """Return True for a limit that stands still, or follows sliders."""
+        moved = depends(limit.measure.channel, kinds_of(self.problem), self.problem)
+        return limit in self.problem.load_limits or not moved
 
 
 _scenes: dict[str, Scene] = {}
 
 
-def scene_of(problem: Problem, tables: Mapping[str, Any]) -> Scene:
-    """The scene of a problem, kept for the next request."""
-    key = key_of(tables)
+def scene_of(problem: Problem, tables: Mapping[str, Any], content: str) -> Scene:
+    """Return the scene of a problem, kept for the next request."""
+    key = key_of(tables, content)
     if key not in _scenes:
         while len(_scenes) >= _KEPT:
             _scenes.pop(next(iter(_scenes)))
@@ -116,8 +140,14 @@ def scene_of(problem: Problem, tables: Mapping[str, Any]) -> Scene:
     return _scenes[key]
 
 
-def key_of(tables: Mapping[str, Any]) -> str:
-    """Of all but where limits stand."""
+def key_of(tables: Mapping[str, Any], content: str) -> str:
+    """Return a hash of all but where limits stand.
+
+    Parameters
+    ----------
+    content
+        Hash of the files that the problem names.
+    """
     limits = [{k: v for k, v in entry.items() if k not in EDGES} for entry in tables.get("constraints", [])]
-    text = json.dumps({**tables, "constraints": limits}, sort_keys=True, default=str)
+    text = json.dumps([content, {**tables, "constraints": limits}], sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:16]

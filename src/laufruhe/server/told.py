@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterable, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from laufruhe.present.numbers import figure, price_of
+from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.report.strict_json import finite
+from laufruhe.server.claims import Claim, Kind, is_broken
 from laufruhe.solvers.conclusion import decision_values
 from laufruhe.solvers.values import LimitValue
 
@@ -22,36 +26,49 @@ def as_text(found: dict[str, Any]) -> str:
     return "".join([text[:-1], *(f', "{key}": {entry}' for key, entry in drawn.items() if entry is not None), "}"])
 
 
-def figures(value: float, problem: Problem) -> dict[str, Any]:
-    """A value of the objective, in SI and as it is read."""
-    unit = problem.objective_unit or ""
-    return {"name": problem.objective_name, "value": value, "unit": unit, "text": figure(value, unit, 5)}
+def answer(claim: Claim, found: Iterable[LimitValue], problem: Problem, conflict: Sequence[str]) -> dict[str, Any]:
+    """Return a claim, how its design stands to limits, and the names of limits that contradict each other."""
+    is_estimate = claim.kind in (Kind.ESTIMATE, Kind.HELD)
+    return {"claim": asdict(claim), "limits": limits(found, problem, is_estimate), "conflict": list(conflict)}
 
 
-def optimum(
-    problem: Problem, values: Sequence[Value], value: float, bound: float, gap: float, proof: str
-) -> dict[str, Any]:
-    """A design with what bounds it."""
-    entries = [e for d, v in zip(problem.decisions, values, strict=False) for e in decision_values(d, v)]
-    return {
-        **figures(value, problem),
-        "design": {entry.name: entry.value for entry in entries},
-        "bound": bound,
-        "boundText": figure(bound, problem.objective_unit or "", 5),
-        "gap": gap,
-        "proof": proof,
-    }
+def design(problem: Problem, values: Sequence[Value]) -> dict[str, float]:
+    """Return sizes and angles of a design by name [SI]."""
+    return {e.name: e.value for d, v in zip(problem.decisions, values, strict=True) for e in decision_values(d, v)}
 
 
-def limits(found: Iterable[LimitValue], problem: Problem) -> list[dict[str, Any]]:
-    """How a design stands to its limits, and what they cost."""
+def limits(found: Iterable[LimitValue], problem: Problem, is_estimate: bool = False) -> list[dict[str, Any]]:
+    """Return how a design stands to its limits, and what they cost."""
+    edges = {limit.name: limit for limit in problem.limits}
     return [
         {
-            **{key: getattr(limit, key) for key in ("name", "value", "limit", "unit", "side", "active")},
+            "name": limit.name,
+            "value": limit.value,
+            "sides": _sides(limit, edges.get(limit.name)),
+            "broken": is_broken(limit),
+            "active": limit.active,
             "price": limit.shadow_price,
-            "text": figure(limit.value, limit.unit),
-            "limitText": figure(limit.limit, limit.unit),
-            "priceText": price_of(limit.shadow_price, problem.objective_unit or "", limit.unit),
+            "words": _words(limit, problem, is_estimate),
         }
         for limit in found
     ]
+
+
+def _sides(found: LimitValue, limit: Limit | None) -> list[tuple[str, float]]:
+    """Return sense and edge of every side; where a band is left out, of the side that has least room."""
+    if limit is None or limit.outside is not None:
+        return [(found.side, found.limit)]
+    ends = (("at least", limit.minimum), ("at most", limit.maximum))
+    return [(sense, edge) for sense, edge in ends if math.isfinite(edge)]
+
+
+def _words(limit: LimitValue, problem: Problem, is_estimate: bool) -> str:
+    value = figure(limit.value, limit.unit)
+    if is_broken(limit):
+        return f"broken: {value}, {limit.side} {figure(limit.limit, limit.unit)}"
+    if not limit.active:
+        return f"is {value}; has room"
+    if not limit.shadow_price > 0.0:
+        return f"is {value}; price not known" if math.isnan(limit.shadow_price) else f"is {value}; no price"
+    price = price_of(limit.shadow_price, problem.objective_unit or "", limit.unit)
+    return f"is {value}; price {'about ' if is_estimate else ''}{price}"

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,8 +16,10 @@ from typing import Any
 
 from laufruhe.server.guard import HEADERS, HOST, TOKEN, Guard
 
-MOST_BYTES, MOST_AT_ONCE = 64_000, 32
-"""Of a request's body; connections."""
+MOST_BYTES, MOST_HEAD, MOST_AT_ONCE = 64_000, 32_000, 32
+"""Bytes of a request's body and of what stands before it; connections at once."""
+READ, WRITE, EVICTION = 5.0, 20.0, 2.0
+"""Seconds for a request to arrive, for a client to take an answer, and for an evicted connection to end."""
 _TYPES = {"html": "text/html", "js": "text/javascript", "css": "text/css", "svg": "image/svg+xml"}
 _JSON = "application/json"
 
@@ -54,19 +58,43 @@ class Server(ThreadingHTTPServer):
         self.files = {f"/{name}": text.encode() for name, text in files.items()}
         self.handles: dict[str, Handle] = {}
         self._room = threading.BoundedSemaphore(MOST_AT_ONCE)
+        self._readers: dict[socket.socket, None] = {}
+        self._lock = threading.Lock()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """In a thread of its own; where there are too many, the connection is closed."""
-        if not self._room.acquire(blocking=False):
+        """Start a thread for a connection. Without room the slowest sender gives way; if all are answered, refuse."""
+        has_room = self._room.acquire(blocking=False)
+        if not has_room and self._evict():
+            has_room = self._room.acquire(timeout=EVICTION)
+        if not has_room:
             self.shutdown_request(request)
             return
+        with self._lock:
+            self._readers[request] = None
         super().process_request(request, client_address)
+
+    def _evict(self) -> bool:
+        """Close the connection that has been sending its request for the longest time."""
+        with self._lock:
+            slowest = next(iter(self._readers), None)
+            if slowest is None:
+                return False
+            del self._readers[slowest]
+            with suppress(OSError):
+                slowest.shutdown(socket.SHUT_RDWR)
+        return True
+
+    def has_read(self, request: socket.socket) -> None:
+        """Note that a connection has sent all of its request."""
+        with self._lock:
+            self._readers.pop(request, None)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
         """One connection."""
         try:
             super().process_request_thread(request, client_address)
         finally:
+            self.has_read(request)
             self._room.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
@@ -80,22 +108,51 @@ class Server(ThreadingHTTPServer):
         self.server_name, self.server_port = HOST, self.server_address[1]
 
 
+class _Incoming(io.RawIOBase):
+    """A request's bytes, limited in number and in the time that all of them together take."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._connection = connection
+        self._room = MOST_HEAD + MOST_BYTES
+        self._until = time.monotonic() + READ
+
+    def readable(self) -> bool:
+        """Return True."""
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        """Return the number of bytes received; `TimeoutError` where time or room is over."""
+        left = self._until - time.monotonic()
+        if left <= 0.0 or self._room <= 0:
+            raise TimeoutError
+        self._connection.settimeout(left)
+        count = self._connection.recv_into(memoryview(buffer)[: self._room])
+        self._room -= count
+        return count
+
+
 class Request(BaseHTTPRequestHandler):
-    """One connection of a page."""
+    """One connection of a page, which carries one request."""
 
     protocol_version = "HTTP/1.1"
     server_version = "laufruhe"
     sys_version = ""
-    timeout = 30.0
     disable_nagle_algorithm = True
     wbufsize = -1
     server: Server
+
+    def setup(self) -> None:
+        """Read by a deadline."""
+        super().setup()
+        self.rfile.close()
+        self.rfile = io.BufferedReader(_Incoming(self.connection))
 
     def log_message(self, format: str, *args: object) -> None:
         """Nothing: a log may be read by others."""
 
     def do_GET(self) -> None:
         """The page and its files, which hold nothing of the problem."""
+        self.server.has_read(self.connection)
         path = "/page.html" if self.path == "/" else self.path
         refusal = self.server.guard.refusal("GET", self._headers())
         if refusal:
@@ -118,6 +175,7 @@ class Request(BaseHTTPRequestHandler):
             self._refused(HTTPStatus.NOT_FOUND, "no such request")
         else:
             body = self._body()
+            self.server.has_read(self.connection)
             if body is not None:
                 self._answer(self._exchanged(body) if self.path == "/token" else self.server.handles[self.path](body))
 
@@ -153,9 +211,7 @@ class Request(BaseHTTPRequestHandler):
         if answer.lines is None:
             self._send(answer.status, answer.text.encode(), _JSON)
             return
-        self.close_connection = True
         self._begin(HTTPStatus.OK, "application/x-ndjson")
-        self.send_header("Connection", "close")
         self.end_headers()
         with suppress(OSError):
             for line in answer.lines:
@@ -166,7 +222,11 @@ class Request(BaseHTTPRequestHandler):
             close()
 
     def _begin(self, status: HTTPStatus, kind: str) -> None:
+        # a connection that nothing is asked over would take the room of one that asks
+        self.close_connection = True
+        self.connection.settimeout(WRITE)
         self.send_response(status)
+        self.send_header("Connection", "close")
         self.send_header("Content-Type", kind)
         for name, value in HEADERS.items():
             self.send_header(name, value)
@@ -180,8 +240,6 @@ class Request(BaseHTTPRequestHandler):
             self.wfile.flush()
 
     def _refused(self, status: HTTPStatus, why: str) -> None:
-        # what was sent is not read, so nothing may follow it
-        self.close_connection = True
         self._send(status, json.dumps({"error": why}).encode(), _JSON)
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:  # noqa: ARG002

@@ -1,9 +1,12 @@
-"""The problem's file as it is on the disk: the last state that could be read, and what is wrong with a newer one."""
+"""A problem's file and the files that it names, as they are on the disk: the last state that could be read."""
 
 from __future__ import annotations
 
+import hashlib
+import stat
 import threading
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +21,7 @@ EVERY = 0.4
 
 
 class Watched:
-    """A file that is looked at while it is served.
+    """A problem's file, and every file that it names, looked at while it is served.
 
     Parameters
     ----------
@@ -28,7 +31,7 @@ class Watched:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._stamp = self._look()
+        self._stamps: dict[Path, tuple[int, int]] = {}
         self.source = self._read()
         self.complaint = ""
         self.version = 1
@@ -58,10 +61,8 @@ class Watched:
 
     def _watch(self) -> None:
         while not self._closed.wait(EVERY):
-            stamp = self._look()
-            if stamp == self._stamp:
+            if all(_stamp_of(path) == stamp for path, stamp in self._stamps.items()):
                 continue
-            self._stamp = stamp
             try:
                 source, complaint = self._read(), ""
             except InputError as error:
@@ -71,18 +72,41 @@ class Watched:
                 self.version += 1
                 self._changed.notify_all()
 
-    def _look(self) -> tuple[int, int]:
-        try:
-            found = self.path.stat()
-        except OSError:
-            return 0, 0
-        return found.st_mtime_ns, found.st_size
-
     def _read(self) -> Source:
+        # stamps are taken before what they are of is read, so that no change is missed
+        self._stamps[self.path] = _stamp_of(self.path)
         tables = tables_of(self.path)
         _check_inside(tables, self.path)
+        named = tuple(_named_in(tables, self.path.parent))
+        self._stamps = {self.path: self._stamps[self.path], **{path: _stamp_of(path) for path in named}}
+        content = _hash_of(named)
         load_tables(tables, self.path)
-        return Source(tables, self.path)
+        return Source(tables, self.path, content)
+
+
+def _named_in(tables: Mapping[str, Any], folder: Path) -> Iterator[Path]:
+    """Yield a path for every text of a problem: any may name a file, now or as soon as there is one."""
+    yield from (folder / text for text in sorted({text for _, text in texts_in(tables)}))
+
+
+def _stamp_of(path: Path) -> tuple[int, int]:
+    # a text of a problem may be no name that a file can have
+    with suppress(OSError, ValueError):
+        found = path.stat()
+        if stat.S_ISREG(found.st_mode):
+            return found.st_mtime_ns, found.st_size
+    return 0, 0
+
+
+def _hash_of(paths: tuple[Path, ...]) -> str:
+    """Return a hash of what the files hold."""
+    found = hashlib.sha256()
+    for path in paths:
+        with suppress(OSError, ValueError):
+            if path.is_file():
+                with path.open("rb") as stream:
+                    found.update(hashlib.file_digest(stream, "sha256").digest())
+    return found.hexdigest()
 
 
 def _check_inside(tables: Mapping[str, Any], path: Path) -> None:

@@ -4,14 +4,16 @@ const STEPS = 1000;
 
 /** A range and a number field of one value. */
 class Slider {
-  constructor(field, marks, told) {
-    this.field = field;
+  /** @param refuse told why a number that was typed is not taken; empty where it is */
+  constructor(field, marks, told, refuse) {
+    Object.assign(this, { field, refuse });
     const { name, unit, lower, upper } = field, id = `live-${name.replace(/[^\w-]/g, "-")}`;
     const step = ((upper - lower) * unit.factor) / STEPS || 1;
     const bounds = { min: lower * unit.factor, max: upper * unit.factor, step: "any" };
     const words = unit.shown ? `${name} in ${unit.shown}` : name;
     this.range = element("input", { type: "range", id, ...bounds, "data-decision": name });
-    this.number = element("input", { type: "number", ...bounds, "data-number": name, "aria-label": words });
+    const kind = { type: "text", inputmode: "decimal", autocomplete: "off" };
+    this.number = element("input", { ...kind, "data-number": name, "aria-label": words });
     this.range.addEventListener("keydown", (event) => this.key(event, step, told));
     this.range.addEventListener("input", () => told(name, this.range.valueAsNumber / unit.factor, false));
     this.range.addEventListener("change", () => told(name, this.range.valueAsNumber / unit.factor, true));
@@ -21,14 +23,18 @@ class Slider {
     for (const [kind, value] of marks) this.setMark(kind, value);
     const [low, high] = [lower, upper].map((value) => trimmed(value * unit.factor));
     const ends = element("span", { class: "live-ends" }, `${low} to ${high} ${unit.shown}`.trimEnd());
-    const typed = element("span", { class: "live-typed" }, this.number, element("span", { "aria-hidden": "true" }, unit.shown));
+    const entry = element("span", { class: "live-typed" }, this.number, element("span", { "aria-hidden": "true" }, unit.shown));
     this.root = element("div", { class: "live-slider" },
-      element("label", { for: id }, name, ends), this.rail, typed);
+      element("label", { for: id }, name, ends), this.rail, entry);
   }
 
   /** Where a known design stands. */
   setMark(kind, value) {
     const { lower, upper } = this.field;
+    if (value === undefined) {
+      this.marks[kind]?.remove();
+      return;
+    }
     const made = this.marks[kind] ??= element("i", { class: `live-mark ${kind}`, "aria-hidden": "true" });
     if (!made.parentNode) this.rail.append(made);
     // the middle of a thumb runs from one half of it to the other
@@ -46,10 +52,12 @@ class Slider {
   }
 
   typed(told) {
-    const value = this.number.valueAsNumber / this.field.unit.factor;
-    const kept = Number.isFinite(value) ? Math.min(Math.max(value, this.field.lower), this.field.upper) : this.value;
+    const { name, unit, lower, upper } = this.field, { value, why } = typed(this.number.value);
+    this.number.setAttribute("aria-invalid", String(Boolean(why)));
+    this.refuse(why ? `${name}: ${why}.` : "");
+    if (why) return;
     this.value = NaN;
-    told(this.field.name, kept, true);
+    told(name, Math.min(Math.max(value / unit.factor, lower), upper), true);
   }
 
   show(value) {
@@ -59,6 +67,7 @@ class Slider {
     this.range.value = value * unit.factor;
     this.range.setAttribute("aria-valuetext", figure(value, unit));
     this.number.value = trimmed(value * unit.factor, 4);
+    this.number.removeAttribute("aria-invalid");
   }
 }
 
@@ -87,7 +96,7 @@ class Limits {
       row.value.textContent = figure(value, measure);
       row.edge.textContent = side ? `${side[0]} ${trimmed(side[1] * measure.factor)} ${measure.shown}`.trimEnd() : "";
       row.bar.style.width = `${side && side[1] ? Math.min(100, (100 * value) / side[1]) : 0}%`;
-      row.met.textContent = met === null ? "not followed" : met ? "kept" : "broken";
+      row.met.textContent = met === null ? "cannot be followed live" : met ? "kept" : "broken";
     });
   }
 }

@@ -18,8 +18,7 @@ function measured(model, x) {
 
 /** How a value stands to a limit: the side that has least room, and whether it is kept; null where that is not known. */
 function standing(measure, value, isKnown) {
-  const { signal, sides, followed } = measure;
-  if (signal === null && followed) return { value, met: measure.met, side: sides[0] ?? null };
+  const { sides } = measure;
   const room = ([sense, edge]) => (sense === "at most" ? edge - value : value - edge) / (Math.abs(edge) || 1);
   const side = sides.reduce((a, b) => (a && room(a) <= room(b) ? a : b), null);
   return { value, met: isKnown ? !side || room(side) >= -KEPT : null, side };
@@ -47,7 +46,7 @@ function judgedAt(model, x, told = null) {
     x,
     objective: isKnown ? terms.reduce((sum, measure) => sum + measure.weight * value(measure), 0) : told?.objective ?? null,
     limits: ofRole(model, "limit").map((measure) => standing(measure, known(measure), measure.followed || told !== null)),
-    ranks: ofRole(model, "rank").map((measure) => ({ measure, value: value(measure) })),
+    ranks: ofRole(model, "rank").map((measure) => ({ measure, value: measure.followed ? value(measure) : null })),
   };
 }
 
@@ -77,25 +76,20 @@ function isSame(model, values, others) {
   return x.every((value, k) => Math.abs(value - y[k]) <= 1e-9 * size);
 }
 
-/** What was proven of an optimum. */
-function proofWords({ kind, gap }) {
-  if (kind === "global") return "proven";
-  return kind === "global within gap" ? `proven to ${trimmed(100 * gap, 2)} %` : "a local one";
-}
-
 /**
- * How an objective stands to the optimum, in words.
+ * How an objective stands to that of the reference, in words.
+ * @param {{value: number, name: string}} reference
  * @param told of an objective
- * @param {{value: number, isNothing: boolean, isOptimum: boolean, isBroken: boolean, unknown: string[]}} at the objective,
- *   whether the optimum is nothing, whether the design is the optimum, whether it breaks a limit, and limits not followed
+ * @param {{value: number, isNothing: boolean, isReference: boolean, isBroken: boolean, unknown: string[]}} at the objective,
+ *   whether that of the reference is nothing, whether the design is the reference, whether it breaks a limit, and limits
+ *   not followed
  */
-function against(bound, told, at) {
-  const best = `the optimum of ${told(bound.value)} (${proofWords(bound)})`, less = at.value - bound.value;
+function against(reference, told, at) {
+  const best = `${reference.name}: ${told(reference.value)}`, less = at.value - reference.value;
   const aside = at.unknown.length ? ` Not followed here: ${at.unknown.join(", ")}.` : "";
-  if (at.isOptimum) return `This is ${best}.`;
-  if (Math.abs(less) <= AT * Math.abs(bound.value)) return `As much as ${best}.${aside}`;
-  if (less < 0 && (aside || at.isBroken)) return `Less than ${best}, which keeps all limits.${aside}`;
-  return `${at.isNothing ? `${told(less)} more than` : `${percent(less / bound.value)} against`} ${best}.${aside}`;
+  if (at.isReference) return `This is ${best}.`;
+  if (Math.abs(less) <= AT * Math.abs(reference.value)) return `As much as ${best}.${aside}`;
+  return `${at.isNothing ? `${told(less)} more than` : `${percent(less / reference.value)} against`} ${best}.${aside}`;
 }
 
 /** Number of the curve that the objective is of; else the first. */

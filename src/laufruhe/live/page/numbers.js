@@ -22,8 +22,24 @@ function trimmed(value, digits = 4) {
   return text.includes(".") && !text.includes("e") ? text.replace(/0+$/, "").replace(/\.$/, "") : text;
 }
 
+/**
+ * A number as it was typed, with a point or a comma before its decimals.
+ * @param {string} text
+ * @returns {{value?: number, why?: string}} the number, or a line that says why it is refused
+ */
+function typed(text) {
+  const plain = text.trim().replace("−", "-");
+  if (/^[+-]?[1-9]\d{0,2},\d{3}$/.test(plain)) {
+    const [whole, decimal] = [plain.replace(",", ""), plain.replace(",", ".")];
+    return { why: `"${plain}" can be read as ${whole} or as ${decimal}: write one of these` };
+  }
+  const isNumber = /^[+-]?(\d+[.,]?\d*|[.,]\d+)(e[+-]?\d+)?$/i.test(plain), value = Number(plain.replace(",", "."));
+  return isNumber && Number.isFinite(value) ? { value } : { why: `"${plain}" is no number: write one like 2.5` };
+}
+
 /** A value in the unit that is shown; what is a rounding of `scale` is zero. */
 function figure(value, unit, digits = 4, scale = 0) {
+  if (value === null) return "-";
   const shown = Math.abs(value) <= 1e-9 * scale ? 0 : value * unit.factor;
   return `${number(shown, digits)} ${unit.shown}`.trimEnd();
 }

@@ -17,8 +17,9 @@ class Page {
     this.point = 0;
     this.optimum = this.known("optimum");
     this.given = this.known("given");
-    this.bound = this.model.proved;
-    this.exact = { values: this.optimum ?? this.given, objective: this.bound?.value ?? null, limits: {} };
+    this.reference = this.model.reference;
+    this.withdrawn = "";
+    this.exact = { values: this.optimum ?? this.given, objective: this.reference?.value ?? null, limits: {} };
     this.size = sizeOf(this.model);
     // the address is that of the first model, whatever was moved since stays
     this.values = fitting(this.model, this.history ? this.values : fromAddress() ?? {}, this.optimum ?? this.given);
@@ -42,10 +43,11 @@ class Page {
 
   build() {
     const told = (name, value, isLast) => this.move({ [name]: value }, isLast);
-    this.sliders = fields(this.model).map((field) => new Slider(field, this.marks(field), told));
+    const refuse = (why) => { this.said.textContent = why; };
+    this.sliders = fields(this.model).map((field) => new Slider(field, this.marks(field), told, refuse));
     this.limits = new Limits(ofRole(this.model, "limit"));
     this.spoken = element("p", { class: "live-spoken", "aria-live": "polite", role: "status" });
-    this.said = element("p", { class: "live-note" });
+    this.said = element("p", { class: "live-note", role: "status" });
     const region = { class: "live-scroll", tabindex: "0", role: "region", "aria-label": "Limits" };
     const limits = element("div", region, this.limits.root);
     limits.hidden = this.limits.rows.length === 0;
@@ -75,7 +77,7 @@ class Page {
 
   buttons() {
     const { given, model } = this, old = { isOld: true };
-    this.best = button("optimum", "Back to the optimum", "The design that was decided", () => this.set(this.optimum));
+    this.best = button("optimum", this.back(), "The design that was decided", () => this.set(this.optimum));
     this.best.hidden = !this.optimum;
     this.undo = button("undo", "Undo", "Ctrl+Z", () => this.set(this.history.undo(), old));
     this.redo = button("redo", "Redo", "Ctrl+Shift+Z", () => this.set(this.history.redo(), old));
@@ -86,6 +88,11 @@ class Page {
     save.hidden = !model.save.text;
     const made = [this.best, start, this.undo, this.redo, link, save];
     return element("div", { class: "live-buttons", role: "toolbar", "aria-label": "Designs" }, ...made);
+  }
+
+  /** What leads back to the design decided, by what is known of it. */
+  back() {
+    return this.reference?.isProven ? "Back to the optimum" : "Back to the best design";
   }
 
   choices() {
@@ -204,7 +211,8 @@ class Page {
     this.value.setAttribute("data-value", found.objective ?? "");
     this.showRegret(found);
     this.limits.update(found.limits);
-    const ranks = found.ranks.map(({ measure, value }) => `${measure.name}: ${figure(value, measure)}`);
+    const told = (value, measure) => (value === null ? "cannot be followed live" : figure(value, measure));
+    const ranks = found.ranks.map(({ measure, value }) => `${measure.name}: ${told(value, measure)}`);
     this.ranks.textContent = ranks.join("; ");
     this.undo.disabled = !this.history.canUndo;
     this.redo.disabled = !this.history.canRedo;
@@ -212,16 +220,19 @@ class Page {
   }
 
   showRegret({ objective }) {
-    const { bound } = this, broken = this.standingSo(false), isNothing = bound && bound.value <= 1e-9 * this.size;
+    const { reference } = this, broken = this.standingSo(false);
+    const isNothing = reference && reference.value <= 1e-9 * this.size;
     this.regret.classList.toggle("broken", broken.length > 0);
     const more = broken.length > 2 ? ` and ${broken.length - 2} more` : "";
     const limits = broken.length ? `Breaks ${broken.slice(0, 2).join(", ")}${more}. ` : "";
-    this.regret.textContent = limits;
-    if (!bound || objective === null) return;
-    const isOptimum = this.optimum !== null && isSame(this.model, this.values, this.optimum);
-    const at = { value: objective, isNothing, isOptimum, isBroken: broken.length > 0, unknown: this.standingSo(null) };
-    this.regret.setAttribute("data-value", (objective - bound.value) / (isNothing ? 1 : bound.value));
-    this.regret.textContent = limits + against(bound, (value) => this.told(value), at);
+    const isUnknown = objective === null && this.model.objective.name;
+    this.regret.textContent = this.withdrawn || limits + (isUnknown ? "The objective cannot be followed live." : "");
+    this.regret.removeAttribute("data-value");
+    if (this.withdrawn || !reference || objective === null) return;
+    const isReference = this.optimum !== null && isSame(this.model, this.values, this.optimum);
+    const at = { value: objective, isNothing, isReference, isBroken: broken.length > 0, unknown: this.standingSo(null) };
+    this.regret.setAttribute("data-value", (objective - reference.value) / (isNothing ? 1 : reference.value));
+    this.regret.textContent = limits + against(reference, (value) => this.told(value), at);
   }
 
   /** The objective in words; what is a rounding beside the designs known is nothing. */
@@ -242,7 +253,7 @@ class Page {
   }
 
   key(event) {
-    if (!(event.ctrlKey || event.metaKey) || event.target.type === "number") return;
+    if (!(event.ctrlKey || event.metaKey) || event.target.type === "text") return;
     const letter = event.key.toLowerCase();
     if (letter !== "z" && letter !== "y") return;
     event.preventDefault();
@@ -286,16 +297,6 @@ class Page {
     return [{ ...unitOf(objective), name: "objective", ...whole }, ...limits];
   }
 
-  /** Another optimum of the same loads, as limits move. */
-  setOptimum({ design, value, bound, kind, proof, gap = 0 }) {
-    this.optimum = fitting(this.model, design, this.optimum ?? this.given);
-    this.bound = { value, bound: bound ?? value, kind: kind ?? proof ?? "global", gap };
-    this.sliders.forEach((slider) => slider.setMark("optimum", this.optimum[slider.field.name]));
-    this.best.hidden = false;
-    this.isMoved = true;
-    this.askFrame();
-  }
-
   /** Whether something is asked of a design that does not follow sliders. */
   get isAside() { return this.model.measures.some((measure) => !measure.followed); }
 
@@ -305,20 +306,39 @@ class Page {
     this.askFrame();
   }
 
-  /** Other edges of limits: at most what is told. */
-  setLimits(limits) {
-    for (const { name, maximum } of limits) {
-      const measure = ofRole(this.model, "limit").find((own) => own.name === name);
-      if (measure) measure.sides = measure.sides.map(([sense, edge]) => [sense, sense === "at most" ? maximum : edge]);
-    }
-    this.askFrame();
+  /** Say nothing of how good a design is, but this, until the next update; at once. */
+  withdraw(words) {
+    this.withdrawn = words;
+    this.root.classList.add("withdrawn");
+    this.showRegret(this.found);
   }
 
-  /** All of these at once, drawn in one frame. */
-  update({ limits, optimum, design }) {
-    if (limits) this.setLimits(limits);
-    if (optimum) this.setOptimum(optimum);
-    if (design) this.setDesign(design, { quiet: true });
+  /** Other edges of limits, and values of those that no slider moves. */
+  setLimits(limits) {
+    for (const { name, sides, value } of limits) {
+      const measure = ofRole(this.model, "limit").find((own) => own.name === name);
+      if (measure) Object.assign(measure, { sides }, measure.followed && measure.signal === null ? { value } : {});
+    }
+  }
+
+  /**
+   * All that is known for other settings of the same loads, drawn in one frame.
+   * @param {{limits: object[], reference: {value: number, name: string, isProven: boolean} | null,
+   *   decided: object | null, follows: boolean}} told limits, what designs are compared with, the design that was decided,
+   *   and whether it is shown
+   */
+  update({ limits, reference, decided, follows }) {
+    this.withdrawn = "";
+    this.root.classList.remove("withdrawn");
+    this.setLimits(limits);
+    this.reference = reference;
+    this.optimum = decided && fitting(this.model, decided, this.optimum ?? this.given);
+    this.sliders.forEach((slider) => slider.setMark("optimum", this.optimum?.[slider.field.name]));
+    this.best.hidden = !this.optimum;
+    this.best.textContent = this.back();
+    this.isMoved = true;
+    if (this.optimum && follows) this.set(this.optimum, { isPassing: true, quiet: true });
+    this.askFrame();
   }
 
   /** Another model; values of sliders that it still has stay. */
@@ -345,7 +365,7 @@ async function show(model, root) {
   return new Page(root).open(typeof model === "string" ? JSON.parse(model) : model);
 }
 
-window.laufruheLive = { show, element, drawn, download, NORMS, opened, measured, judged, rowsAt, savedText, number };
+window.laufruheLive = { show, element, drawn, download, NORMS, opened, measured, judged, rowsAt, savedText, number, typed };
 
 const told = document.getElementById("live-model");
 if (told) window.laufruheLive.page = show(told.textContent, document.getElementById("live"));

@@ -44,7 +44,7 @@ export class Comparison {
  * @param {Measured | undefined} b
  */
 function row(a, b) {
-  const change = b && a.value ? `${b.value >= a.value ? "+" : ""}${shown((100 * (b.value - a.value)) / a.value, 3)} %` : "-";
+  const change = b && b.value !== null && a.value ? `${b.value >= a.value ? "+" : ""}${shown((100 * (b.value - a.value)) / a.value, 3)} %` : "-";
   return element("tr", {}, element("th", { scope: "row" }, a.words ?? a.name), ...[a, b].map(cell), element("td", {}, change));
 }
 
@@ -52,7 +52,7 @@ function row(a, b) {
 function cell(measured) {
   const broken = measured?.met === false ? ", broken" : "";
   const [unit, factor] = [measured?.shown ?? measured?.unit, measured?.factor ?? 1];
-  return element("td", {}, measured ? `${shown(measured.value * factor, 5)} ${unit}${broken}` : "-");
+  return element("td", {}, measured && measured.value !== null ? `${shown(measured.value * factor, 5)} ${unit}${broken}` : "-");
 }
 
 /**

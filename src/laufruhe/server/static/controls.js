@@ -1,5 +1,5 @@
 // Sliders for what loads are not affine in: each moves one number of the problem, by name.
-import { element, shown } from "./parts.js";
+import { element, shown, typed } from "./parts.js";
 
 /**
  * @typedef {{way: string, name: string, group: string, label: string, value: number, low: number, high: number,
@@ -16,9 +16,11 @@ export class Controls {
   /**
    * @param {HTMLElement} root
    * @param {(edit: Edit | null, control: Control) => void} moved
+   * @param {(why: string) => void} complain of what was typed
    */
-  constructor(root, moved) {
+  constructor(root, moved, complain) {
     this.root = root;
+    this.complain = complain;
     this.moved = moved;
     /** @type {Map<string, {control: Control, box: HTMLElement, range: any, number: any, free: any, said: HTMLElement}>} */
     this.rows = new Map();
@@ -53,20 +55,32 @@ export class Controls {
     const value = edit ? parseFloat(edit[2]) : control.value;
     const limits = { min: control.low, max: control.high, step: control.step };
     const range = element("input", { type: "range", id, ...limits, "data-control": control.name });
-    const number = element("input", { type: "number", step: "any", "aria-label": `${control.label}, ${control.unit || "number"}`,
+    const number = element("input", { type: "text", inputmode: "decimal", "aria-label": `${control.label}, ${control.unit || "number"}`,
       "data-number-of": control.name });
     const free = element("button", { type: "button", hidden: true, "aria-label": `${control.label}: as in the file` }, "↺");
-    const said = element("p", { class: "said" }, control.open ? "decided, until you move it" : "");
+    const said = element("p", { class: "said" }, control.open ? "optimised; move to fix" : "");
     range.value = String(value);
     number.value = shown(value, 6);
     const row = element("div", { class: "row" }, range, number, element("span", {}, control.unit), free);
     const box = element("div", { class: "control" }, element("label", { for: id }, control.label), row, said);
     range.addEventListener("input", () => this.set(control, Number(range.value)));
-    number.addEventListener("change", () => this.set(control, Number(number.value)));
+    number.addEventListener("change", () => this.typed(control, number));
     free.addEventListener("click", () => this.release(control));
     this.rows.set(control.name, { control, box, range, number, free, said });
     this.mark(control.name, Boolean(edit));
     return box;
+  }
+
+  /**
+   * Take a number that was typed, or say why it is refused.
+   * @param {Control} control
+   * @param {any} number
+   */
+  typed(control, number) {
+    const { value, why } = typed(number.value);
+    number.setAttribute("aria-invalid", String(Boolean(why)));
+    if (why) this.complain(`${control.label}: ${why}. It stays at ${this.rows.get(control.name)?.range.value} ${control.unit}.`);
+    else this.set(control, value ?? NaN);
   }
 
   /**
@@ -78,6 +92,7 @@ export class Controls {
     if (!row || !Number.isFinite(value)) return;
     const text = shown(value, 6);
     row.number.value = text;
+    row.number.removeAttribute("aria-invalid");
     row.range.value = text;
     this.mark(control.name, true);
     this.moved([control.way, control.name, control.unit ? `${text} ${control.unit}` : Number(text)], control);
@@ -115,7 +130,7 @@ export class Controls {
 
   /**
    * How a design stands to its limits, what they cost, and which contradict each other.
-   * @param {{name: string, text: string, side: string, active: boolean, priceText: string}[]} limits
+   * @param {{name: string, words: string, broken: boolean}[]} limits
    * @param {string[]} conflict
    */
   tell(limits, conflict) {
@@ -124,7 +139,8 @@ export class Controls {
       const own = limits.find((limit) => limit.name === control.limit);
       const against = conflict.includes(control.limit);
       box.classList.toggle("conflict", against);
-      const words = against ? "contradicts the others marked so, or the bounds" : own ? price(own) : "";
+      box.classList.toggle("broken", Boolean(own?.broken));
+      const words = against ? "contradicts the others marked so, or the bounds" : own?.words ?? "";
       if (said.textContent !== words) said.textContent = words;
     }
   }
@@ -133,10 +149,4 @@ export class Controls {
   disable(dead) {
     this.root.querySelectorAll("fieldset").forEach((box) => { box.disabled = dead; });
   }
-}
-
-/** @param {{text: string, active: boolean, priceText: string}} limit */
-function price(limit) {
-  const told = limit.priceText === "-" ? "no price" : `price ${limit.priceText}`;
-  return `is ${limit.text}; ${limit.active ? told : "has room"}`;
 }

@@ -14,6 +14,8 @@ export class Crank {
    */
   constructor(root, moved) {
     this.moved = moved;
+    /** @type {string | null} what the ranking is about */
+    this.about = null;
     this.said = element("p", { class: "said" });
     this.list = element("ol", { id: "ranking", "aria-label": "Cranks, best first" });
     this.all = element("button", { type: "button", id: "rank-all" }, "Rank all cranks");
@@ -37,12 +39,25 @@ export class Crank {
   /**
    * @param {Star[]} ranking
    * @param {string} chosen the star of the state, as JSON
+   * @param {string} about what they were ranked for
    */
-  tell(ranking, chosen) {
+  tell(ranking, chosen, about) {
     if (!ranking.length) return;
-    this.said.textContent = `${ranking.length} best, each with all else at its optimum:`;
+    this.about = about;
+    this.check(about);
     this.list.replaceChildren(...ranking.map((star) => this.entry(star)));
     this.choose(chosen);
+  }
+
+  /**
+   * Say whether the ranking is about the settings that stand now.
+   * @param {string} about
+   */
+  check(about) {
+    if (this.about === null) return;
+    const isOld = about !== this.about;
+    this.box.classList.toggle("outdated", isOld);
+    this.said.textContent = isOld ? "Ranked for earlier settings:" : "Best cranks found, all else decided for each:";
   }
 
   /** @param {string} chosen */

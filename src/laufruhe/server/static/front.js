@@ -4,7 +4,7 @@ import { drawn, shown, ticks } from "./parts.js";
 const [WIDE, HIGH, LEFT, LOW, TOP] = [640, 376, 74, 44, 28];
 
 /**
- * @typedef {{across: number, value: number, bound: number, acrossText: string, text: string, boundText: string,
+ * @typedef {{across: number, value: number, bound: {at: number, value: number} | null, words: string, simpler: string,
  *   axes: {across: [string, number], value: [string, number]}, name: string, design: Record<string, number>}} Point
  */
 
@@ -21,9 +21,13 @@ export function drawFront(root, points, across, picked) {
   }
   const sorted = [...points].sort((a, b) => a.across - b.across);
   const x = scale(sorted.map((point) => point.across), LEFT, WIDE - 12);
-  const y = scale(sorted.flatMap((point) => [point.value, point.bound]), HIGH - LOW, TOP);
+  const bounds = sorted.flatMap((point) => (point.bound ? [point.bound] : [])).sort((a, b) => a.at - b.at);
+  const y = scale([...sorted, ...bounds].map((point) => point.value), HIGH - LOW, TOP);
   const svg = drawn("svg", { viewBox: `0 0 ${WIDE} ${HIGH}`, role: "group", "aria-label": `Front against ${across}` });
-  svg.append(...axes(x, y, sorted[0], across), line(sorted, x, y, "bound", "bound"), line(sorted, x, y, "value", "curve"));
+  const places = (/** @type {[number, number][]} */ pairs) => pairs.map(([a, b]) => `${x.at(a)},${y.at(b)}`).join(" ");
+  svg.append(...axes(x, y, sorted[0], across),
+    drawn("polyline", { class: "bound", points: places(bounds.map((bound) => [bound.at, bound.value])) }),
+    drawn("polyline", { class: "curve", points: places(sorted.map((point) => [point.across, point.value])) }));
   svg.append(...sorted.map((point) => dot(point, x, y, picked)));
   root.replaceChildren(svg);
 }
@@ -62,19 +66,8 @@ function axes(x, y, point, across) {
       drawn("text", { x: LEFT - 6, y: at + 4, "text-anchor": "end" }, shown(tick)));
   }
   found.push(drawn("text", { x: WIDE - 12, y: HIGH - 8, "text-anchor": "end" }, `${across} [${unit}]`),
-    drawn("text", { x: 4, y: 14 }, `${point.name} [${upUnit}]; dashed: no design has less`));
+    drawn("text", { x: 4, y: 14 }, `${point.name} [${upUnit}]${point.bound ? "; dashed: no design has less" : point.simpler}`));
   return found;
-}
-
-/**
- * @param {Point[]} points
- * @param {{at: (value: number) => number}} x
- * @param {{at: (value: number) => number}} y
- * @param {"value" | "bound"} what
- * @param {string} look
- */
-function line(points, x, y, what, look) {
-  return drawn("polyline", { class: look, points: points.map((p) => `${x.at(p.across)},${y.at(p[what])}`).join(" ") });
 }
 
 /**
@@ -84,9 +77,8 @@ function line(points, x, y, what, look) {
  * @param {(point: Point) => void} picked
  */
 function dot(point, x, y, picked) {
-  const told = `${point.acrossText}: ${point.text}, at least ${point.boundText}`;
   const made = drawn("circle", { cx: x.at(point.across), cy: y.at(point.value), r: 4.5, tabindex: 0, role: "button",
-    "aria-label": `Show the design with ${told}` }, drawn("title", {}, told));
+    "aria-label": `Show the design with ${point.words}` }, drawn("title", {}, point.words));
   made.addEventListener("click", () => picked(point));
   made.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
     if (event.key === "Enter" || event.key === " ") {

@@ -9,7 +9,7 @@ import { Pictures } from "./pictures.js";
 import { Trade } from "./trade.js";
 import { byId, download, element } from "./parts.js";
 import { latencies, state } from "./state.js";
-import { busy, complain, tellFile, tellGone, tellOptimum } from "./words.js";
+import { busy, complain, tellClaim, tellFile, tellGone, tellMark, tellPending } from "./words.js";
 
 /** Milliseconds of rest after which the whole problem is solved, and before something is asked again. */
 const [REST, RETRY, MOST_RETRIES] = [350, 100, 3];
@@ -25,7 +25,7 @@ const controls = new Controls(byId("controls"), (edit, control) => {
   // loads that take long to open are drawn when the slider rests
   state.isLater = control.group !== "Limits" && state.opening > SLOW;
   changed(control.name, edit);
-});
+}, complain);
 const crank = new Crank(byId("controls"), (edit) => {
   CRANK.forEach((name) => state.edits.delete(name));
   state.held = [];
@@ -47,11 +47,31 @@ function changed(name, edit) {
   else state.edits.delete(name);
   // what is held by hand is held no other way
   state.held = state.held.filter((held) => held[1] !== name);
-  byId("optimum").dataset.stage = "asked";
-  pictures.offer(false);
+  moved();
   remember();
   follow();
 }
+
+/** Other settings stand from now on: what is claimed is about earlier ones. */
+function moved() {
+  state.position += 1;
+  state.refused = false;
+  pictures.offer(false);
+  trade.withdraw();
+  crank.check(ranked());
+  mark();
+}
+
+/** Say of all that is claimed which settings it is about, where that are not those that stand now. */
+function mark() {
+  const isOld = state.claim !== null && state.claim.position !== state.position;
+  const [words, why] = state.refused ? ["Last valid settings", "the new ones are refused"] : ["Earlier settings", "the new ones are being computed"];
+  tellMark(isOld ? words : "");
+  if (isOld) state.handle?.withdraw(`${words}; ${why}.`);
+}
+
+/** What a ranking of cranks is about: all settings but the crank. */
+const ranked = () => JSON.stringify([state.version, [...state.edits.values()].filter((edit) => !CRANK.includes(edit[1]))]);
 
 /** The state in the address once nothing moves, so that a link shows it. */
 function remember() {
@@ -65,8 +85,9 @@ function written() {
   crank.choose(star ? JSON.stringify(star[2]) : "");
 }
 
-/** @returns {{edits: Edit[], held: Edit[], has: string}} */
-const asked = () => ({ edits: [...state.edits.values()], held: state.held, has: state.isLater ? "later" : state.key });
+/** @returns {{edits: Edit[], held: Edit[], has: string, position: number}} */
+const asked = () => ({ edits: [...state.edits.values()], held: state.held, has: state.isLater ? "later" : state.key,
+  position: state.position });
 
 /** Ask for the optimum that follows; while an answer is on its way only the newest state waits. */
 async function follow() {
@@ -76,9 +97,8 @@ async function follow() {
     return;
   }
   state.asking = true;
-  const from = inputAt;
+  const [from, mine] = [inputAt, state.position];
   inputAt = 0;
-  state.serial += 1;
   state.dropped = 0;
   try {
     const answer = await ask("follow", asked());
@@ -95,6 +115,9 @@ async function follow() {
       // what was held may be what no longer fits
       state.held = [];
       state.again = true;
+    } else if (error instanceof Refusal && mine === state.position) {
+      state.refused = true;
+      mark();
     }
   }
   state.asking = false;
@@ -118,64 +141,68 @@ function rested() {
 }
 
 async function settle() {
-  const mine = state.serial;
-  const stop = busy(state.optimum);
+  const mine = state.position;
+  const stop = busy();
   try {
-    const answer = await ask("settle", { edits: [...state.edits.values()] });
-    if (mine !== state.serial) return;
+    const answer = await ask("settle", { edits: [...state.edits.values()], position: mine });
+    if (mine !== state.position) return;
     if (!answer.dropped) await settled(answer);
     else if (state.dropped++ < MOST_RETRIES) state.resting = setTimeout(settle, RETRY * 10 ** state.dropped);
   } catch (error) {
-    if (mine === state.serial) failed(error);
+    if (mine !== state.position) return;
+    failed(error);
+    tellPending("; the whole problem could not be solved");
   } finally {
     stop();
   }
 }
 
 /**
- * What was proven: shown at once, with the model of what was decided beside weights.
+ * The whole problem was solved: its claim, with the model of what was decided beside weights.
  * @param {any} answer
  */
 async function settled(answer) {
-  crank.tell(answer.ranking, JSON.stringify(state.edits.get("star")?.[2] ?? answer.ranking[0]?.orders[0]?.star ?? ""));
-  const moved = JSON.stringify(answer.holds) !== JSON.stringify(state.held);
-  if (answer.optimum && moved) {
+  crank.tell(answer.ranking, JSON.stringify(state.edits.get("star")?.[2] ?? answer.ranking[0]?.orders[0]?.star ?? ""), ranked());
+  const isOther = JSON.stringify(answer.holds) !== JSON.stringify(state.held);
+  if (answer.design && isOther) {
     state.held = answer.holds;
-    const mine = state.serial;
+    const mine = state.position;
     const model = await ask("follow", asked());
-    if (mine !== state.serial) return;
-    await show(model);
+    if (mine !== state.position) return;
+    if (!model.dropped) await draw(model);
   }
   answer.holds.filter((/** @type {Edit} */ edit) => edit[0] === "fix").forEach((/** @type {Edit} */ edit) => controls.place(edit[1], parseFloat(edit[2])));
   tell(answer);
-  pictures.offer(Boolean(answer.optimum));
+  pictures.offer(Boolean(answer.design));
   // where nothing slides they are all that there is to see
-  if (answer.optimum && !state.handle) pictures.draw(asked().edits).catch(failed);
+  if (answer.design && !state.handle) pictures.draw(asked().edits).catch(failed);
 }
 
 /**
  * @param {any} answer
  */
 async function show(answer) {
-  complain("");
-  const isStale = answer.engine === undefined && answer.key !== state.key;
-  byId("live").classList.toggle("stale", isStale);
-  if (isStale) {
-    controls.tell(answer.limits, answer.conflict || []);
-    tellOptimum(answer);
-    return;
-  }
-  if (answer.engine !== undefined) {
-    const began = performance.now();
-    state.key = answer.key;
-    if (answer.model && state.handle) await state.handle.setModel(answer.model);
-    else if (answer.model) await first(answer.model);
-    else unshown(answer.unshown);
-    engine.load(answer.engine);
-    trade.offer(answer.partners);
-    state.opening = performance.now() - began;
-  }
-  tell(answer);
+  if (answer.claim.position === state.position) complain("");
+  const isDrawn = answer.engine !== undefined || answer.key === state.key;
+  byId("live").classList.toggle("stale", !isDrawn);
+  await draw(answer);
+  tell(answer, isDrawn);
+}
+
+/**
+ * Take over another model, where an answer has one.
+ * @param {any} answer
+ */
+async function draw(answer) {
+  if (answer.engine === undefined) return;
+  const began = performance.now();
+  state.key = answer.key;
+  if (answer.model && state.handle) await state.handle.setModel(answer.model);
+  else if (answer.model) await first(answer.model);
+  else unshown(answer.unshown);
+  engine.load(answer.engine);
+  trade.offer(answer.partners);
+  state.opening = performance.now() - began;
 }
 
 /** @param {any} model */
@@ -193,21 +220,25 @@ function unshown(why) {
   byId("live").replaceChildren(element("p", {}, why));
 }
 
-/** @param {any} answer with an optimum, or why there is none */
-function tell(answer) {
-  state.optimum = answer.optimum;
-  state.conflict = answer.conflict || [];
-  controls.tell(answer.limits, state.conflict);
-  tellOptimum(answer);
+/**
+ * @param {any} answer a claim, and the design that it is about
+ * @param {boolean} [isDrawn] whether the loads on the page are those of the answer
+ */
+function tell(answer, isDrawn = true) {
+  const { claim, design, limits } = answer;
+  Object.assign(state, { claim, design });
+  tellClaim(claim);
+  controls.tell(limits, answer.conflict);
   byId("keep").disabled = !state.handle;
-  if (!state.handle) return;
-  const limits = answer.limits.filter((/** @type {any} */ l) => l.side === "at most")
-    .map((/** @type {any} */ l) => ({ name: l.name, maximum: l.limit }));
-  const follows = answer.optimum && byId("follows").checked;
-  state.setting = true;
-  state.handle.update({ limits, optimum: answer.optimum, design: follows ? answer.optimum.design : null });
-  state.setting = false;
-  drawDesign();
+  if (state.handle && isDrawn) {
+    const isCompared = Boolean(claim.reference) && claim.value !== null;
+    const reference = isCompared ? { value: claim.value, name: claim.reference, isProven: claim.kind === "proven" } : null;
+    state.setting = true;
+    state.handle.update({ limits, reference, decided: design, follows: byId("follows").checked });
+    state.setting = false;
+    drawDesign();
+  } else state.handle?.withdraw("The loads are drawn when the slider rests.");
+  mark();
 }
 
 /** The user has moved a weight. */
@@ -226,9 +257,9 @@ function drawDesign() {
 
 /** What of the design that is shown no slider moves in proportion, by the exact model. */
 async function measure() {
-  const values = state.handle.design();
+  const [values, mine] = [state.handle.design(), state.position];
   const found = await ask("measure", { edits: [...state.edits.values()], held: state.held, design: values });
-  if (found.limits && !state.gone) state.handle?.setExact({ ...found, values });
+  if (found.limits && mine === state.position && !state.gone) state.handle?.setExact({ ...found, values });
 }
 
 /** @param {unknown} error */
@@ -276,7 +307,7 @@ async function heard(told) {
   state.version = told.version;
   if (told.complaint) return;
   state.held = [];
-  byId("optimum").dataset.stage = "asked";
+  moved();
   await begin();
   follow();
 }
@@ -294,8 +325,8 @@ async function events() {
 function back() {
   state.edits.clear();
   state.held = [];
+  moved();
   remember();
-  byId("optimum").dataset.stage = "asked";
   byId("follows").checked = true;
   begin().then(follow).catch(failed);
 }
@@ -317,7 +348,7 @@ async function showKept() {
   if (!kept) return;
   state.edits = new Map(kept.edits);
   state.held = [...kept.held];
-  byId("optimum").dataset.stage = "asked";
+  moved();
   remember();
   byId("follows").checked = false;
   await begin();
@@ -346,7 +377,7 @@ async function start() {
   // what sticks under the optimum has to know how high that is
   new ResizeObserver(() => document.body.style.setProperty("--status", `${byId("status").offsetHeight}px`)).observe(byId("status"));
   byId("follows").addEventListener("change", () => {
-    if (byId("follows").checked && state.optimum) state.handle.setDesign(state.optimum.design, {});
+    if (byId("follows").checked && state.design) state.handle?.setDesign(state.design, {});
   });
   await begin();
   events();

@@ -12,9 +12,9 @@ export function byId(id) {
 
 /**
  * @type {{element: (tag: string, attributes?: object, ...children: (Node | string)[]) => any, drawn: typeof element,
- *   download: (text: string, name: string) => void}}
+ *   download: (text: string, name: string) => void, typed: (text: string) => {value?: number, why?: string}}}
  */
-export const { element, drawn, download } = window.laufruheLive;
+export const { element, drawn, download, typed } = window.laufruheLive;
 
 /**
  * A number to so many figures, without zeros that say nothing.

@@ -10,10 +10,14 @@ export const state = {
   key: "",
   /** @type {any} */
   handle: null,
-  /** @type {any} the last answer that has an optimum */
-  optimum: null,
-  /** @type {string[]} */
-  conflict: [],
+  /** Number of the settings that stand now: every change makes another one. */
+  position: 1,
+  /** Whether these settings were refused. */
+  refused: false,
+  /** @type {import("./words.js").Claim | null} what is claimed on the page, maybe about other settings */
+  claim: null,
+  /** @type {Record<string, number> | null} the design that it is about */
+  design: null,
   version: 0,
   gone: false,
   asking: false,
@@ -21,7 +25,6 @@ export const state = {
   resting: 0,
   measuring: 0,
   writing: 0,
-  serial: 0,
   dropped: 0,
   isLater: false,
   /** Milliseconds that the last model took. */

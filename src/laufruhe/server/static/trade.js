@@ -32,6 +32,12 @@ export class Trade {
     byId("front-state").textContent = why;
   }
 
+  /** Other settings stand: what is drawn is about earlier ones. */
+  withdraw() {
+    const has = byId("front").childElementCount > 0 || byId("front-state").textContent !== "";
+    this.clear(has ? "The settings have changed: draw it again." : "");
+  }
+
   /** @param {{edits: any[], held: any[]}} asked the state that it is drawn for */
   async draw(asked) {
     this.clear("The first point is being computed.");
@@ -42,8 +48,7 @@ export class Trade {
     const across = byId("across").value;
     try {
       await listen("front", { ...asked, across }, (told) => this.add(told, points, across), mine.signal);
-      const held = asked.held.length ? "; what is not affine is held as it is" : "";
-      byId("front-state").textContent = `${counted(points)}, done${held}`;
+      byId("front-state").textContent = `${counted(points)}${points[0]?.simpler ?? ""}, done`;
     } catch (error) {
       if (error.name !== "AbortError") throw error;
     }
@@ -56,7 +61,7 @@ export class Trade {
    */
   add(told, points, across) {
     if (told.error) throw new Refusal(told.error);
-    if (!told.text) return;
+    if (!told.words) return;
     points.push(told);
     byId("front-state").textContent = counted(points);
     drawFront(byId("front"), points, across, this.picked);

@@ -1,71 +1,48 @@
-// What the page says of the optimum: what is proven, what is being computed, and why there is none.
+// Renders what the server claims of a design. What is claimed, and how strongly, is decided in claims.py alone.
 import { byId, element } from "./parts.js";
 
-/** Gap from which a bound says nothing that a user can act on. */
-const USELESS = 0.99;
-
 /**
- * @param {any} answer
+ * @typedef {{kind: string, position: number, lead: string, words: string, value: number | null, reference: string,
+ *   breaks: string, is_last: boolean}} Claim
  */
-export function tellOptimum(answer) {
-  const place = byId("optimum");
-  place.dataset.stage = answer.stage;
-  place.dataset.value = answer.optimum ? String(answer.optimum.value) : "";
-  place.dataset.bound = answer.optimum ? String(answer.optimum.bound) : "";
-  place.dataset.proof = answer.optimum ? answer.optimum.proof : "";
-  place.replaceChildren(...words(answer));
+
+/** @param {Claim} claim */
+export function tellClaim(claim) {
+  const place = byId("claim");
+  Object.assign(place.dataset, { kind: claim.kind, position: claim.position, value: claim.value ?? "", last: claim.is_last });
+  const breaks = claim.breaks ? ["; ", element("strong", { class: "broken" }, claim.breaks)] : [];
+  place.replaceChildren(element("span", { id: "mark" }), element("strong", {}, claim.lead), " ",
+    element("span", { class: "words" }, claim.words), ...breaks, element("span", { id: "pending" }));
+  tellPending(claim.is_last ? "" : "; the whole problem is being solved");
 }
 
-/** @param {any} answer */
-function words(answer) {
-  const but = answer.but?.length ? `, with ${answer.but.join(", ")}` : "";
-  if (answer.conflict?.length) return [conflict(answer.conflict, but)];
-  const own = answer.optimum;
-  if (!own) return [answer.message || given(answer)];
-  const lead = [element("strong", {}, `Optimum ${own.text}`), ` ${own.name}, `];
-  const share = `${(100 * own.gap).toPrecision(2)} %`;
-  const useful = own.gap < USELESS;
-  const bound = useful ? `no design has less than ${own.boundText}` : "no useful bound yet";
-  if (answer.status === "optimal") return [...lead, element("span", { class: "proven" }, `proven: ${bound}`)];
-  const local = own.proof === "local" ? ", a local optimum" : "";
-  const found = answer.stage === "settled" ? `found; ${bound} (${useful ? `gap ${share}${local}` : "a local optimum"})` : useful ? `at ${share} from its bound so far${but}: ${bound}; being proven` : `${bound}${but}; being proven`;
-  return [...lead, element("span", { class: "pending" }, found)];
-}
-
-/** @param {any} answer */
-function given(answer) {
-  return answer.given ? `${answer.given.name} ${answer.given.text} as given; the optimum is being computed` : "The optimum is being computed";
+/** @param {string} words what is still being done */
+export function tellPending(words) {
+  const place = document.getElementById("pending");
+  if (place) place.textContent = words;
 }
 
 /**
- * @param {string[]} names of limits
- * @param {string} but what was left out of the question
+ * Mark all that is claimed as being about other settings than those that stand now; at once.
+ * @param {string} words which settings it is about; nothing where it is about those that stand now
  */
-function conflict(names, but) {
-  const told = names.map((name) => `'${name}'`).join(" and ");
-  const why = names.length > 1 ? `${told} contradict each other` : `${told} cannot be met within the bounds`;
-  const whole = but ? "; the whole problem is being solved" : "";
-  return element("strong", { class: "infeasible" }, `No design exists${but}: ${why}. Move one of the limits${whole}.`);
+export function tellMark(words) {
+  document.body.classList.toggle("earlier", Boolean(words));
+  const place = document.getElementById("mark");
+  if (place) place.textContent = words && `${words}: `;
 }
 
 /**
  * Say how long the whole problem is being solved.
- * @param {any} optimum
  * @returns {() => void} what ends it
  */
-export function busy(optimum) {
-  const place = byId("optimum");
-  const said = element("span", { class: "pending", id: "busy" });
+export function busy() {
   const began = performance.now();
   const timer = setInterval(() => {
     const seconds = (performance.now() - began) / 1000;
-    said.textContent = seconds < 1 ? "" : optimum ? ` for ${seconds.toFixed(0)} s` : `: ${seconds.toFixed(0)} s`;
-    if (!said.isConnected) place.append(said);
+    if (seconds >= 1) tellPending(`; the whole problem is being solved for ${seconds.toFixed(0)} s`);
   }, 250);
-  return () => {
-    clearInterval(timer);
-    said.remove();
-  };
+  return () => clearInterval(timer);
 }
 
 /** @param {string} text one line, or nothing where all is well */

@@ -1,0 +1,192 @@
+"""What a page claims of the numbers that it shows. Every claim is made here; the page's scripts only render it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from laufruhe.present.numbers import figure, number
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Certificate, Proof
+from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.values import LimitValue
+
+_FEW = 2
+"""Broken limits that a claim names before it counts the others."""
+
+
+class Kind(StrEnum):
+    """How strong a claim is."""
+
+    PROVEN = "proven"
+    """The whole problem was solved, and no design is better within the tolerance."""
+    FOUND = "found"
+    """The whole problem was solved, and the design is the best that was found."""
+    ESTIMATE = "estimate"
+    """The whole problem, decided at few crank angles."""
+    HELD = "held"
+    """A simpler problem, decided at few crank angles."""
+    GIVEN = "given"
+    """The design as given; nothing was decided."""
+    NO_DESIGN = "no design"
+
+
+@dataclass(frozen=True)
+class Simpler:
+    """What makes the problem that follows a slider simpler than the whole one; false where nothing does.
+
+    Attributes
+    ----------
+    held
+        Phrases for what stands still: "these mounts".
+    left_out
+        Phrases for what is not asked: "tolerances".
+    """
+
+    held: tuple[str, ...] = ()
+    left_out: tuple[str, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.held or self.left_out)
+
+    @property
+    def phrase(self) -> str:
+        """Words that follow a number, with a blank before them."""
+        still = f" for {listed(self.held)}" if self.held else ""
+        return f"{still} without {listed(self.left_out)}" if self.left_out else still
+
+
+WHOLE = Simpler()
+
+
+@dataclass(frozen=True)
+class Claim:
+    """Words about the design that a page shows.
+
+    Attributes
+    ----------
+    kind
+        How strong it is.
+    position
+        Number of the page's settings that it is about: a claim about other settings is never shown as one about these.
+    lead, words
+        The number, and what is claimed of it.
+    value
+        Objective of the design [SI]; None where there is no design.
+    reference
+        Name of the design for comparisons, "the proven optimum"; empty where the page draws another one.
+    breaks
+        Limits that the design breaks, in words; empty where it keeps all that are known.
+    is_last
+        Whether nothing more is being solved for these settings.
+    """
+
+    kind: Kind
+    position: int
+    lead: str
+    words: str
+    value: float | None = None
+    reference: str = ""
+    breaks: str = ""
+    is_last: bool = False
+
+    @property
+    def text(self) -> str:
+        """The whole claim as one line."""
+        return "; ".join(part for part in (f"{self.lead} {self.words}".strip(), self.breaks) if part)
+
+
+def is_broken(limit: LimitValue) -> bool:
+    """Return True for a limit that a design breaks by more than the tolerance of limits."""
+    over = limit.value - limit.limit if limit.side == "at most" else limit.limit - limit.value
+    return over > KEPT * (abs(limit.limit) or 1.0)
+
+
+def breaks_words(limits: Iterable[LimitValue]) -> str:
+    """Return which limits a design breaks, each with its value and its edge; empty where it breaks none."""
+    broken = [limit for limit in limits if is_broken(limit)]
+    words = [
+        f"{limit.name} ({figure(limit.value, limit.unit)}, {limit.side} {figure(limit.limit, limit.unit)})"
+        for limit in broken[:_FEW]
+    ]
+    more = len(broken) - _FEW
+    return f"breaks {', '.join(words)}{f' and {more} more' if more > 0 else ''}" if broken else ""
+
+
+def preview_claim(
+    position: int, problem: Problem, value: float, simpler: Simpler, limits: Iterable[LimitValue]
+) -> Claim:
+    """Return the claim about a design that follows a slider.
+
+    Parameters
+    ----------
+    value
+        Objective of the design [SI].
+    simpler
+        What makes the problem that was decided simpler than the whole one.
+    limits
+        How the design stands to all limits of the whole problem.
+    """
+    kind = Kind.HELD if simpler else Kind.ESTIMATE
+    lead = f"Estimate {figure(value, problem.objective_unit or '')}"
+    words = f"{problem.objective_name}{simpler.phrase}"
+    return Claim(kind, position, lead, words, value, f"the estimate{simpler.phrase}", breaks_words(limits))
+
+
+def given_claim(position: int, problem: Problem, value: float | None, limits: Iterable[LimitValue]) -> Claim:
+    """Return the claim about the design as given, where nothing follows sliders."""
+    if value is None or not math.isfinite(value):
+        words = "No objective" if value is None else "The design as given stands on a resonance"
+        return Claim(Kind.GIVEN, position, "", words, breaks=breaks_words(limits))
+    lead = figure(value, problem.objective_unit or "")
+    words = f"{problem.objective_name} of the design as given"
+    return Claim(Kind.GIVEN, position, lead, words, value, "the design as given", breaks_words(limits))
+
+
+def conflict_claim(position: int, names: Sequence[str], simpler: Simpler = WHOLE, is_last: bool = False) -> Claim:
+    """Return the claim that no design keeps these limits together: found for a simpler problem, or the last word."""
+    told = listed([f"'{name}'" for name in names])
+    why = f"{told} contradict each other" if len(names) > 1 else f"{told} cannot be met within the bounds"
+    lead = "No design exists:" if is_last else "No design found:"
+    return Claim(Kind.NO_DESIGN, position, lead, f"{why}{simpler.phrase}. Move one of the limits", is_last=is_last)
+
+
+def settled_claim(position: int, result: Result) -> Claim:
+    """Return the claim about the whole problem as `laufruhe solve` decides it."""
+    objective, certificate = result.objective, result.certificate
+    if result.status is Status.INFEASIBLE and result.conflict:
+        return conflict_claim(position, result.conflict, is_last=True)
+    if not result.status.has_design or objective is None or certificate is None:
+        return Claim(Kind.NO_DESIGN, position, "", result.message or "No design was found.", is_last=True)
+    value, breaks = figure(objective.value, objective.unit, 5), breaks_words(result.limits)
+    least = f"no design has less than {figure(certificate.lower_bound, objective.unit, 5)}"
+    is_proven = result.status is Status.OPTIMAL and not breaks
+    # a page shows the drawing, with the parts that it names
+    is_drawn = result.problem.over is None and result.problem.assembly is None
+    reference = "the proven optimum" if is_proven else "the best design found"
+    return Claim(
+        Kind.PROVEN if is_proven else Kind.FOUND,
+        position,
+        f"{'Optimum' if is_proven else 'Best design found'} {value}",
+        f"{objective.name}, proven: {least}" if is_proven else f"{objective.name}; {_gap_words(certificate, least)}",
+        objective.value,
+        reference if is_drawn else "",
+        breaks,
+        is_last=True,
+    )
+
+
+def _gap_words(certificate: Certificate, least: str) -> str:
+    if certificate.kind is Proof.NONE or not certificate.is_useful:
+        return "no useful bound was found in the time given"
+    local = ", a local optimum" if certificate.kind is Proof.LOCAL else ""
+    return f"{least} (gap {number(100.0 * certificate.gap, 2)} %{local})"
+
+
+def listed(phrases: Sequence[str]) -> str:
+    """Return phrases as one, with commas and "and" before the last."""
+    *first, last = phrases
+    return f"{', '.join(first)} and {last}" if first else last

@@ -1,0 +1,206 @@
+"""What the served page claims while a simpler problem stands in for the whole one, and what it claims in the end."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from laufruhe.files.reader import load, tables_of
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.server import answers
+from laufruhe.server.answers import Source
+from laufruhe.server.asked import Asked, Edit
+from laufruhe.server.claims import Simpler, conflict_claim, is_broken
+from laufruhe.solvers.values import LimitValue
+from problem_files import PROBLEMS
+
+INPUTS = Path(__file__).parent / "inputs"
+OPEN_CRANK = Edit("open crank", "crank", 1)
+STRONG = ("optimum", "no design", "proven", "gap", "bound", "least")
+"""Words that only the whole problem may be told with."""
+
+
+def follow(path: Path, *edits: Edit, held: tuple[Edit, ...] = (), position: int = 0) -> dict[str, Any]:
+    asked = Asked(edits, held, has="later", position=position)
+    return json.loads(answers.follow(Source(tables_of(path), path), asked))  # type: ignore[no-any-return]
+
+
+def settle(path: Path, *edits: Edit) -> dict[str, Any]:
+    return json.loads(answers.settle(Source(tables_of(path), path), Asked(edits), 600.0))  # type: ignore[no-any-return]
+
+
+def text_of(claim: dict[str, Any]) -> str:
+    return " ".join((claim["lead"], claim["words"], claim["breaks"], claim["reference"])).lower()
+
+
+def is_modest(claim: dict[str, Any]) -> bool:
+    return not claim["is_last"] and not any(word in text_of(claim) for word in STRONG)
+
+
+def exact(path: Path, design: dict[str, float], *edits: Edit) -> float:
+    """Objective of a design by the exact model."""
+    found = json.loads(answers.measure(Source(tables_of(path), path), Asked(edits, design=design)))
+    return float(found["objective"])
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("rank-all-cranks", 2161.25, "for these shaft positions and this crank"),
+        ("tractor-four-lanchester", 502.944, "for this crank"),
+    ],
+)
+def test_a_crank_that_is_not_ranked_yet_has_an_estimate(name: str, value: float, words: str) -> None:
+    path = INPUTS / f"{name}.toml" if name == "rank-all-cranks" else PROBLEMS / f"{name}.toml"
+    found = follow(path, OPEN_CRANK)
+    assert found["claim"]["kind"] == "held"
+    assert found["claim"]["lead"].startswith("Estimate ")
+    assert found["claim"]["value"] == pytest.approx(value, rel=1e-3)
+    assert words in found["claim"]["words"]
+    assert is_modest(found["claim"])
+
+
+@pytest.mark.slow
+def test_a_ranked_crank_is_proven() -> None:
+    found = settle(PROBLEMS / "tractor-four-lanchester.toml", OPEN_CRANK)
+    assert found["claim"]["kind"] == "proven"
+    assert found["claim"]["value"] == pytest.approx(227.25, abs=0.01)
+    assert found["claim"]["lead"] == "Optimum 227.25 N"
+    assert "no design has less than 227.2" in found["claim"]["words"]
+
+
+@pytest.mark.slow
+def test_places_and_a_crank_are_decided_together_before_anything_is_proven() -> None:
+    """Far under what any estimate of given places, or of a given crank, has."""
+    found = settle(INPUTS / "rank-all-cranks.toml", OPEN_CRANK)
+    assert found["claim"]["value"] == pytest.approx(458.65, abs=0.02)
+    assert found["claim"]["kind"] in ("proven", "found")
+
+
+@pytest.mark.parametrize("name", ["rank-all-cranks", "tractor-four-lanchester"])
+def test_a_limit_that_moves_has_no_bound_beside_it(name: str) -> None:
+    path = INPUTS / f"{name}.toml" if name == "rank-all-cranks" else PROBLEMS / f"{name}.toml"
+    found = follow(path, Edit("set", "constraints.1.max", "1.5 kg"))
+    assert is_modest(found["claim"])
+    assert not {"bound", "gap", "proof", "optimum"} & set(json.dumps(found).replace('"', " ").split())
+
+
+@pytest.mark.parametrize(
+    ("name", "least"), [("few-angles-below-any-design", 1508.9), ("few-angles-16-percent-below", 3837.4)]
+)
+def test_an_estimate_is_what_its_design_has(name: str, least: float) -> None:
+    """At the angles that the program takes both read less than any design has."""
+    path = INPUTS / f"{name}.toml"
+    found = follow(path)
+    assert found["claim"]["kind"] == "estimate"
+    assert found["claim"]["value"] == pytest.approx(exact(path, found["design"]), rel=1e-12)
+    assert found["claim"]["value"] >= least
+    assert is_modest(found["claim"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "value"), [("few-angles-below-any-design", 1508.9), ("few-angles-16-percent-below", 3837.4)]
+)
+def test_the_whole_problem_is_solved_at_enough_angles(name: str, value: float) -> None:
+    found = settle(INPUTS / f"{name}.toml")
+    assert found["claim"]["value"] == pytest.approx(value, rel=1e-3)
+    assert found["claim"]["is_last"]
+
+
+def test_a_limit_that_the_shown_design_breaks_is_marked_at_once() -> None:
+    path = INPUTS / "held-mounts-break-sag.toml"
+    found = follow(path)
+    sag = next(limit for limit in found["limits"] if limit["name"] == "static sag")
+    assert found["claim"]["kind"] == "held"
+    assert "for these mounts" in found["claim"]["words"]
+    assert found["claim"]["breaks"] == "breaks static sag (2.501 mm, at most 1.800 mm)"
+    assert sag["broken"]
+    assert sag["words"] == "broken: 2.501 mm, at most 1.800 mm"
+    wide = follow(path, Edit("set", "constraints.2.max", "3 mm"))
+    assert wide["claim"]["breaks"] == ""
+    assert next(limit for limit in wide["limits"] if limit["name"] == "static sag")["words"] == "is 2.501 mm; has room"
+
+
+def test_a_limit_of_the_ready_elastic_four_is_marked_as_it_moves() -> None:
+    path = PROBLEMS / "tractor-four-elastic.toml"
+    problem = load(path)
+    sag = next(limit for limit in problem.limits if limit.name == "static sag")
+    value = evaluate(problem).value(sag.measure)
+    found = follow(path, Edit("set", "constraints.1.max", f"{value / 1.58!r} m"))
+    assert "breaks static sag" in found["claim"]["breaks"]
+    assert is_modest(found["claim"])
+
+
+def test_limits_on_numbers_that_wait_are_named_and_measured() -> None:
+    path = PROBLEMS / "soft-single-run-up.toml"
+    found = follow(path)
+    assert found["claim"]["words"].endswith("without the limits on run-up twist and run-up travel")
+    twist = next(limit for limit in found["limits"] if limit["name"] == "run-up twist")
+    assert twist["broken"] == ("run-up twist" in found["claim"]["breaks"])
+
+
+def test_a_claim_carries_the_position_of_the_settings_that_it_is_about() -> None:
+    path = PROBLEMS / "tractor-four-lanchester.toml"
+    assert follow(path, position=41)["claim"]["position"] == 41
+    found = json.loads(answers.settle(Source(tables_of(path), path), Asked(position=42), 600.0))
+    assert found["claim"]["position"] == 42
+
+
+def test_what_is_held_as_decided_is_named() -> None:
+    path = INPUTS / "rank-all-cranks.toml"
+    names = [decision.name for decision in load(path).decisions if not decision.is_affine]
+    held = tuple(Edit("fix", name, f"{-200 if name.endswith('z') else 100 * (1 - 2 * ('right' in name))} mm")
+                 for name in names)  # fmt: skip
+    found = follow(path, held=held)
+    assert found["claim"]["kind"] == "held"
+    assert found["claim"]["words"].endswith("for these shaft positions")
+    # fixed by the user, they are part of the problem
+    assert follow(path, *held)["claim"]["kind"] == "estimate"
+
+
+def test_words_of_what_is_simpler() -> None:
+    assert not Simpler()
+    both = Simpler(("these mounts", "this crank"), ("tolerances",))
+    assert both.phrase == " for these mounts and this crank without tolerances"
+    told = conflict_claim(3, ("a", "b"), Simpler(("these mounts",)))
+    assert told.text == "No design found: 'a' and 'b' contradict each other for these mounts. Move one of the limits"
+    assert conflict_claim(3, ("a",), is_last=True).lead == "No design exists:"
+
+
+@pytest.mark.parametrize(
+    ("value", "side", "broken"),
+    [(1.1, "at most", True), (1.0, "at most", False), (0.9, "at least", True), (1.0, "at least", False)],
+)
+def test_a_limit_is_broken_on_its_side(value: float, side: str, broken: bool) -> None:
+    assert is_broken(LimitValue("x", value, 1.0, "N", False, 0.0, side)) == broken
+
+
+@pytest.mark.slow
+def test_no_ready_problem_claims_more_than_an_estimate_while_it_is_followed() -> None:
+    for path in sorted(PROBLEMS.glob("*.toml")):
+        tables = tables_of(path)
+        if "study" in tables:
+            continue
+        found = json.loads(answers.follow(Source(tables, path), Asked(has="later")))
+        claim = found["claim"]
+        assert not claim["is_last"], path.stem
+        if claim["kind"] != "no design":
+            assert is_modest(claim), path.stem
+        if found["design"] is not None:
+            problem = load(path)
+            moved = not problem.phasing and all(decision.is_affine for decision in problem.decisions)
+            if moved and problem.objective and not problem.ranks:
+                assert claim["value"] == pytest.approx(exact(path, found["design"]), rel=1e-9), path.stem
+
+
+def test_the_exact_model_is_asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The value, all limits and the drawing of a design come from one evaluation."""
+    asked = []
+    monkeypatch.setattr("laufruhe.server.scenes.evaluate", lambda *given: asked.append(given) or evaluate(*given))
+    path = INPUTS / "few-angles-below-any-design.toml"
+    json.loads(answers.follow(Source(tables_of(path), path), Asked()))
+    assert len(asked) == 1
