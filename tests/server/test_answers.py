@@ -242,3 +242,17 @@ def test_pictures_of_other_files_are_not_shown() -> None:
     answers.settle(first, Asked(), 600.0)
     assert json.loads(answers.picture(first, Asked(), 0))["name"] == "engine"
     assert json.loads(answers.picture(replace(first, content="b"), Asked(), 0)) == {"done": True}
+
+
+@pytest.mark.slow
+def test_a_number_of_the_file_is_held_where_it_stands_until_it_is_searched() -> None:
+    """Sliders move the weights on the engine that its start draws; what is found last has no bound to claim."""
+    path = PROBLEMS / "single-stroke-offset.toml"
+    first, held = follow(path), follow(path, edits=(Edit("fix", "engine.stroke", "130 mm"),))
+    assert [slider["name"] for slider in first["model"]["sliders"]] == ["web.balance_factor"]
+    assert "for these other numbers" in first["claim"]["words"]
+    assert held["limits"][0]["value"] < 0.99 * first["limits"][0]["value"]
+    found = settle(path)["claim"]
+    assert found["kind"] == "found"
+    assert "no useful bound" in found["words"]
+    assert found["value"] == pytest.approx(laufruhe.solve(path).objective.value, rel=1e-9)

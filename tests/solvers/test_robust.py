@@ -247,7 +247,17 @@ def test_limits_are_kept_by_every_engine(read: Callable[[str], Problem]) -> None
 @pytest.mark.parametrize(
     ("text", "word"),
     [
-        (TEXT.replace("firing_order = [1, 3, 4, 2]", 'cylinders = 4\nfiring_order = "open"\nthrows = "open"'), "stars"),
+        (
+            TEXT.replace(
+                "firing_order = [1, 3, 4, 2]",
+                'cylinders = 4\nthrows = "open"\n[phasing]\nintervals = { largest_deviation = "20 deg" }',
+            ),
+            "fire evenly",
+        ),
+        (
+            TEXT.replace("cylinder_spacing = ", 'offset = { between = ["0 mm", "5 mm"] }\ncylinder_spacing = '),
+            "engine.offset is open too",
+        ),
         (TEXT.replace('["60 mm", "-100 mm"]', '[{ between = ["0 mm", "60 mm"] }, "-100 mm"]'), "left.y"),
     ],
 )

@@ -324,6 +324,9 @@ class Problem:
 
     def built(self, errors: Any) -> Problem:
         """The problem of engines with these errors, shape (columns,), none of which is left to chance (R2)."""
+        numbers = [decision.name for decision in self.decisions if decision.address_drives]
+        if numbers:
+            raise ModelError(f"tolerances are of one drawing, and {', '.join(numbers)} is open; fix it first")
         given = Drawing(self.engine, self.points, self.decisions, self.mount_numbers)
         found = self.tolerances.built(given, errors)
         return replace(
