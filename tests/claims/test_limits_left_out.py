@@ -45,7 +45,7 @@ def test_a_limit_with_room_takes_nothing_from_the_proof(problem: Problem) -> Non
 
 
 @pytest.mark.slow
-def test_a_limit_that_holds_leaves_the_bound_without_it(problem: Problem) -> None:
+def test_a_limit_that_holds_leaves_at_least_the_bound_without_it(problem: Problem) -> None:
     free = laufruhe.solve(problem.changed(limits=()))
     (limit,) = problem.limits
     reached = evaluate(problem, free.final.engine).value(limit.measure)
@@ -59,10 +59,9 @@ def test_a_limit_that_holds_leaves_the_bound_without_it(problem: Problem) -> Non
     assert found.certificate is not None
     assert found.objective is not None
     assert free.objective is not None
-    assert found.certificate.lower_bound == pytest.approx(free.objective.value, rel=1e-4)
-    assert found.certificate.lower_bound <= _least(tight)
+    # boxes of the weight may show more than that
+    assert free.objective.value * (1.0 - 1e-4) <= found.certificate.lower_bound <= _least(tight)
     assert found.final.excess(tight.limits) <= 1e-5
-    assert "without 1 limit" in found.certificate.method
 
 
 @pytest.mark.slow
@@ -73,8 +72,7 @@ def test_a_term_that_no_closing_method_knows_takes_its_own_share_alone(problem: 
     assert found.certificate is not None
     assert alone.objective is not None
     assert found.objective is not None
-    assert found.certificate.lower_bound == pytest.approx(alone.objective.value, rel=1e-4)
-    assert found.certificate.lower_bound <= _least(both)
+    assert alone.objective.value * (1.0 - 1e-4) <= found.certificate.lower_bound <= _least(both)
     assert found.objective.value <= _least(both) * (1.0 + 1e-6)
 
 

@@ -22,6 +22,7 @@ from laufruhe.machine import Flywheel, Torsion
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torsion import Resonance, dynamic_stiffness, inertias, receptances, throw_torques
+from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
@@ -34,6 +35,8 @@ from laufruhe.prove.mounts.ranges import SLACK
 # orders whose share of the squares is less, in the middle of the bounds and at their corners, are left out
 LEAST_SHARE = 1e-10
 MOST_CORNERS = 16
+HEATS = frozenset({channels.ABSORBER_HEAT})
+"""Channels that are squares of the swing of absorbers."""
 _SAME = 1e-9
 
 
@@ -102,6 +105,7 @@ class TwistBoxes:
         self._constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
         self._terms = [(t.weight, t.measure) for t in problem.objective if _is_square(t.measure)]
         self._limits = [(limit.maximum, limit.measure) for limit in problem.limits if _is_square(limit.measure)]
+        self._heat = [limit for limit in problem.limits if limit.measure.channel in HEATS]
         self._numbers = [
             (limit, resonance)
             for limit in problem.limits if limit.measure.channel.of_modes is not None
@@ -146,8 +150,11 @@ class TwistBoxes:
         twists = [self._expanded(lines, chains[1], centre, half) for lines in self._lines]
         if any(_least([(1.0, self._under(q, chains, twists))]) > most * (1.0 + SLACK) for most, q in self._limits):
             return math.inf, int(np.argmax(wide))
-        least = _least([(weight, self._under(measure, chains, twists)) for weight, measure in self._terms])
-        pull = np.max([twist.pull[0].max(axis=0, initial=0.0) for twist in twists], axis=0)
+        if any(self._overheats(limit, chains, twists) for limit in self._heat):
+            return math.inf, int(np.argmax(wide))
+        terms = [(weight, self._under(measure, chains, twists)) for weight, measure in self._terms]
+        least, pull = _least(terms), np.nan_to_num(sum((w * under.bends[0] for w, under in terms), np.zeros(len(wide))))
+        pull = pull / max(float(pull.max(initial=0.0)), 1e-300)
         turning = sum(weight * of.least(chains) for weight, of in self._turning)
         if not self._terms:
             # each goes one way with every inertia, and nothing else moves it
@@ -253,6 +260,21 @@ class TwistBoxes:
         slopes = self.coordinates.owners[:, chosen] * (0.5 * (high - low))
         rest = np.array([[float(np.linalg.norm(here - 0.5 * (high + low)))]])
         return Answer(here[None, None], slopes[None, None], rest, np.zeros((1, 1, len(slopes))))
+
+    def _overheats(self, limit: Limit, chains: Sequence[Torsion], twists: Sequence[Expansion]) -> bool:
+        """Tell if an absorber gives off too much all over a box: what it loses of a swing is least at low ends."""
+        root = np.sqrt(inertias(chains[1]))
+        for lines, twist in zip(self._lines, twists, strict=True):
+            point = lines.loads.point
+            rate = lines.orders * point.speed
+            for k, absorber in enumerate(chains[0].absorbers if limit.measure.counts_point(point) else ()):
+                row = np.zeros(len(root))
+                row[len(chains[0].discs) + k], row[chains[0].index(absorber.on)] = 1.0, -1.0
+                swing = mapped(twist, np.broadcast_to(row / root, (1, len(rate), 1, len(root))))
+                lost = absorber.stiffness * absorber.loss_factor * rate + absorber.damping_at(point.speed) * rate**2
+                if _least([(1.0, root_under(swing, 0.5 * lost))]) ** 2 > limit.maximum * (1.0 + SLACK):
+                    return True
+        return False
 
     def _breaks(self, limit: Limit, resonance: Resonance, lower: Array, upper: Array) -> bool:
         """Tell if modes break a limit all over a box: they rise with stiffness and fall with inertia (V15)."""

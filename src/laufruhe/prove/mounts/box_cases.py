@@ -77,7 +77,7 @@ def _with_stops(
     )  # fmt: skip
     corner = np.asarray(np.linalg.cholesky(np.asarray(soft + stops.added(on), dtype=np.float64)))
     off_by, first = _strayed(stops, at, corner, signs, met)
-    rows, factors = counted_rows(model, asked)
+    rows, factors = counted_rows(model.problem, asked)
     maps, turned = model.maps(STILL, at, _AS_LOADS[asked.channel], rows)
     value = maps.real * factors[:, None]
     by_side = None if turned is None else turned.real * factors[:, None]

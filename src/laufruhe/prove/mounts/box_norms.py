@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.arrays import Array, Mask
+from laufruhe.numerics.arrays import Array, Indices, Mask
 from laufruhe.problem.measure import Measure
+from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.box_response import BoxModel, Lines
 from laufruhe.prove.mounts.box_series import Answer, Expansion
 
@@ -54,17 +55,61 @@ def nothing_under(lower: Array) -> Under:
     return Under(np.zeros(len(lower)), np.zeros_like(lower), np.zeros(len(lower)), np.zeros_like(lower))
 
 
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """Orders of operating points in the samples of one period.
+
+    Attributes
+    ----------
+    points
+        Operating point, shape (n,).
+    places, orders
+        Multiple of the lowest order of the period, and of crank speed, shape (n,).
+    samples
+        Steps over the period.
+    """
+
+    points: Indices
+    places: Indices
+    orders: Array
+    samples: int
+
+    @classmethod
+    def of(cls, model: BoxModel, lines: Lines) -> Sampled:
+        """Return orders over the cycle."""
+        base = model.problem.engine.cycle.base_order
+        steps = np.array([int(loads.wrench.base / base) for loads in model.evaluation.loads], dtype=np.intp)
+        return cls(lines.points, lines.places * steps[lines.points], lines.orders, model.evaluation.samples)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether every order has more than two samples, so that sums over samples are those over the period."""
+        return bool(2 * self.places.max(initial=0) < self.samples)
+
+    def turns(self, own: NDArray[np.intp]) -> NDArray[np.complex128]:
+        """Return a phase a sample and order, shape (samples, own); orders beyond half the samples fold."""
+        apart = int(np.gcd.reduce(self.places[own])) or 1
+        apart = apart if self.samples % apart == 0 else 1
+        places, samples = self.places[own] // apart, self.samples // apart
+        return np.asarray(np.exp(2j * math.pi / samples * (np.outer(np.arange(samples), places) % samples)))
+
+
 def under(model: BoxModel, quantity: Measure, lines: Lines, at: Expansion) -> Under:
     """A linear function under a norm of forces or travel, for every box (E38)."""
-    rows, factors = counted_rows(model, quantity)
+    rows, factors = counted_rows(model.problem, quantity)
     answer = model.answer(lines, at, quantity.channel, rows, factors)
-    share, weights = quantity.shares(model.problem.points), line_weights(model, quantity, lines)
+    return norm_under(model.problem, quantity, answer, Sampled.of(model, lines))
+
+
+def norm_under(problem: Problem, quantity: Measure, answer: Answer, lines: Sampled) -> Under:
+    """Return a linear function under a norm of what these orders answer, for every box (E38)."""
+    share, weights = quantity.shares(problem.points), line_weights(problem, quantity, lines)
     if quantity.norm.is_euclidean:
         return root_under(answer, weights)
-    points = [p for p in model.counted(quantity.points) if np.any(lines.points == p)]
-    found = [_sampled(model, quantity, answer, lines, p) for p in points]
+    points = [p for p in np.flatnonzero(share > 0.0) if np.any(lines.points == p)]
+    found = [_sampled(quantity, answer, lines, int(p)) for p in points]
     if not found:
-        return nothing_under(at.centres)
+        return nothing_under(np.zeros((len(answer.slopes), answer.slopes.shape[2])))
     if not quantity.norm.sums_lengths:
         best = np.argmax([each.value for each in found], axis=0)
         pick = np.arange(len(best))
@@ -78,25 +123,25 @@ def under(model: BoxModel, quantity: Measure, lines: Lines, at: Expansion) -> Un
     return Under(np.asarray(value), np.asarray(slopes), rest, bends)
 
 
-def counted_rows(model: BoxModel, quantity: Measure) -> tuple[NDArray[np.intp], Array]:
+def counted_rows(problem: Problem, quantity: Measure) -> tuple[NDArray[np.intp], Array]:
     """Rows of the mounts that count, and the factors on them."""
-    chosen = quantity.places([mount.name for mount in model.problem.engine.mounts])
+    chosen = quantity.places([mount.name for mount in problem.engine.mounts])
     rows = np.array([3 * k + axis for k in chosen for axis in range(3)], dtype=np.intp)
     return rows, np.tile(np.array(quantity.direction_weights or (1.0, 1.0, 1.0)), len(chosen))
 
 
-def line_weights(model: BoxModel, quantity: Measure, lines: Lines) -> Array:
+def line_weights(problem: Problem, quantity: Measure, lines: Sampled | Lines) -> Array:
     """What the square of every order counts in a mean over the cycle, the mounts and the operating points."""
-    chosen = quantity.places([mount.name for mount in model.problem.engine.mounts])
-    share = quantity.shares(model.problem.points)
+    chosen = quantity.places([mount.name for mount in problem.engine.mounts])
+    share = quantity.shares(problem.points)
     return np.asarray(share[lines.points] * np.where(lines.orders > 0.0, 0.5, 1.0) / len(chosen))
 
 
-def _sampled(model: BoxModel, quantity: Measure, answer: Answer, lines: Lines, p: int) -> Under:
+def _sampled(quantity: Measure, answer: Answer, lines: Sampled, p: int) -> Under:
     """Mean, maximum or peak to peak over the samples of one period at one operating point."""
     own = np.flatnonzero(lines.points == p)
     value, slopes, rest, bends = answer.value[:, own], answer.slopes[:, own], answer.rest[:, own], answer.bends[:, own]
-    turns = _turns(model, lines, p, own)
+    turns = lines.turns(own)
     boxes, samples, mounts = len(value), len(turns), value.shape[-1] // 3
     # the three directions of all mounts one after the other, and real and imaginary parts as orders of their own
     waves = np.hstack([turns.real, -turns.imag])
@@ -133,17 +178,6 @@ def _lengths(rows: Array) -> Array:
     """Of vectors, (boxes, samples, 3, mounts) to (boxes, samples, mounts)."""
     x, y, z = rows[:, :, 0], rows[:, :, 1], rows[:, :, 2]
     return np.asarray(np.sqrt(x * x + y * y + z * z))
-
-
-def _turns(model: BoxModel, lines: Lines, p: int, own: NDArray[np.intp]) -> NDArray[np.complex128]:
-    """A phase a sample and order, shape (samples, lines); orders beyond half the samples fold."""
-    step = model.evaluation.loads[p].wrench.base / model.problem.engine.cycle.base_order
-    places = lines.places[own] * int(step)
-    samples = model.evaluation.samples
-    apart = int(np.gcd.reduce(places)) or 1
-    apart = apart if samples % apart == 0 else 1
-    places, samples = places // apart, samples // apart
-    return np.asarray(np.exp(2j * math.pi / samples * (np.outer(np.arange(samples), places) % samples)))
 
 
 def root_under(answer: Answer, weights: Array) -> Under:

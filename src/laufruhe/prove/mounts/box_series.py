@@ -115,7 +115,8 @@ class Expansion:
     @property
     def pull(self) -> Array:
         """By how much each side of every box keeps the series from ending, (..., n)."""
-        size = np.linalg.norm(self.gain, axis=-2) + np.linalg.norm(self.gain, axis=-1)
+        even = self.gain * (self.balance[..., None] / self.balance[..., None, :])
+        size = np.linalg.norm(even, axis=-2) + np.linalg.norm(even, axis=-1)
         return np.asarray(np.nan_to_num(self.sides.summed(size), nan=1.0, posinf=1.0))
 
 

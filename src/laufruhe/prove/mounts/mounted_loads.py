@@ -51,6 +51,11 @@ class Orders:
     omegas: Array
     loads: ComplexArray
 
+    def kept(self, which: Indices) -> Orders:
+        """Return some of them."""
+        own = self.points[which], self.places[which], self.numbers[which], self.omegas[which]
+        return Orders(*own, self.loads[which])
+
 
 @dataclass(frozen=True, eq=False)
 class Pairing:
@@ -88,7 +93,7 @@ class MountedLoads:
             self._model = AffineModel(known, keep_all=True, whole_cycle=True)
         self.samples, self.domains = self._model.full_samples, self._model.domains
         self.root = mass_root(mounting_in(problem.engine).block)
-        self._still: dict[Measure, AffineNorm] = {}
+        self._still: dict[tuple[Measure, bool], AffineNorm] = {}
 
     @property
     def columns(self) -> int:
@@ -138,11 +143,15 @@ class MountedLoads:
         )
         return AffineProblem(terms, limits, self.domains, self.samples)
 
+    def still(self, measure: Measure, averaged: bool) -> AffineNorm:
+        """Return a norm that mounts do not change, at their samples."""
+        if (measure, averaged) not in self._still:
+            self._still[measure, averaged] = self._model.norm(measure, self.samples, averaged)
+        return self._still[measure, averaged]
+
     def _norm(self, measure: Measure, averaged: bool, felt: ComplexArray | None) -> AffineNorm:
         if felt is None:
-            if measure not in self._still:
-                self._still[measure] = self._model.norm(measure, self.samples, averaged)
-            return self._still[measure]
+            return self.still(measure, averaged)
         none = [np.zeros(0)] * len(self.problem.points)
         rows = [
             load_rows(measure, self.problem.points, signals, self.problem.engine, self.samples, none)

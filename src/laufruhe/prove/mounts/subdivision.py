@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import NORMS
-from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.problem import channels
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import at_many
@@ -25,12 +23,13 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import NEARLY, Divided, divided_on
 from laufruhe.prove.mounts.box_lines import BoxLines
-from laufruhe.prove.mounts.box_norms import Under, root_under, under
+from laufruhe.prove.mounts.box_norms import under
 from laufruhe.prove.mounts.box_numbers import RANGES, SAID, UNDER, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, Lines
 from laufruhe.prove.mounts.box_runs import run_boxes
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.ranges import SLACK
+from laufruhe.prove.mounts.ratios import groups_of, is_ratio, ratio_under
 from laufruhe.prove.witness import Known
 
 # open numbers that are divided without being asked for, and what all boxes may cost together
@@ -39,7 +38,6 @@ WORK = 2e7
 MOST_BOXES = 60_000
 # numbers held at once
 HELD = 3e6
-HALVINGS = 45
 # numbers of a motion in time that cost as much as one of an order
 RUN_SHARE = 18
 # of the gap that counts as proven, what small orders may take of it
@@ -140,7 +138,7 @@ class StiffnessBoxes:
         mounts = len(self.problem.engine.mounts)
         lines = sum(len(lines.omegas) for _, _, lines, _ in (*self._terms, *self._limits))
         ratios = [term.measure for term in self.problem.mount_terms]
-        lines += sum(2 * len(self._ratio_lines(q).omegas) for q in ratios if _is_ratio(q))
+        lines += sum(2 * len(self._ratio_lines(q).omegas) for q in ratios if is_ratio(q))
         runs = self.runs.cost // RUN_SHARE if self.runs is not None else 0
         return max(lines, 1) * len(self.problem.decisions) ** 2 * max(mounts, 2) + runs
 
@@ -213,7 +211,7 @@ class StiffnessBoxes:
         """Least of what numbers of the mounts are in the objective, and the pull of sides."""
         found, pull = np.zeros(len(lower)), np.zeros_like(lower)
         for asked, weight in ((term.measure, term.weight) for term in self.problem.mount_terms):
-            if _is_ratio(asked):
+            if is_ratio(asked):
                 ratio, pulled = self._ratio(asked, lower, upper)
                 found, pull = np.asarray(found + weight * ratio), pull + weight * pulled
             else:
@@ -224,7 +222,7 @@ class StiffnessBoxes:
         """Boxes on which a limit of a number of the mounts is broken everywhere, beside what `hold` says."""
         out = np.zeros(len(lower), dtype=bool)
         for limit in self.problem.mount_limits:
-            if _is_ratio(limit.measure):
+            if is_ratio(limit.measure):
                 out |= self._ratio(limit.measure, lower, upper)[0] > limit.maximum * (1.0 + SLACK)
             elif limit.measure.channel not in SAID:
                 out |= breaks(self.model, limit, lower, upper)
@@ -246,43 +244,7 @@ class StiffnessBoxes:
             self.model.answer(each, expansion, channels.MOUNT_FORCE, rows, np.ones(len(rows)))
             for each, expansion in ((lines, at), (lines.still(), still))
         )
-        best, pull = np.zeros(len(lower)), np.zeros_like(lower)
-        for group in _groups(quantity, lines):
-            weights = group.astype(float)
-            top, bottom = root_under(over, weights), root_under(firm, weights)
-            bent = np.einsum("k,bk->b", weights, np.linalg.norm(firm.slopes, axis=-1).sum(axis=-1) ** 2)
-            known = np.all(np.isfinite(firm.rest[:, group]), axis=1) & (bottom.value > 0.0)
-            bend = bent / (2.0 * np.where(known, bottom.value, 1.0))
-            least = _least_ratio(top, replace(bottom, rest=bottom.rest + bend))
-            best = np.maximum(best, np.where(known, least, 0.0))
-            pull = np.maximum(pull, (top.bends + least[:, None] * bottom.bends) / bottom.value[:, None])
-        return best, pull
-
-
-def _is_ratio(quantity: Measure) -> bool:
-    return quantity.channel is channels.TRANSMISSIBILITY
-
-
-def _groups(quantity: Measure, lines: Lines) -> list[Mask]:
-    """Lines that make one ratio: of each operating point every order named, or all together."""
-    out = []
-    for p in np.unique(lines.points):
-        own = lines.points == p
-        orders: Sequence[float | None] = (None,) if quantity.orders is None else quantity.orders
-        out += [own if order is None else own & orders_equal(lines.orders, order) for order in orders]
-    return [group for group in out if group.any()]
-
-
-def _least_ratio(top: Under, bottom: Under) -> Array:
-    """Largest t with top - t bottom >= 0 all over the box, top from below and bottom from above (E40)."""
-    low = np.zeros(len(top.value))
-    high = top.value / np.where(bottom.value > 0.0, bottom.value, 1.0)
-    for _ in range(HALVINGS):
-        t = 0.5 * (low + high)
-        left = top.value - top.rest - t * (bottom.value + bottom.rest)
-        holds = left - np.abs(top.slopes - t[:, None] * bottom.slopes).sum(axis=1) >= 0.0
-        low, high = np.where(holds, t, low), np.where(holds, high, t)
-    return low
+        return ratio_under(over, firm, groups_of(quantity, self.problem.points, lines))
 
 
 def _felt(model: BoxModel, quantity: Measure, budget: float) -> tuple[Lines, float]:

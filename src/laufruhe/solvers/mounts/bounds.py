@@ -11,12 +11,14 @@ import numpy as np
 from laufruhe.load_models.run_look import asks_runs
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import at_least, in_time, passed
+from laufruhe.problem.decision import domains_of, vector_of
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import NEARLY, Divided
 from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.prove.mounts.design_boxes import DesignBoxes, designed_bound, mixes_corners
+from laufruhe.prove.mounts.load_boxes import load_bound
 from laufruhe.prove.mounts.subdivision import divided_bound, divided_bounds, divides
 from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.prove.witness import Known
@@ -60,6 +62,11 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
         room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine if found else None))
         near = found.design.values if found is not None else ()
         known = None if found is None or not met else known_of(found.design, mount_numbers(found.design))
+        if found is not None and met and len(problem.decisions) == 1 and not divides(problem):
+            # boxes of one number are few, and need no multipliers
+            alone = _by_loads(problem, value, room, Divided(0.0, 0), near, known)
+            if alone.bound >= value - room:
+                return alone
         if found is not None and met and mixes_corners(problem) and not divides(problem):
             return _by_corners(problem, search, value, room, near, known)
         divided = _by_boxes(problem, value, room, near, known)
@@ -92,7 +99,22 @@ def _by_corners(
     if passed() or found.bound >= boxes.value - room:
         return found
     few = spring_bound(problem, value, room, near, known=known)
-    return Divided(max(few.bound, found.bound), few.boxes + found.boxes)
+    told = Divided(max(few.bound, found.bound), few.boxes + found.boxes)
+    return _by_loads(problem, value, room, told, near, known)
+
+
+def _by_loads(
+    problem: Problem, value: float, room: float, told: Divided, near: Sequence[Value], known: Known | None
+) -> Divided:  # fmt: skip
+    """Return what boxes of mounts and unbalances add to what is told."""
+    if passed() or told.bound >= value - room:
+        return told
+    place = np.zeros(0)
+    if known is not None:
+        own = [value for value, decision in zip(near, problem.decisions, strict=True) if decision.is_affine]
+        place = np.append(known.place, vector_of(domains_of(problem.unbalances), own))
+    more = load_bound(problem, value, room, told.bound, None if known is None else replace(known, place=place))
+    return Divided(max(more.bound, told.bound), more.boxes + told.boxes, told.places)
 
 
 def _by_boxes(problem: Problem, value: float, room: float, near: Sequence[Value], known: Known | None) -> Divided:
@@ -108,7 +130,9 @@ def _by_boxes(problem: Problem, value: float, room: float, near: Sequence[Value]
     alone = divides(problem)
     with at_least(LEAST_SECONDS):
         few = spring_bound(problem, value, room, near, whole=alone, known=known)
-    if passed() or not alone or (few.boxes and few.bound >= value - room):
+    if not alone:
+        return _by_loads(problem, value, room, few, near, known)
+    if passed() or (few.boxes and few.bound >= value - room):
         return few
     expanded = divided_bounds(problem, value, room, (EARLY, 1.0), known)
     many = next(expanded)

@@ -26,6 +26,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach, gap_of, room_of
 from laufruhe.prove.mounts.named import named_part
+from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, decided, nearest_of, none_within, unbalances_of
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_unbalances
@@ -172,7 +173,13 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
     if conflict:
         return conflict
     convex = _convex_part(problem)
-    return () if convex is None else solve_convex_mounts(convex).conflict
+    conflict = () if convex is None else solve_convex_mounts(convex).conflict
+    if conflict or not problem.unbalances:
+        return conflict
+    # what no load is in is the same for all unbalances
+    limits = tuple(limit for limit in problem.mount_limits if not limit.measure.channel.of_loads)
+    alone = replace(problem, decisions=problem.mount_decisions, objective=(), limits=limits)
+    return ruled_out(alone) if limits and divides(alone) else ()
 
 
 def mounts_bound(problem: Problem, near: Sequence[Value] = ()) -> float:

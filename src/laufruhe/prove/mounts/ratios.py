@@ -1,0 +1,71 @@
+"""Transmissibility over boxes: the least ratio of forces to those of mounts that give no way (E40)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from laufruhe.machine import OperatingPoint
+from laufruhe.numerics.arrays import Array, Mask
+from laufruhe.numerics.spectrum import orders_equal
+from laufruhe.problem import channels
+from laufruhe.problem.measure import Measure
+from laufruhe.prove.mounts.box_norms import Sampled, Under, root_under
+from laufruhe.prove.mounts.box_response import Lines
+from laufruhe.prove.mounts.box_series import Answer
+
+HALVINGS = 45
+RATIOS = frozenset({channels.TRANSMISSIBILITY})
+"""Channels whose numbers are such a ratio."""
+
+
+def is_ratio(measure: Measure) -> bool:
+    """Return whether a measure is a transmissibility."""
+    return measure.channel in RATIOS
+
+
+def groups_of(quantity: Measure, points: Sequence[OperatingPoint], lines: Lines | Sampled) -> list[Mask]:
+    """Lines that make one ratio: of each operating point every order named, or all above zero together."""
+    out = []
+    for p in (p for p in np.unique(lines.points) if quantity.counts_point(points[p])):
+        own = (lines.points == p) & (lines.orders > 0.0)
+        orders: Sequence[float | None] = (None,) if quantity.orders is None else quantity.orders
+        out += [own if order is None else own & orders_equal(lines.orders, order) for order in orders]
+    return [group for group in out if group.any()]
+
+
+def ratio_under(over: Answer, firm: Answer, groups: Sequence[Mask]) -> tuple[Array, Array]:
+    """Least of the largest ratio on every box, shape (boxes,), and the pull of sides.
+
+    Parameters
+    ----------
+    over, firm
+        Forces of orders, and those at rest under the same loads.
+    groups
+        Of orders that make one ratio.
+    """
+    best, pull = np.zeros(len(over.value)), np.zeros(over.bends[:, 0].shape)
+    for group in groups:
+        weights = group.astype(float)
+        top, bottom = root_under(over, weights), root_under(firm, weights)
+        bent = np.einsum("k,bk->b", weights, np.linalg.norm(firm.slopes, axis=-1).sum(axis=-1) ** 2)
+        known = np.all(np.isfinite(firm.rest[:, group]), axis=1) & (bottom.value > 0.0)
+        bend = bent / (2.0 * np.where(known, bottom.value, 1.0))
+        least = _least_ratio(top, replace(bottom, rest=bottom.rest + bend))
+        best = np.maximum(best, np.where(known, least, 0.0))
+        pull = np.maximum(pull, (top.bends + least[:, None] * bottom.bends) / bottom.value[:, None])
+    return best, pull
+
+
+def _least_ratio(top: Under, bottom: Under) -> Array:
+    """Largest t with top - t bottom >= 0 all over the box, top from below and bottom from above (E40)."""
+    low = np.zeros(len(top.value))
+    high = top.value / np.where(bottom.value > 0.0, bottom.value, 1.0)
+    for _ in range(HALVINGS):
+        t = 0.5 * (low + high)
+        left = top.value - top.rest - t * (bottom.value + bottom.rest)
+        holds = left - np.abs(top.slopes - t[:, None] * bottom.slopes).sum(axis=1) >= 0.0
+        low, high = np.where(holds, t, low), np.where(holds, high, t)
+    return low

@@ -1,0 +1,67 @@
+"""One open number of the mounts is bounded in seconds, and a band that no stiffness leaves is infeasible."""
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+import laufruhe
+from attack.own_loads import si
+from attack.own_problem import Own
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers.result import Status
+
+INPUTS = Path(__file__).parent / "inputs"
+
+
+def own_of(name: str) -> Own:
+    return Own(tomllib.loads((INPUTS / f"{name}.toml").read_text(encoding="utf-8")), 256)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["one-damper-over-41-speeds", "one-stiffness-under-transmissibility"])
+def test_one_number_is_proven(name: str) -> None:
+    found, own = laufruhe.solve(INPUTS / f"{name}.toml"), own_of(name)
+    ((low, high),) = own.box
+    designs = own.designs(np.linspace(low, high, 61)[:, None])
+    least = float(np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf).min())
+    assert found.certificate is not None
+    assert found.objective is not None
+    assert found.certificate.kind is Proof.GLOBAL
+    assert found.certificate.gap <= 1e-3
+    assert found.certificate.lower_bound <= least * (1.0 + 1e-6)
+    assert found.objective.value <= least * (1.0 + 1e-6)
+
+
+def frequencies(table: dict[str, Any], stiffness: float) -> np.ndarray:
+    """Natural frequencies of the block on upright springs, with the open one at a stiffness [Hz]."""
+    centre = np.array([si(x) for x in table["block"]["centre_of_gravity"]])
+    (xx, yy, zz), (xy, xz, yz) = ([si(x) for x in table["block"][key]] for key in ("inertia", "inertia_products"))
+    mass = np.zeros((6, 6))
+    mass[:3, :3] = si(table["block"]["mass"]) * np.eye(3)
+    mass[3:, 3:] = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+    whole = np.zeros((6, 6))
+    for place in table["mounts"]["places"]:
+        x, y, z = np.array([si(each) for each in place["position"]]) - centre
+        motion = np.hstack([np.eye(3), np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])])
+        springs = [stiffness if isinstance(k, dict) else si(k) for k in place["stiffness"]]
+        whole += motion.T @ np.diag(springs) @ motion
+    return np.sqrt(eigh(whole, mass, eigvals_only=True)) / (2.0 * np.pi)
+
+
+@pytest.mark.slow
+def test_a_band_that_no_stiffness_leaves_is_infeasible() -> None:
+    path = INPUTS / "frequency-band-on-any-stiffness.toml"
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    found = laufruhe.solve(path)
+    assert found.status is Status.INFEASIBLE
+    assert found.conflict == ("natural frequencies",)
+    # frequencies feel no weight: on every stiffness one stands in the band
+    low, high = (si(edge) for edge in table["constraints"][0]["outside"])
+    ends = next(k for place in table["mounts"]["places"] for k in place["stiffness"] if isinstance(k, dict))
+    for stiffness in np.linspace(*map(si, ends["between"]), 1001):
+        f = frequencies(table, float(stiffness))
+        assert np.any((f > low) & (f < high))

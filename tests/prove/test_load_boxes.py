@@ -1,0 +1,96 @@
+"""Boxes of mounts and unbalances: no design is under the bound of its box, and small boxes come near (E71)."""
+
+from __future__ import annotations
+
+import itertools
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import laufruhe
+from attack.families import problem as random_problem
+from attack.own_problem import Own
+from lanes import first_fast
+from laufruhe.problem.evaluation import at_many, evaluate, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.mounts.load_boxes import LoadBoxes, is_boxed, load_bound
+
+INPUTS = Path(__file__).parents[1] / "claims" / "inputs"
+# rms, mean and largest force and travel on stiff, moved and turned mounts, under limits of loads and modes
+SEEDS = (780003, 780004, 780005, 780000, 780014, 780017, 780012, 780002, 780031, 780032, 780033, 780034)
+
+
+def columns(problem: Problem, x: np.ndarray, numbers: int) -> list[complex]:
+    """Return the values of all decisions, those of unbalances from their columns."""
+    mounts, unbalances, values = iter(x[:numbers]), iter(x[numbers:]), []
+    for decision in problem.decisions:
+        if not decision.is_affine:
+            values.append(float(next(mounts)))
+        elif decision.set.width == 2:
+            values.append(complex(next(unbalances), next(unbalances)))
+        else:
+            values.append(float(next(unbalances)) * decision.set.directions[0])
+    return values
+
+
+def is_inside(problem: Problem, values: list[complex]) -> bool:
+    pairs = zip(problem.decisions, values, strict=True)
+    return all(abs(value) <= d.upper for d, value in pairs if d.set.width == 2)
+
+
+@pytest.mark.parametrize("seed", first_fast(SEEDS, 3))
+def test_no_design_of_a_box_is_under_its_bound_and_small_boxes_come_near(seed: int) -> None:
+    problem = at_many(laufruhe.load(random_problem("joint", seed)[0]))
+    if not is_boxed(problem):
+        pytest.skip("more is open than boxes take")
+    boxes, generator = LoadBoxes(problem, 1e-9), np.random.default_rng(seed)
+    low, high, numbers = boxes.lower, boxes.upper, len(problem.mount_decisions)
+    near = []
+    for widest in (1.0, 0.3, 0.1, 0.02, 1e-4):
+        middle, half = generator.uniform(low, high), 0.5 * (high - low) * widest * generator.random(len(low))
+        lower, upper = np.maximum(middle - half, low), np.minimum(middle + half, high)
+        bound = float(boxes.bounds(lower[None], upper[None])[0][0])
+        for share in generator.random((6, len(low))):
+            values = columns(problem, lower + share * (upper - lower), numbers)
+            found = evaluate(problem, problem.design(values))
+            if is_inside(problem, values) and found.excess(problem.limits) <= 0.0:
+                assert bound <= objective_value(problem, found) * (1.0 + 1e-9)
+            if widest == 1e-4 and bound < np.inf:
+                near.append(bound / objective_value(problem, found))
+    assert not near or max(near) > 0.98
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["one-damper-over-41-speeds", "one-stiffness-under-transmissibility"])
+def test_one_open_number_is_bounded_by_few_boxes(name: str) -> None:
+    path = INPUTS / f"{name}.toml"
+    problem, own = laufruhe.load(path), Own(tomllib.loads(path.read_text(encoding="utf-8")), 256)
+    ((low, high),) = own.box
+    designs = own.designs(np.linspace(low, high, 61)[:, None])
+    objective = np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf)
+    least = float(objective.min())
+    found = load_bound(problem, least, 1e-3 * least)
+    assert found.boxes <= 60
+    assert least * (1.0 - 1e-3) <= found.bound <= least * (1.0 + 1e-6)
+    # a better value than any is not shown
+    assert load_bound(problem, 1.2 * least, 1e-3 * least).bound <= least * (1.0 + 1e-6)
+
+
+@pytest.mark.slow
+def test_a_transmissibility_limit_takes_the_boxes_where_it_is_broken() -> None:
+    path = INPUTS / "one-stiffness-under-transmissibility.toml"
+    problem, own = laufruhe.load(path), Own(tomllib.loads(path.read_text(encoding="utf-8")), 256)
+    (limit,) = problem.limits
+    ((low, high),) = own.box
+    x = np.linspace(low, high, 201)
+    ratio = own.designs(x[:, None]).measure({"quantity": "transmissibility", "orders": [2]})
+    boxes = LoadBoxes(
+        problem.changed(limits=(limit.__class__(limit.name, limit.measure, float(np.median(ratio))),)), 0.0
+    )
+    edges = np.linspace(low, high, 21)
+    bounds = boxes.bounds(edges[:-1, None], edges[1:, None])[0]
+    broken = [ratio[(x >= a) & (x <= b)].min() > np.median(ratio) for a, b in itertools.pairwise(edges)]
+    assert not np.any(np.isinf(bounds) & ~np.array(broken))
+    assert np.isinf(bounds).sum() >= 5
