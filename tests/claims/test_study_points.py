@@ -80,6 +80,14 @@ def test_every_file_that_a_scene_names_counts(tables: dict[str, object], tmp_pat
     assert len({absent, first, changed}) == 3
 
 
+def test_which_of_two_files_it_is_counts(tmp_path: Path) -> None:
+    point = Point(CaseTable(name="a", problem="a.toml"), base={"gas": {"files": ["a.csv", "b.csv"]}})
+    (tmp_path / "a.csv").write_text("1,2\n", encoding="utf-8")
+    first = Scenes(tmp_path).fingerprint(point, {})
+    (tmp_path / "a.csv").rename(tmp_path / "b.csv")
+    assert Scenes(tmp_path).fingerprint(point, {}) != first
+
+
 @pytest.mark.parametrize("text", ["a\x00b", "x" * 5000, "", ".", "/dev/zero", "\ud800"])
 def test_texts_that_name_no_file_do_no_harm(text: str, tmp_path: Path) -> None:
     point = Point(CaseTable(name="a", problem="a.toml"), base={"title": text})

@@ -123,6 +123,9 @@ def test_names_of_files_cannot_command_a_screen(here: Path) -> None:
         assert found.exit_code == 0
         assert "\\x1b" in found.output
         assert all(line.isprintable() for line in found.output.splitlines())
+    (folder,) = (here / "results").iterdir()
+    for page in (folder / "report.md", folder / "report.html"):
+        assert "\x1b" not in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("command", ["check", "solve", "evaluate", "study", "explain", "trade", "page"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from itertools import groupby
@@ -11,6 +10,7 @@ from pathlib import Path
 import typer
 
 from laufruhe.cli.questions import asked, described
+from laufruhe.cli.screen import typed
 from laufruhe.errors import printed, refused
 from laufruhe.files import drafts, ready
 from laufruhe.files.catalogue import CatalogueEngine, engine_named, engines
@@ -28,7 +28,7 @@ def begun(file: Path, name: str | None) -> str:
     _write({file.parent / other: text for other, text in texts.items()})
     known = ready.ready().get((source or "").removesuffix(".toml"))
     command = "study" if known is not None and known.is_study else "solve"
-    return printed(f"{file}: ready to be changed; then: {shlex.join(['laufruhe', command, str(file)])}") + "\n"
+    return f"{printed(str(file))}: ready to be changed; then: {typed('laufruhe', command, str(file))}\n"
 
 
 def _texts(file: Path, source: str | None) -> dict[str, str]:

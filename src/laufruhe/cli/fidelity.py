@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import replace
@@ -11,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from laufruhe.cli.screen import typed
 from laufruhe.errors import SolverError, refused
 from laufruhe.fidelity.automatic import Choice, choose
 from laufruhe.fidelity.mount_needs import needs
@@ -144,7 +144,7 @@ def _pages(path: Path, one: Trade) -> Pages:
 
 def _page(path: Path, one: Trade, picture: str | None = None) -> Document:
     """The page of a problem; a picture by its name."""
-    return report.trade_document(one, picture, shlex.join(["laufruhe", "trade", str(path)]))
+    return report.trade_document(one, picture, typed("laufruhe", "trade", str(path)))
 
 
 def _with_objective(path: Path) -> Problem:

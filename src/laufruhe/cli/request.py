@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from laufruhe.cli.drawing import Ask
+from laufruhe.cli.screen import typed
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Request:
     def command(self) -> str:
         """The line that makes the same result again."""
         words = ["laufruhe", self.verb, str(self.problem), *(("--series",) if self.series else ())]
-        return shlex.join(words if self.tolerance is None else [*words, "--tolerance", f"{self.tolerance:g}"])
+        return typed(*words, *([] if self.tolerance is None else ["--tolerance", f"{self.tolerance:g}"]))
 
 
 @contextmanager

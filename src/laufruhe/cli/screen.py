@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import math
 import os
+import shlex
 import sys
 import time
 import warnings
@@ -23,6 +24,8 @@ QUIET, PLAIN, VERBOSE = -1, 0, 1
 _loudness: ContextVar[int] = ContextVar("loudness", default=PLAIN)
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+LONGEST = 10_000
+"""Characters of a command that is shown."""
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 Shown: TypeAlias = str | Callable[[TextIO], None]
@@ -99,6 +102,11 @@ def at_work(scheduler: str | None) -> Iterator[None]:
 
     with cluster(scheduler) as workers, working_on(workers):
         yield
+
+
+def typed(*words: str) -> str:
+    """Return a command as it is typed, with escapes in place of what no screen should be sent."""
+    return printed(shlex.join(words), LONGEST)
 
 
 def complain(lines: str) -> None:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import shlex
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from laufruhe.cli.drawing import Ask
-from laufruhe.cli.screen import pace
+from laufruhe.cli.screen import pace, typed
 from laufruhe.errors import printed, refused
 from laufruhe.files.reader import shown_as
 from laufruhe.numerics.cores import processors
@@ -34,7 +33,7 @@ def studied(
     option, names = "--out" if out is not None else "results", file_names(study)
     with files.staged(files.Set(folder, option, "study", names, beside=[KEPT])) as stage:
         datasets, seconds = run(study, path.parent, kept, _Teller(say), jobs or processors())
-        command = shlex.join(["laufruhe", "study", str(path)])
+        command = typed("laufruhe", "study", str(path))
 
         def draw(picture: Picture, place: Path) -> Callable[[], str]:
             return ask("laufruhe.plots.picture:save_picture", picture, place, kinds)

@@ -125,7 +125,8 @@ class Scenes:
         found = hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode())
         folder = (self.folder / point.case.problem).parent
         for text in sorted({text for _, text in texts_in(tables)}):
-            found.update(_content_of(folder / text))
+            if content := _content_of(folder / text):
+                found.update(text.encode() + content)
         return found.hexdigest()[:32]
 
 
