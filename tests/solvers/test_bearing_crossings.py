@@ -123,12 +123,13 @@ def test_places_of_balancer_shafts_beside_bearings() -> None:
     assert found.objective.value <= least * (1.0 + 1e-3)
     assert found.certificate.lower_bound <= least
     assert least <= 1.05 * found.objective.value
-    # of a weight on the crank itself bearings feel the place: it is searched, and nothing is claimed of it
+    # of a weight on the crank itself bearings feel the place: it is searched, and nothing is claimed but what is bounded
     moved = [{**WEBS[0], "x": open_place, "mass": "1 kg"}, *WEBS[1:]]
     local = laufruhe.solve(problem_of({**told, "counterweights": moved}, ""))
-    assert (local.certificate.kind, local.certificate.lower_bound) == (Proof.LOCAL, 0.0)
-    fixed = (
+    assert local.certificate.kind is Proof.LOCAL
+    fixed = [
         laufruhe.solve(problem_of({**told, "counterweights": [{**moved[0], "x": f"{x} mm"}, *moved[1:]]}, ""))
         for x in (-200, -100, 0, 100, 200)
-    )
-    assert local.objective.value <= min(one.objective.value for one in fixed) * (1.0 + 1e-4)
+    ]
+    least = min(one.objective.value for one in fixed)
+    assert local.certificate.lower_bound <= local.objective.value <= least * (1.0 + 1e-4)
