@@ -123,7 +123,7 @@ def test_places_of_balancer_shafts_beside_bearings() -> None:
     assert found.objective.value <= least * (1.0 + 1e-3)
     assert found.certificate.lower_bound <= least
     assert least <= 1.05 * found.objective.value
-    # of a weight on the crank itself bearings feel the place: it is searched, and nothing is claimed but what is bounded
+    # of a weight on the crank itself bearings feel the place: it is searched, and little is claimed
     moved = [{**WEBS[0], "x": open_place, "mass": "1 kg"}, *WEBS[1:]]
     local = laufruhe.solve(problem_of({**told, "counterweights": moved}, ""))
     assert local.certificate.kind is Proof.LOCAL
