@@ -25,9 +25,9 @@ from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN
 from laufruhe.present.measures import places_of
-from laufruhe.problem.channels import CHANNELS, Channel
+from laufruhe.problem.channels import CHANNELS
 from laufruhe.problem.decision import Decision, Domain, Kind, vector_of
-from laufruhe.problem.dependence import Dependence, dependence, depends
+from laufruhe.problem.dependence import depends, is_affine
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
@@ -149,16 +149,11 @@ class _Collected:
             found += self._shown(limit.measure, "limit", limit.name, limit)
         return tuple(found)
 
-    def _is_affine(self, channel: Channel) -> bool:
-        """Return True for a channel that is known to be affine in what slides, or constant."""
-        found = {dependence(channel, kind, self.model.problem) for kind in self.kinds}
-        return found <= {Dependence.NONE, Dependence.AFFINE}
-
     def _shown(
         self, measure: Measure, role: str, name: str, limit: Limit | None = None, weight: float = 1.0
     ) -> list[Shown]:
         stays = not depends(measure.channel, self.kinds, self.model.problem)
-        follows = (measure.is_mass or measure.is_load) and self._is_affine(measure.channel)
+        follows = (measure.is_mass or measure.is_load) and is_affine(measure.channel, self.kinds, self.model.problem)
         follows = follows and measure.norm.name in NORMS_OF_PAGE
         self.asked.append(measure if follows and not stays else None)
         base = Shown(role, name, measure.unit, measure.norm.name, measure.norm.refinement, None, weight, _sides(limit))

@@ -68,9 +68,9 @@ main-bearing pressure               a a a  s m >  >  0 0  0 0
 main-bearing pressure times speed   a a a  s m >  >  0 0  0 0
 hammer blow                         a a a  s m >  >  0 0  0 0
 friction power                      a a a  s m >  >  0 0  0 0
-web stress                          a a a  s m >  >  0 0  0 0
+web stress                          a a a  s m s  >  0 0  0 0
 journal torsion stress              a a a  s m >  >  0 0  0 0
-journal stress                      a a a  s m >  >  0 0  0 0
+journal stress                      a a a  s m s  >  0 0  0 0
 crank-pin force                     0 0 a  0 m s  >  0 0  0 0
 crank-pin pressure                  0 0 a  0 m s  >  0 0  0 0
 crank-pin bending stress            a 0 a  0 m s  >  0 0  0 0
@@ -153,6 +153,9 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
     if kind is Kind.STIFFNESS and problem.engine.block is None and channel.is_load:
         # rigid mounts share a force by their places alone
         return Dependence.NONE
+    if kind is Kind.LEAD and found in (Dependence.SHIFT, Dependence.SWING) and shares_gas(problem):
+        # a lead moves one piston against another that has the same gas
+        return Dependence.SMOOTH
     if problem.fidelity.is_uneven and found in _OF_EVEN_SPEED and kind is not Kind.STAR:
         return Dependence.SMOOTH
     return found
@@ -161,6 +164,23 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
 def depends(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool:
     """Return whether a channel may change with decisions of these kinds; what is UNKNOWN may."""
     return any(dependence(channel, kind, problem) is not Dependence.NONE for kind in kinds)
+
+
+def is_affine(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool:
+    """Return whether a channel is affine in decisions of these kinds together, or constant."""
+    if {Kind.SHARE, Kind.PISTON} <= set(kinds):
+        # what is reckoned on a geared shaft is a share of what the pistons make
+        return not depends(channel, kinds, problem)
+    allowed = (Dependence.NONE, Dependence.AFFINE)
+    return all(dependence(channel, kind, problem) in allowed for kind in kinds)
+
+
+def shares_gas(problem: Problem) -> bool:
+    """Return whether gas that is felt works between two pistons, of which one may lead."""
+    names = {shaft for decision in problem.decisions for shaft in decision.keys(Kind.LEAD)}
+    parts = problem.engine.slider_cranks
+    led = (part for part in parts if part.shaft.name in names)
+    return problem.feels_gas and any(part.faces(other) for part in led for other in parts if other is not part)
 
 
 def _moves_carried(problem: Problem) -> bool:

@@ -20,7 +20,6 @@ from laufruhe.numerics.witness import collected
 from laufruhe.problem.channels import (
     ABSORBER_HEAT,
     AT_EACH_MOUNT,
-    ENVELOPE_RADIUS,
     FLYWHEEL_INERTIA,
     IRREGULARITY,
     MOUNT_FORCE,
@@ -28,9 +27,8 @@ from laufruhe.problem.channels import (
     OF_FLYWHEEL,
     OF_MOUNTING,
     OF_RUNS,
+    OF_SHAFT_PLACES,
     OF_SIZES,
-    SHAFT_CLEARANCE,
-    SHAFT_DISTANCE,
     TORSIONAL,
     Channel,
 )
@@ -70,6 +68,14 @@ def _is_pointwise(norm: Norm) -> bool:
     return norm.is_convex and norm.is_pointwise
 
 
+def _is_of_lengths(norm: Norm) -> bool:
+    return norm.is_convex and norm.of_row_lengths
+
+
+def _is_no_number(channel: Channel) -> bool:
+    return not channel.is_number
+
+
 @dataclass(frozen=True)
 class Method:
     """A way of deciding.
@@ -90,6 +96,8 @@ class Method:
         Channels that it has formulas of its own for, however they depend on what is open, but not UNKNOWN.
     norms
         Return whether it suits a norm of a load, by what that claims.
+    still
+        Return whether a channel that it does not know, and that nothing open moves, may be asked beside.
     also
         Return whether other facts of a problem suit it.
     """
@@ -101,6 +109,7 @@ class Method:
     judges_fidelity: bool = False
     knows: frozenset[Channel] = frozenset()
     norms: Callable[[Norm], bool] = _is_convex
+    still: Callable[[Channel], bool] = lambda _: True
     also: Callable[[Problem], bool] = lambda _: True
 
     @property
@@ -123,12 +132,12 @@ class Method:
             return all(Dependence.AFFINE in self.needs[kind] for kind in kinds)
         if measure.is_load and not self.norms(measure.norm):
             return False
-        for kind in kinds:
-            found = dependence(measure.channel, kind, problem)
-            own = measure.channel in self.knows and found is not Dependence.UNKNOWN
-            if not (own or found is Dependence.NONE or found in self.needs[kind]):
-                return False
-        return True
+        found = {kind: dependence(measure.channel, kind, problem) for kind in kinds}
+        if measure.channel in self.knows:
+            return Dependence.UNKNOWN not in found.values()
+        if all(each is Dependence.NONE for each in found.values()):
+            return self.still(measure.channel)
+        return all(each is Dependence.NONE or each in self.needs[kind] for kind, each in found.items())
 
     def decided(self, problem: Problem) -> Result:
         """The design, accurate as far as that is looked at; what decides is imported when it first does."""
@@ -147,26 +156,6 @@ def kinds_of(problem: Problem) -> frozenset[Kind]:
     return frozenset([*stars, *(decision.kind for decision in problem.decisions)])
 
 
-def _asks_mounted_sizes(problem: Problem) -> bool:
-    """Whether loads are minimised beside what mounts are asked for, and the rest suits boxes of sizes."""
-    others = [term for term in problem.objective if not term.measure.is_mounting]
-    limits = [limit for limit in problem.limits if not limit.measure.is_mounting]
-    return bool(others) and _asks_sizes(replace(problem, objective=tuple(others), limits=tuple(limits)))
-
-
-def _asks_sizes(problem: Problem) -> bool:
-    """Whether all that is asked is of loads that are affine in masses at an even speed, of sizes alone, or masses."""
-    felt = [m.channel for m in problem.measures]
-    return (
-        Kind.SIZE in kinds_of(problem)
-        and not problem.fidelity.is_uneven
-        and all(
-            channel.of_engine is not None or channel.is_mass or (channel.is_load and not channel.feels_inertia)
-            for channel in felt
-        )
-    )
-
-
 def solve_each_apart(problem: Problem) -> Result:
     """Parts of what is open, each by its own method."""
     return solve_apart(problem, _decided)
@@ -177,62 +166,19 @@ def solve_all_numbers(problem: Problem) -> Result:
     return solve_generally(problem, _decided, lambda part: _method(part).home == _CONES)
 
 
-def _asks_led(problem: Problem) -> bool:
-    """Whether all that is asked is of loads that what each shaft carries adds up to, or of how evenly these turn."""
-    felt = all(measure.channel.adds_up_by_shafts or measure.is_mass for measure in problem.measures)
-    return felt and not _shares_gas(problem) and _adds_points(problem) and not problem.fidelity.is_uneven
+def _is_rigid(problem: Problem) -> bool:
+    return problem.engine.block is None and not problem.fidelity.is_uneven
 
 
-def _shares_gas(problem: Problem) -> bool:
-    """Whether gas that is felt works between two pistons, of which one may lead."""
-    names = {shaft for decision in problem.decisions for shaft in decision.keys(Kind.LEAD)}
-    parts = problem.engine.slider_cranks
-    led = (part for part in parts if part.shaft.name in names)
-    return problem.feels_gas and any(part.faces(other) for part in led for other in parts if other is not part)
+def _minimises_loads(problem: Problem) -> bool:
+    return any(not term.measure.is_mounting for term in problem.objective)
 
 
-def _asks_shared(problem: Problem) -> bool:
-    """Whether all that is asked is of loads on the block, or on mounts that do not give way, gas between two cranks."""
-    felt = all(m.is_mass or (m.is_load and not m.is_inside) for m in problem.measures)
-    rigid = problem.engine.block is None and not problem.fidelity.is_uneven
-    return _shares_gas(problem) and felt and rigid and _adds_points(problem)
-
-
-def _asks_places(problem: Problem) -> bool:
-    """Whether no bearing that is asked about carries a shaft whose unbalances have open places."""
-    carried = {bearing.shaft.name for bearing in problem.engine.bearings}
-    moved = {drive.rotor for decision in problem.decisions for drive in decision.place_drives}
-    loads = any(rotor.shaft.name in carried for rotor in problem.engine.rotors if rotor.name in moved)
-    inside = any(measure.is_inside or measure.channel.is_flywheel for measure in problem.measures)
-    return _asks_loads(problem) and _adds_points(problem) and not (loads and inside)
-
-
-def _adds_points(problem: Problem) -> bool:
-    """Whether no norm takes operating points as groups: boxes, stars and smooth programs know none such."""
-    return all(measure.norm.is_pointwise or not measure.is_load for measure in problem.measures)
-
-
-def _asks_stars(problem: Problem) -> bool:
-    """Whether stars may be told apart by all that is asked: by loads, masses, and what each by itself is known for."""
-    return _adds_points(problem) and not any(m.is_mounting and m.channel.of_loads for m in problem.measures)
-
-
-def _asks_stars_on_mounts(problem: Problem) -> bool:
-    """Whether stars on open mounts are told apart by all that is asked; how evenly they turn while they are even."""
+def _tells_stars_apart(problem: Problem) -> bool:
+    """Return whether all that is asked tells stars on open mounts apart; how evenly they turn while they are even."""
     moves = problem.phasing is not None and problem.phasing.continuous
     numbers = (m.channel.is_number and not m.is_mounting for m in problem.measures)
-    return problem.engine.block is not None and _adds_points(problem) and not (moves and any(numbers))
-
-
-def _feels_pistons(problem: Problem) -> bool:
-    """Whether nothing is asked but masses and loads that are affine in the masses of the pistons."""
-    channels = [measure.channel for measure in problem.measures]
-    return not any(channel.feels_inertia or channel.is_number for channel in channels)
-
-
-def _asks_loads(problem: Problem) -> bool:
-    """Whether nothing that is asked of the mounts depends on loads: it holds for every design, or for none."""
-    return not any(measure.channel.of_loads for measure in problem.measures)
+    return problem.engine.block is not None and not (moves and any(numbers))
 
 
 _U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.FLYWHEEL
@@ -242,43 +188,39 @@ _AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependen
 _BUILT = (Dependence.SHIFT, Dependence.AFFINE)
 _OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *OF_RUNS}
 _OF_SIZES = frozenset(channel for channel in OF_SIZES if channel.of_engine is not None)
-_OF_SHARED_GAS = frozenset({MOUNT_FORCE, *OF_BLOCK})
 _TOLD_APART = frozenset({IRREGULARITY, ABSORBER_HEAT})
 _CONES, _JOINT = "cones.unbalances:solve_sharply", "mounts.nonlinear:solve_joint"
 METHODS: tuple[Method, ...] = (
     Method("evaluation", {}, Reach.WHOLE, "conclusion:state", norms=lambda _: True),
     Method("boxes of the flywheel", {_F: ()}, Reach.WHOLE, "boxes.flywheel:solve_flywheel",
-           knows=frozenset(OF_FLYWHEEL), also=lambda p: all(m.channel.is_flywheel for m in p.measures)),
+           knows=frozenset(OF_FLYWHEEL), still=lambda _: False),
     Method("boxes of discs and shafts", {_T: ()}, Reach.NEAR, "boxes.torsion:solve_torsion", True,
-           frozenset({*TORSIONAL, IRREGULARITY, FLYWHEEL_INERTIA}), _is_pointwise, _adds_points),
-    Method("boxes of sizes", {_Z: _MASSES, _U: _AFFINE}, Reach.WHOLE, "boxes.sizes:solve_sizes", True, _OF_SIZES,
-           also=_asks_sizes),
-    Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, Reach.WHOLE, _CONES, True, also=_asks_loads),
-    Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, Reach.WHOLE, _CONES, True,
-           also=_feels_pistons),
+           frozenset({*TORSIONAL, IRREGULARITY, FLYWHEEL_INERTIA}), _is_pointwise),
+    Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, Reach.WHOLE, _CONES, True),
+    Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, Reach.WHOLE, _CONES, True),
     Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, Reach.WHOLE, "boxes.leads:solve_leads", True,
-           frozenset({IRREGULARITY}), _is_pointwise, _asks_led),
+           frozenset({IRREGULARITY}), _is_pointwise, _is_no_number),
     Method("boxes of leads between shared chambers", {Kind.LEAD: ()}, Reach.WHOLE,
-           "boxes.shared_leads:solve_shared_leads", True, _OF_SHARED_GAS, _is_pointwise, _asks_shared),
+           "boxes.shared_leads:solve_shared_leads", True, frozenset({MOUNT_FORCE, *OF_BLOCK}), _is_pointwise,
+           _is_no_number, _is_rigid),
     Method("cones over boxes of places", {_U: _AFFINE, _P: (Dependence.BIAFFINE,)}, Reach.WHOLE,
-           "boxes.places:solve_places", True, frozenset({SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS}),
-           _is_pointwise, _asks_places),
+           "boxes.places:solve_places", True, OF_SHAFT_PLACES, _is_pointwise),
     Method("stars, each with cones", {_S: _BUILT, _U: _AFFINE}, Reach.WHOLE, "stars.phasing:solve_phasing", True,
-           _TOLD_APART, _is_pointwise, _asks_stars),
+           _TOLD_APART, _is_pointwise),
+    Method("boxes of sizes", {_Z: _MASSES, _U: _AFFINE}, Reach.WHOLE, "boxes.sizes:solve_sizes", True, _OF_SIZES,
+           _is_of_lengths, _is_no_number),
     Method("stars, each with boxes of sizes", {_S: _BUILT, _U: _AFFINE, _Z: _MASSES}, Reach.WHOLE,
-           "stars.sizes:solve_star_sizes", True, _OF_SIZES, also=_asks_sizes),
+           "stars.sizes:solve_star_sizes", True, _OF_SIZES, _is_of_lengths, _is_no_number),
     Method("linear matrix inequalities", {_K: ()}, Reach.WHOLE, "mounts.convex:solve_convex_mounts",
            knows=frozenset(OF_MOUNTING), also=is_convex),
-    Method("smooth program, boxes of stiffness", {_K: ()}, Reach.NEAR, _JOINT, False, _OF_MOUNTS, _is_pointwise,
-           _adds_points),
-    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE, _JOINT, False, _OF_MOUNTS, _is_pointwise,
-           _adds_points),
+    Method("smooth program, boxes of stiffness", {_K: ()}, Reach.NEAR, _JOINT, False, _OF_MOUNTS, _is_pointwise),
+    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE, _JOINT, False, _OF_MOUNTS, _is_pointwise),
     Method("flywheel, crankshaft and the rest apart", dict.fromkeys(set(Kind) - {_S}, tuple(Dependence)), Reach.ASIDE,
            "methods:solve_each_apart", norms=lambda _: True, also=is_apart),
     Method("local programs of sizes and mounts", {_Z: _MASSES, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
-           "mounts.sizes:solve_mounted_sizes", False, _OF_SIZES | _OF_MOUNTS, also=_asks_mounted_sizes),
+           "mounts.sizes:solve_mounted_sizes", False, _OF_SIZES | _OF_MOUNTS, _is_of_lengths, also=_minimises_loads),
     Method("stars, each with a smooth program", {_S: _BUILT, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
-           "mounts.stars:solve_star_mounts", False, _OF_MOUNTS | _TOLD_APART, _is_pointwise, _asks_stars_on_mounts),
+           "mounts.stars:solve_star_mounts", False, _OF_MOUNTS | _TOLD_APART, _is_pointwise, also=_tells_stars_apart),
     Method("local programs of all numbers", dict.fromkeys(Kind, tuple(Dependence)), Reach.ASIDE,
            "methods:solve_all_numbers", norms=lambda _: True),
 )  # fmt: skip

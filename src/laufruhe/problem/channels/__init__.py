@@ -75,7 +75,6 @@ __all__ = [
     "AT_EACH_MOUNT",
     "DECOUPLING",
     "DECOUPLING_SHORTFALL",
-    "ENVELOPE_RADIUS",
     "FLYWHEEL_INERTIA",
     "FREQUENCIES",
     "IRREGULARITY",
@@ -86,6 +85,7 @@ __all__ = [
     "OF_MOUNTING",
     "OF_MOUNTS",
     "OF_RUNS",
+    "OF_SHAFT_PLACES",
     "OF_SIZES",
     "ON_BLOCK",
     "RAW_TORQUE_ROLL",
@@ -93,8 +93,6 @@ __all__ = [
     "RUN_TRAVEL",
     "RUN_TWIST",
     "SAG",
-    "SHAFT_CLEARANCE",
-    "SHAFT_DISTANCE",
     "STATIC_FORCE",
     "STATIC_TRAVEL",
     "STORED_WORK",
@@ -121,7 +119,7 @@ def _on_block(name: str, unit: str, part: slice, lever: int | None = None) -> Lo
     def signal(loads: PointLoads) -> Spectrum:
         return loads.wrench.each(lambda wrench: wrench[:, None, part])
 
-    return LoadChannel(name, unit, signal=signal, part=part, feels_gas=lever is None, lever=lever)
+    return LoadChannel(name, unit, signal=signal, part=part, feels_gas=lever is None, lever=lever, of_wrench=True)
 
 
 def _on_mounts(name: str, unit: str, needs: Needs, signal: Callable[[PointLoads], Spectrum | None]) -> LoadChannel:
@@ -131,7 +129,7 @@ def _on_mounts(name: str, unit: str, needs: Needs, signal: Callable[[PointLoads]
             raise ValueError(f"this mounting has no {name}")
         return spectrum
 
-    return LoadChannel(name, unit, AT_MOUNTS, needs, signal=found, places=_names_of_mounts)
+    return LoadChannel(name, unit, AT_MOUNTS, needs, signal=found, places=_names_of_mounts, of_wrench=True)
 
 
 _ON_CRANK: Where = (ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",))
@@ -186,6 +184,7 @@ ADDED_MASS = MassChannel("added mass", "kg", roles=(Role.COUNTERWEIGHT, Role.BAL
 SHAFT_DISTANCE = _of_places("shaft distance", ("min", "max"), lambda m, a, b: distances(m.rotors, a, b, False))
 SHAFT_CLEARANCE = _of_places("shaft clearance", ("min",), lambda m, a, b: distances(m.rotors, a, b, True))
 ENVELOPE_RADIUS = _of_places("envelope radius", ("max",), lambda m, a, b: reaches(m.rotors, a, b))
+OF_SHAFT_PLACES = frozenset({SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS})
 
 
 def is_at_mounts(channel: Channel) -> bool:

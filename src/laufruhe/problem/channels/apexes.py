@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from laufruhe.machine.rotary import RotaryUnit
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.kinds import Needs, NumberChannel
-from laufruhe.problem.decision import Kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,10 +17,7 @@ class ApexChannel(NumberChannel):
     keys: tuple[str, ...] = ("operating_points",)
     needs: Needs = Needs.ROTORS
     minimised: bool = False
-
-    def is_moved_by(self, _kinds: Collection[Kind]) -> bool:
-        """By nothing."""
-        return False
+    of_loads: bool = False
 
 
 def _most(name: str, unit: str, power: int, number: Callable[[RotaryUnit], float]) -> ApexChannel:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from laufruhe.machine import Flywheel
@@ -10,32 +10,18 @@ from laufruhe.physics.irregularity import Swing, swing_of
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.kinds import Needs, NumberChannel, OfWheel
-from laufruhe.problem.decision import Kind
 
 
 @dataclass(frozen=True, eq=False)
 class FlywheelChannel(NumberChannel):
-    """A number that goes one way with every number of the flywheel.
+    """A number that goes one way with every number of the flywheel."""
 
-    Attributes
-    ----------
-    of_work
-        Whether the mean torque is in it, which leads between shared chambers and rods of another length move too.
-    """
-
-    of_work: bool = False
-
-    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """The flywheel, discs where it follows from them, and all that moves the torque where that counts."""
-        moving = {Kind.FLYWHEEL} | ({Kind.SIZE, Kind.LEAD} if self.of_work or self.of_torque else set())
-        moving |= {Kind.STAR, Kind.PISTON} if self.of_torque else set()
-        # a rim is no disc of the crankshaft
-        return bool((moving | ({Kind.TORSION} if self.of_inertia else set())) & set(kinds))
+    of_loads: bool = False
 
 
 def _found(
     name: str, unit: str, number: Callable[[Flywheel, Swing], float], keys: tuple[str, ...] = (),
-    needs: Needs = Needs.FLYWHEEL, rises: bool = True, of_torque: bool = False, of_work: bool = False,
+    needs: Needs = Needs.FLYWHEEL, rises: bool = True, of_torque: bool = False,
 ) -> FlywheelChannel:  # fmt: skip
     """The largest of a number of the flywheel over the operating points that count."""
 
@@ -51,7 +37,6 @@ def _found(
 
     return FlywheelChannel(
         name, unit, keys, needs, values=values, of_wheel=of_wheel, rises=rises, of_torque=of_torque,
-        of_work=of_work,
     )  # fmt: skip
 
 
@@ -64,7 +49,6 @@ FLYWHEEL_INERTIA = _found("flywheel inertia", "kg m^2", lambda wheel, _: wheel.i
 FLYWHEEL_MASS = _found("flywheel mass", "kg", lambda wheel, _: wheel.ring.whole * wheel.ring.mass, needs=Needs.RIM)
 RIM_STRESS = _found("rim stress", "Pa", lambda wheel, swing: wheel.ring.stress(swing.speed), AT, Needs.RIM)
 ARM_STRESS = _found(
-    "arm stress", "Pa", lambda wheel, swing: wheel.ring.arm_stress(swing.speed, swing.torque), AT, Needs.ARMS,
-    of_work=True,
+    "arm stress", "Pa", lambda wheel, swing: wheel.ring.arm_stress(swing.speed, swing.torque), AT, Needs.ARMS
 )  # fmt: skip
 OF_FLYWHEEL = (IRREGULARITY, FLYWHEEL_INERTIA, FLYWHEEL_MASS, RIM_STRESS, ARM_STRESS)

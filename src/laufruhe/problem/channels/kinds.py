@@ -24,15 +24,11 @@ from laufruhe.problem.loads import PointLoads
 
 OfWheel: TypeAlias = Callable[[Flywheel], float]
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
-UNFELT = frozenset({Kind.FLYWHEEL, Kind.TORSION})
-"""At an even speed no load on block or bearings feels the flywheel, nor how the crankshaft twists."""
 ON_BLOCK = ("operating_points", "orders", "alternating")
 AT_SECTIONS, AT_WEBS = ((*ON_BLOCK, at) for at in ("sections", "webs"))
 AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
     (*ON_BLOCK, "direction_weights", at) for at in ("mounts", "bearings", "cylinders")
 )
-OF_SHAFTS = frozenset({"cylinders", "webs", "sections"})
-"""Keys of places that belong to one shaft."""
 OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
 
 
@@ -89,7 +85,7 @@ class Channel:
     minimised
         Whether it may be an objective.
     of_loads
-        Whether it depends on what excites the block.
+        Whether a number may depend on what excites the block, as it does where nobody says that it does not.
     size
         Of an engine, of what cancels in it where it is zero; else zero.
     rises
@@ -125,7 +121,7 @@ class Channel:
     sides: tuple[str, ...] = ("max",)
     minimised: bool = True
     size: Callable[[Engine], float] = lambda _: 0.0
-    of_loads: bool = False
+    of_loads: bool = True
     rises: bool = True
     of_wheel: Callable[[Asked, Answered], OfWheel] | None = None
     of_run: Callable[[Response], NDArray[np.float64]] | None = None
@@ -145,7 +141,6 @@ class Channel:
     is_mounting: ClassVar[bool] = False
     is_placing: ClassVar[bool] = False
     is_checked: ClassVar[bool] = False
-    feels_inertia: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         _KNOWN[self.name] = self
@@ -168,11 +163,6 @@ class Channel:
         return self.of_wheel is not None
 
     @property
-    def adds_up_by_shafts(self) -> bool:
-        """Whether what each shaft carries adds up to it, and comes earlier as that leads; or the torque moves it."""
-        return self.of_torque
-
-    @property
     def of_inertia(self) -> bool:
         """Whether it goes one way with the inertia of all that turns, whatever that is made of."""
         return self.is_flywheel and self.needs is Needs.FLYWHEEL
@@ -187,10 +177,6 @@ class Channel:
         """
         if self.of_engine is not None:
             self.of_engine(engine)
-
-    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """Whether it may change with decisions of these kinds."""
-        return bool(set(kinds) - UNFELT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,8 +193,8 @@ class LoadChannel(Channel):
         Whether the roll moment is in it: gas gives no force (eq. 1).
     lever
         Power of a throw's place that its load grows with; None where loads do not add up by places alone.
-    is_inside
-        Whether it acts inside the crankcase, so that neither the block nor its mounts feel it.
+    of_wrench
+        Whether it follows from the wrench on the block alone; what does not say so counts as a load inside.
     adds_up
         Whether its places are added up, so that no norm but the mean over the cycle has a meaning.
     factors
@@ -222,7 +208,7 @@ class LoadChannel(Channel):
     part: slice | None = None
     feels_gas: bool = True
     lever: int | None = None
-    is_inside: bool = False
+    of_wrench: bool = False
     adds_up: bool = False
     factors: Factors = unit_factors
     of_sizes: Factor | None = None
@@ -242,24 +228,19 @@ class LoadChannel(Channel):
         self.factors_of(engine, point)
 
     @property
+    def is_inside(self) -> bool:
+        """Whether more than the wrench on the block is in it, as inside the crankcase."""
+        return not self.of_wrench
+
+    @property
     def feels_order(self) -> bool:
         """Whether it changes with the firing order of one star, where gas acts: cylinders are felt one by one."""
         return self.is_inside
 
     @property
-    def adds_up_by_shafts(self) -> bool:
-        """Not where its places are parts that stand on a shaft themselves."""
-        return not OF_SHAFTS & set(self.keys)
-
-    @property
     def norms(self) -> Collection[str]:
         """All, or the mean where places are added up."""
         return (MEAN.name,) if self.adds_up else tuple(NORMS)
-
-    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """Mounts move what they transmit, and nothing of what the block feels."""
-        felt = set(kinds) - UNFELT
-        return bool(felt if self.part is None and not self.is_inside else felt - OF_MOUNTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,13 +249,7 @@ class TwistChannel(LoadChannel):
 
     keys: tuple[str, ...] = AT_SECTIONS
     needs: Needs = Needs.TORSION
-    is_inside: bool = True
     feels_unbalances: ClassVar[bool] = False
-    feels_inertia: ClassVar[bool] = True
-
-    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """Throws and firing order, the inertia of the pistons, discs and shafts."""
-        return bool({Kind.STAR, Kind.PISTON, Kind.TORSION, Kind.SIZE} & set(kinds))
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,10 +259,6 @@ class MassChannel(Channel):
     keys: tuple[str, ...] = ("of",)
     roles: tuple[Role, ...] = field(kw_only=True)
     is_mass: ClassVar[bool] = True
-
-    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """Unbalances, weights of levers, and shafts that may be left out."""
-        return bool({Kind.UNBALANCE, Kind.PISTON, Kind.STAR} & set(kinds))
 
 
 @dataclass(frozen=True, eq=False)
@@ -308,9 +279,7 @@ class NumberChannel(Channel):
 class SizeChannel(NumberChannel):
     """A number of sizes alone."""
 
-    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """By sizes."""
-        return Kind.SIZE in kinds
+    of_loads: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,10 +289,6 @@ class MountChannel(NumberChannel):
     needs: Needs = Needs.ELASTIC
     is_mounting: ClassVar[bool] = True
 
-    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """Mounts, and all that moves loads where these count."""
-        return bool(set(kinds) - UNFELT) if self.of_loads else bool(set(kinds) & OF_MOUNTS)
-
 
 @dataclass(frozen=True, eq=False)
 class TorsionChannel(NumberChannel):
@@ -332,19 +297,12 @@ class TorsionChannel(NumberChannel):
     needs: Needs = Needs.TORSION
     minimised: bool = False
 
-    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """Discs, shafts and pistons; what excites them is a matter of throws and firing order too."""
-        return bool({Kind.PISTON, Kind.TORSION, Kind.SIZE} & set(kinds)) or (self.of_loads and Kind.STAR in kinds)
-
 
 @dataclass(frozen=True, eq=False)
 class PlaceChannel(NumberChannel):
     """Where balancer shafts stand."""
 
     keys: tuple[str, ...] = ("of",)
+    of_loads: bool = False
     minimised: bool = False
     is_placing: ClassVar[bool] = True
-
-    def is_moved_by(self, kinds: Collection[Kind]) -> bool:
-        """Places alone."""
-        return Kind.PLACE in kinds

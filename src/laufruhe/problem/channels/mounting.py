@@ -61,7 +61,14 @@ def _of_axis(
         return mount_numbers.residual_of(mounting, residual(mounting.block, measure.frequency))
 
     return MountChannel(
-        name, unit, ("frequency",), values=_of_mounting(value), size=size, of_axis=residual, of_constant_stiffness=True
+        name,
+        unit,
+        ("frequency",),
+        values=_of_mounting(value),
+        size=size,
+        of_axis=residual,
+        of_constant_stiffness=True,
+        of_loads=False,
     )
 
 
@@ -82,31 +89,33 @@ def _of_cases(name: str, unit: str, part: Callable[[Any], Any]) -> MountChannel:
 
     keys = ("load_cases", "mounts", "direction_weights")
     return MountChannel(
-        name, unit, keys, Needs.CASES, values=values, of_cases=part,
+        name, unit, keys, Needs.CASES, values=values, of_cases=part, of_loads=False,
         places=lambda engine: [mount.name for mount in engine.mounts],
     )  # fmt: skip
 
 
 STATIC_TRAVEL = _of_cases("static travel", "m", lambda found: found.travel)
 STATIC_FORCE = _of_cases("static mount force", "N", lambda found: found.force)
-TRANSMISSIBILITY = MountChannel(
-    "transmissibility", "", ("operating_points", "orders"), values=_transmissibility, of_loads=True
-)
+TRANSMISSIBILITY = MountChannel("transmissibility", "", ("operating_points", "orders"), values=_transmissibility)
 SAG = MountChannel(
-    "static sag", "m", sides=("min", "max"), values=_of_mounting(lambda mounting, _: mount_numbers.sag(mounting))
+    "static sag",
+    "m",
+    sides=("min", "max"),
+    of_loads=False,
+    values=_of_mounting(lambda mounting, _: mount_numbers.sag(mounting)),
 )
 FREQUENCIES = MountChannel(
     "natural frequencies", "Hz", sides=("min", "max", "outside"), minimised=False, of_constant_stiffness=True,
-    values=_of_mounting(lambda mounting, _: [float(f) for f in mounting.modes.frequencies]),
+    of_loads=False, values=_of_mounting(lambda mounting, _: [float(f) for f in mounting.modes.frequencies]),
 )  # fmt: skip
 DECOUPLING = MountChannel(
     "kinetic-energy decoupling", "", ("motions",), sides=("min",), minimised=False, of_constant_stiffness=True,
-    of_shares=True,
+    of_shares=True, of_loads=False,
     values=_of_mounting(lambda mounting, m: mount_numbers.decoupling(mounting.modes.energy, motion_indices(m))),
 )  # fmt: skip
 DECOUPLING_SHORTFALL = MountChannel(
     "decoupling shortfall", "", ("motions", "wanted"), size=lambda _: 1.0, of_constant_stiffness=True,
-    values=_of_mounting(
+    of_loads=False, values=_of_mounting(
         lambda mounting, m: mount_numbers.decoupling_shortfall(mounting.modes.energy, motion_indices(m), m.wanted)
     ),
 )  # fmt: skip
@@ -119,7 +128,7 @@ RAW_TORQUE_ROLL = replace(
     open_frequency=True,
 )  # fmt: skip
 TOTAL_STIFFNESS = MountChannel(
-    "total stiffness", "N/m", sides=("min", "max"),
+    "total stiffness", "N/m", sides=("min", "max"), of_loads=False,
     values=_of_mounting(lambda mounting, _: mount_numbers.total_stiffness(mounting.mounts)),
 )  # fmt: skip
 OF_MOUNTING = (

@@ -19,6 +19,7 @@ class RunChannel(NumberChannel):
     """The most of a number in run-up and shut-down, integrated in time."""
 
     needs: Needs = Needs.RUN
+    of_loads: bool = False
     is_checked: ClassVar[bool] = True
 
 

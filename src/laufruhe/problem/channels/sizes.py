@@ -62,7 +62,7 @@ def inside(name: str, unit: str, where: Where, load: Load, factor: strength.Fact
 
     keys, needs, places = where
     told = of_what_moves(name, signal)
-    return LoadChannel(name, unit, keys, needs, signal=told, places=places, is_inside=True, of_sizes=factor)
+    return LoadChannel(name, unit, keys, needs, signal=told, places=places, of_sizes=factor)
 
 
 def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:

@@ -60,7 +60,7 @@ def _of_modes(
         return [float(x) for own in resonances(measure, evaluation) for x in own.numbers(chain)]
 
     sides = ("min", "max", "outside")
-    return TorsionChannel(name, unit, keys, sides=sides, values=values, of_modes=resonances)
+    return TorsionChannel(name, unit, keys, sides=sides, values=values, of_modes=resonances, of_loads=False)
 
 
 def _heat(measure: Asked, evaluation: Answered) -> Sequence[float]:
@@ -76,6 +76,6 @@ SHAFT_STRESS = _of_shafts(
 )
 TORSIONAL_FREQUENCIES = _of_modes("torsional frequencies", "Hz", ("operating_points",), _at_speeds)
 CRITICAL_SPEEDS = _of_modes("critical speeds", "rad/s", ("operating_points", "orders"), _in_orders)
-ABSORBER_HEAT = TorsionChannel("absorber heat", "W", ("operating_points",), values=_heat, of_loads=True)
+ABSORBER_HEAT = TorsionChannel("absorber heat", "W", ("operating_points",), values=_heat)
 
 TORSIONAL = (SHAFT_TWIST, SHAFT_TORQUE, SHAFT_STRESS, TORSIONAL_FREQUENCIES, CRITICAL_SPEEDS, ABSORBER_HEAT)

@@ -23,6 +23,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torsion import Resonance, dynamic_stiffness, inertias, receptances, throw_torques
 from laufruhe.problem import channels
+from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
@@ -101,7 +102,8 @@ class TwistBoxes:
 
     def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
         self.problem, self.coordinates = problem, TwistCoordinates(problem)
-        rest = [t for t in problem.objective if not (t.measure.is_twist or _turns(t.measure))]
+        kinds = {decision.kind for decision in problem.decisions}
+        rest = [t for t in problem.objective if not depends(t.measure.channel, kinds, problem)]
         self._constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
         self._terms = [(t.weight, t.measure) for t in problem.objective if _is_square(t.measure)]
         self._limits = [(limit.maximum, limit.measure) for limit in problem.limits if _is_square(limit.measure)]

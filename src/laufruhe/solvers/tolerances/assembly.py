@@ -21,6 +21,8 @@ from laufruhe.load_models.built_engines import BuiltEngines, values_of
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.progress import tell
 from laufruhe.problem.assembly import Chosen, Lot, assembled
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import is_affine
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
@@ -96,7 +98,7 @@ def _check(problem: Problem) -> None:
     if problem.fidelity.is_uneven:
         raise ModelError("[assembly] takes a crank that turns evenly; leave fidelity.crank_inertia out")
     for term in problem.objective:
-        if not term.measure.is_load or term.measure.channel.feels_inertia:
+        if not term.measure.is_load or not is_affine(term.measure.channel, {Kind.UNBALANCE, Kind.PISTON}, problem):
             raise ModelError(f"[assembly] minimises loads only, not {term.measure.name}; ask for a load")
     if not problem.objective:
         raise ModelError("[assembly] minimises nothing; add [objective]")

@@ -23,6 +23,7 @@ from laufruhe.numerics.progress import tell, within
 from laufruhe.numerics.spectrum import common_base
 from laufruhe.numerics.witness import is_over
 from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import is_affine
 from laufruhe.problem.evaluation import fine_samples, finely, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
@@ -159,7 +160,7 @@ def _check(problem: Problem) -> None:
     if problem.fidelity.is_uneven:
         raise ModelError("[robust] takes a crank that turns evenly; leave fidelity.crank_inertia out, or [robust]")
     for measure in problem.measures:
-        if measure.channel.is_number or measure.channel.feels_inertia:
+        if measure.channel.is_number or not is_affine(measure.channel, {Kind.UNBALANCE, Kind.PISTON}, problem):
             raise ModelError(f"[robust] is for loads only, not for {measure.name}; ask for it without [robust]")
     if not problem.objective:
         raise ModelError("[robust] minimises nothing; add [objective]")
