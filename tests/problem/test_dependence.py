@@ -10,7 +10,6 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import combinations
 
 import numpy as np
 import pytest
@@ -23,11 +22,12 @@ from laufruhe.problem.dependence import Dependence, dependence
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Measure, mass_rows
 from laufruhe.problem.problem import Problem
+from laufruhe.solvers.stars.phasing import every_star
 from problem_files import PROBLEMS
 
 ROUNDING = 1e-9
 STEPS = 60
-FEW = ("car-four-willans", "tractor-four-elastic", "single-rod-length", "tractor-four-bearings", "soft-single")
+FEW = ("study-soft-mounts", "single-rod-length", "shaper", "tractor-four-shaft-heights", "opposed-pistons-lead")
 
 
 def _random(problem: Problem, rng: np.random.Generator) -> Problem:
@@ -44,8 +44,8 @@ def _values(decision: Decision, shares: np.ndarray) -> complex | float:
     """Return the value at these shares of the bounds of a decision."""
     (domain,) = domains_of([decision])
     low, high = domain.ends
-    columns = low + shares[: domain.width] * (high - low)
-    value = domain.complex_value(domain.project(columns) if domain.width > 1 else columns)
+    # a sector may be left: brought back into it, a line would bend
+    value = domain.complex_value(low + shares[: domain.width] * (high - low))
     return value if decision.is_affine else value.real
 
 
@@ -95,14 +95,12 @@ def refuted(claim: Dependence, at: Sequence[np.ndarray]) -> bool:
     return False
 
 
-def _entries(
-    names: Sequence[str], rounds: int, kinds: Sequence[Kind] = tuple(Kind)
-) -> Iterator[tuple[str, Channel, Kind, Dependence, list[np.ndarray]]]:
+def _entries(names: Sequence[str], rounds: int) -> Iterator[tuple[str, Channel, Kind, Dependence, list[np.ndarray]]]:
     """Yield samples of every entry that a ready engine has something of."""
     for number, name in enumerate(names):
         problem = laufruhe.load(PROBLEMS / f"{name}.toml")
         rng = np.random.default_rng(number)
-        for kind in sorted({d.kind for d in problem.decisions} & set(kinds)):
+        for kind in sorted({d.kind for d in problem.decisions}):
             for _ in range(rounds):
                 try:
                     own, evaluations = _sampled(_random(problem, rng), kind, rng)
@@ -128,8 +126,84 @@ def _check(names: Sequence[str], rounds: int) -> set[tuple[str, Kind]]:
     return seen
 
 
-def ready_names() -> list[str]:
+def _ready() -> list[str]:
     """Return the names of the ready problems that leave numbers open."""
-    files = sorted(PROBLEMS.glob("*.toml"))
-    texts = {path.stem: path.read_text() for path in files}
+    texts = {path.stem: path.read_text() for path in sorted(PROBLEMS.glob("*.toml"))}
     return [name for name, text in texts.items() if "study" not in tomllib.loads(text) and "between" in text]
+
+
+def test_few_engines_refute_no_entry() -> None:
+    assert len(_check(FEW, 1)) > 160
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*encountered in:RuntimeWarning")
+def test_no_engine_refutes_an_entry() -> None:
+    seen = _check(_ready(), 2)
+    assert len(seen) > 370
+    sampled = {kind for _, kind in seen}
+    assert sampled == set(Kind) - {Kind.STAR, Kind.NUMBER}
+
+
+@pytest.mark.parametrize(
+    ("claim", "at"),
+    [
+        (Dependence.NONE, (1.0, 1.0, 1.001)),
+        (Dependence.AFFINE, (1.0, 2.0, 3.001)),
+        (Dependence.BIAFFINE, (1.0, 2.0, 4.0)),
+        (Dependence.CONVEX, (1.0, 2.001, 3.0)),
+        (Dependence.MONOTONE_UP, (1.0, 2.0, 1.999)),
+        (Dependence.MONOTONE_DOWN, (2.0, 1.0, 1.001)),
+    ],
+)
+def test_samples_refute_what_is_wrong(claim: Dependence, at: tuple[float, float, float]) -> None:
+    assert refuted(claim, [np.array([each]) for each in at])
+    assert not refuted(claim, [np.ones(1)] * 3)
+
+
+@pytest.mark.slow
+def test_leads_shift_what_each_shaft_carries() -> None:
+    """Of one order a lead turns what its shaft carries: each further step moves a coefficient as far as the last."""
+    seen = 0
+    for number, name in enumerate(name for name in _ready() if "lead" in (PROBLEMS / f"{name}.toml").read_text()):
+        problem = laufruhe.load(PROBLEMS / f"{name}.toml")
+        leads = [decision for decision in problem.decisions if decision.kind is Kind.LEAD]
+        rng = np.random.default_rng(number)
+        for decision in leads:
+            own = replace(_random(problem, rng), decisions=(decision,))
+            a, step = rng.uniform(0.1, 0.3), rng.uniform(0.05, 0.2)
+            at = [evaluate(own, own.design([_values(decision, np.full(2, a + k * step))])) for k in range(3)]
+            for channel in CHANNELS.values():
+                if dependence(channel, Kind.LEAD, own) is not Dependence.SHIFT or not isinstance(channel, LoadChannel):
+                    continue
+                try:
+                    told = [evaluation.signals(channel) for evaluation in at]
+                except ValueError:
+                    continue
+                for signals in zip(*told, strict=True):
+                    base = min(signal.base for signal in signals)
+                    first, second, third = (signal.over(base).series.coefficients for signal in signals)
+                    size = float(np.abs(first).max(initial=0.0))
+                    np.testing.assert_allclose(np.abs(third - second), np.abs(second - first), rtol=0, atol=1e-8 * size)
+                    seen += 1
+    assert seen > 20
+
+
+@pytest.mark.slow
+def test_no_star_moves_what_is_constant() -> None:
+    seen = set()
+    for name in ("inline-five", "tractor-four-open", "two-stroke-four-open", "inline-nine-uneven"):
+        path = PROBLEMS / f"{name}.toml"
+        problem = laufruhe.load(path) if path.exists() else None
+        if problem is None or problem.phasing is None or problem.phasing.throws is not None:
+            continue
+        stars = [star for star, _ in every_star(problem.phasing)][:3]
+        at = [evaluate(whole := problem.phasing.realise(star), whole.engine) for star in stars]
+        for channel in CHANNELS.values():
+            told = [_numbers(channel, evaluation) for evaluation in at]
+            if len(told) > 1 and dependence(channel, Kind.STAR, problem) is Dependence.NONE:
+                for each in told:
+                    if each is not None and told[0] is not None:
+                        np.testing.assert_allclose(each, told[0], rtol=1e-9)
+                        seen.add(channel.name)
+    assert seen
