@@ -104,7 +104,115 @@ def gallery() -> str:
     return GALLERY + "".join(rows)
 
 
-PAGES = {"reference/keys.md": keys, "gallery.md": gallery}
+PROVEN = """\
+# What is proven when
+
+How good a design is proven to be follows from what is open and what is asked. These tables are made from those that
+choose the method; [the report](../reference/results.md) says it of each design.
+
+## Methods
+
+The first row that covers all kinds that are open, and that what is asked suits, decides. What is not in the second
+table is decided by the last row. A limit or a term that a method with a closing bound does not know is left out for
+its bound alone.
+
+| method | open | what is asked may be | its bound proves |
+| --- | --- | --- | --- |
+"""
+DEPENDENCES = """
+## Quantities
+
+How each quantity depends on numbers of one kind while all others are held, on elastic mounts at an even speed. A dash
+means that it does not.
+
+"""
+WORDS = {
+    "UNBALANCE": "unbalances",
+    "SHARE": "shares of geared inertia",
+    "PISTON": "masses of pistons",
+    "PLACE": "places of shafts",
+    "SIZE": "sizes",
+    "LEAD": "leads",
+    "STAR": "stars, firing orders, shafts",
+    "STIFFNESS": "stiffness",
+    "MOUNT": "other numbers of mounts",
+    "FLYWHEEL": "flywheel",
+    "TORSION": "crankshaft",
+    "NUMBER": "any number of the file",
+}
+SHORT = {
+    "NONE": "-",
+    "AFFINE": "affine",
+    "BIAFFINE": "affine while unbalances are held",
+    "MASSES": "affine in masses that follow",
+    "SHIFT": "sum of shifted parts",
+    "SWING": "number of such a sum",
+    "CONVEX": "convex",
+    "MONOTONE_UP": "never falls",
+    "MONOTONE_DOWN": "never rises",
+    "SMOOTH": "smooth",
+    "UNKNOWN": "unknown",
+}
+
+
+CLAIMS = """
+## Norms
+
+What each norm claims of itself; methods and bounds use nothing else of it. Every method with a bound needs a convex
+one; boxes, stars and smooth programs need one that takes points alone, and boxes of sizes one of row lengths.
+
+| norm | claims |
+| --- | --- |
+"""
+FACTS = {
+    "is_convex": "convex",
+    "of_row_lengths": "of row lengths, and never falls with one",
+    "is_pointwise": "takes points alone",
+    "sums_lengths": "sum of lengths",
+    "is_euclidean": "root of the sum of squares",
+    "is_largest": "largest length",
+    "is_diameter": "largest diameter of a signal",
+    "is_largest_mean": "largest mean of a point",
+    "averages": "averages about angles bound it",
+}
+
+
+def proven() -> str:
+    """The methods, and how every quantity depends on every kind."""
+    from laufruhe.numerics.norms import NORMS
+    from laufruhe.problem.dependence import TABLE
+    from laufruhe.solvers import METHODS
+
+    rows = [PROVEN]
+    for method in METHODS:
+        every, missing = len(method.needs) >= len(WORDS) - 1, {*WORDS} - {kind.name for kind in method.needs}
+        kinds = ", ".join(WORDS[kind.name] for kind in method.needs) or "nothing"
+        kinds = "anything" + "".join(f" but {WORDS[name]}" for name in missing) if every else kinds
+        rows.append(f"| {method.name} | {kinds} | {_asked(method, every)} | {method.proves} |\n")
+    kinds = list(next(iter(TABLE.values())))
+    heads = " | ".join(WORDS[kind.name] for kind in kinds)
+    rows += [DEPENDENCES, f"| quantity | {heads} |\n", "| --- " * (len(kinds) + 1) + "|\n"]
+    for name, row in TABLE.items():
+        rows.append(f"| {name} | " + " | ".join(SHORT[row[kind].name] for kind in kinds) + " |\n")
+    rows += [CLAIMS, "".join(f"| {name} | {_claimed(norm)} |\n" for name, norm in NORMS.items())]
+    return "".join(rows)
+
+
+def _claimed(norm: Any) -> str:
+    """What a norm claims of itself, in words."""
+    return ", ".join(words for fact, words in FACTS.items() if getattr(norm, fact))
+
+
+def _asked(method: Any, every: bool) -> str:
+    """What a method may be asked for, in words."""
+    if every or not method.needs:
+        return "anything"
+    found = dict.fromkeys(SHORT[each.name] for needs in method.needs.values() for each in needs)
+    names = sorted(channel.name for channel in method.knows)
+    return "; ".join(part for part in (", ".join(found), ", ".join(names)) if part)
+
+
+PAGES = {"reference/keys.md": keys, "gallery.md": gallery, "how-to/what-is-proven.md": proven}
 
 if __name__ == "__main__":
     for place, made in PAGES.items():

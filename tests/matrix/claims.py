@@ -113,7 +113,11 @@ def _is_searched(problem: Problem) -> bool:
     No program is convex then.
     """
     uneven = problem.phasing is not None and problem.phasing.continuous
-    return bool(problem.mount_decisions) or uneven or any(m.channel.of_loads for m in problem.measures)
+    return (
+        bool(problem.mount_decisions)
+        or uneven
+        or any(m.channel.is_number and m.channel.of_loads for m in problem.measures)
+    )
 
 
 def _own_claims(document: Document, problem: Problem, result: Result, folder: Path) -> Iterator[str]:

@@ -21,6 +21,7 @@ from laufruhe.problem.channels import (
     ABSORBER_HEAT,
     AT_EACH_MOUNT,
     FLYWHEEL_INERTIA,
+    FREQUENCIES,
     IRREGULARITY,
     MOUNT_FORCE,
     OF_BLOCK,
@@ -46,7 +47,7 @@ from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import beyond_mounts
 from laufruhe.solvers.general import solve_generally, solve_star_by_star
 from laufruhe.solvers.in_order import solve_in_order
-from laufruhe.solvers.mounts.convex import is_convex
+from laufruhe.solvers.mounts.convex import CONVEX, is_convex
 from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.relaxed import solve_relaxed
 from laufruhe.solvers.result import Result, Status
@@ -100,6 +101,8 @@ class Method:
         Return whether a channel that it does not know, and that nothing open moves, may be asked beside.
     also
         Return whether other facts of a problem suit it.
+    proves
+        What of the best design, in words.
     """
 
     name: str
@@ -111,6 +114,7 @@ class Method:
     norms: Callable[[Norm], bool] = _is_convex
     still: Callable[[Channel], bool] = lambda _: True
     also: Callable[[Problem], bool] = lambda _: True
+    proves: str = ""
 
     @property
     def decides(self) -> frozenset[Kind]:
@@ -191,38 +195,58 @@ _OF_SIZES = frozenset(channel for channel in OF_SIZES if channel.of_engine is no
 _TOLD_APART = frozenset({IRREGULARITY, ABSORBER_HEAT})
 _CONES, _JOINT = "cones.unbalances:solve_sharply", "mounts.nonlinear:solve_joint"
 METHODS: tuple[Method, ...] = (
-    Method("evaluation", {}, Reach.WHOLE, "conclusion:state", norms=lambda _: True),
+    Method("evaluation", {}, Reach.WHOLE, "conclusion:state", norms=lambda _: True,
+           proves="the value itself"),
     Method("boxes of the flywheel", {_F: ()}, Reach.WHOLE, "boxes.flywheel:solve_flywheel",
-           knows=frozenset(OF_FLYWHEEL), still=lambda _: False),
+           knows=frozenset(OF_FLYWHEEL), still=lambda _: False,
+           proves="the optimum"),
     Method("boxes of discs and shafts", {_T: ()}, Reach.NEAR, "boxes.torsion:solve_torsion", True,
-           frozenset({*TORSIONAL, IRREGULARITY, FLYWHEEL_INERTIA}), _is_pointwise),
-    Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, Reach.WHOLE, _CONES, True),
-    Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, Reach.WHOLE, _CONES, True),
+           frozenset({*TORSIONAL, IRREGULARITY, FLYWHEEL_INERTIA}), _is_pointwise,
+           proves="the optimum of root mean squares of two or three; else a local one"),
+    Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, Reach.WHOLE, _CONES, True,
+           proves="the optimum"),
+    Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, Reach.WHOLE, _CONES, True,
+           proves="the optimum"),
     Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, Reach.WHOLE, "boxes.leads:solve_leads", True,
-           frozenset({IRREGULARITY}), _is_pointwise, _is_no_number),
+           frozenset({IRREGULARITY}), _is_pointwise, _is_no_number,
+           proves="the optimum, as far as the boxes go (P13)"),
     Method("boxes of leads between shared chambers", {Kind.LEAD: ()}, Reach.WHOLE,
            "boxes.shared_leads:solve_shared_leads", True, frozenset({MOUNT_FORCE, *OF_BLOCK}), _is_pointwise,
-           _is_no_number, _is_rigid),
+           _is_no_number, _is_rigid,
+           proves="the optimum, as far as the boxes go (P15)"),
     Method("cones over boxes of places", {_U: _AFFINE, _P: (Dependence.BIAFFINE,)}, Reach.WHOLE,
-           "boxes.places:solve_places", True, OF_SHAFT_PLACES, _is_pointwise),
+           "boxes.places:solve_places", True, OF_SHAFT_PLACES, _is_pointwise,
+           proves="the optimum, as far as the boxes go (P8)"),
     Method("stars, each with cones", {_S: _BUILT, _U: _AFFINE}, Reach.WHOLE, "stars.phasing:solve_phasing", True,
-           _TOLD_APART, _is_pointwise),
+           _TOLD_APART, _is_pointwise,
+           proves="the optimum; where throws leave the even steps as far as boxes of throws, bank angle and split "
+           "pins go (S29, S30)"),
     Method("boxes of sizes", {_Z: _MASSES, _U: _AFFINE}, Reach.WHOLE, "boxes.sizes:solve_sizes", True, _OF_SIZES,
-           _is_of_lengths, _is_no_number),
+           _is_of_lengths, _is_no_number,
+           proves="the optimum (Z12, Z14); with the length of the rod within a gap where bends of a load move "
+           "with it (Z13)"),
     Method("stars, each with boxes of sizes", {_S: _BUILT, _U: _AFFINE, _Z: _MASSES}, Reach.WHOLE,
-           "stars.sizes:solve_star_sizes", True, _OF_SIZES, _is_of_lengths, _is_no_number),
+           "stars.sizes:solve_star_sizes", True, _OF_SIZES, _is_of_lengths, _is_no_number,
+           proves="the optimum, of 60 even stars or firing orders at most"),
     Method("linear matrix inequalities", {_K: ()}, Reach.WHOLE, "mounts.convex:solve_convex_mounts",
-           knows=frozenset(OF_MOUNTING), also=is_convex),
-    Method("smooth program, boxes of stiffness", {_K: ()}, Reach.NEAR, _JOINT, False, _OF_MOUNTS, _is_pointwise),
-    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE, _JOINT, False, _OF_MOUNTS, _is_pointwise),
+           knows=frozenset({*CONVEX, FREQUENCIES}), also=is_convex,
+           proves="the optimum"),
+    Method("smooth program, boxes of stiffness", {_K: ()}, Reach.NEAR, _JOINT, False, _OF_MOUNTS, _is_pointwise,
+           proves="mostly the optimum of up to four numbers, often of six; else a bound"),
+    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE, _JOINT, False, _OF_MOUNTS, _is_pointwise,
+           proves="mostly the optimum of up to five numbers of the mounts (E69); else a local one, with a bound"),
     Method("flywheel, crankshaft and the rest apart", dict.fromkeys(set(Kind) - {_S}, tuple(Dependence)), Reach.ASIDE,
-           "methods:solve_each_apart", norms=lambda _: True, also=is_apart),
+           "methods:solve_each_apart", norms=lambda _: True, also=is_apart,
+           proves="what each of them proves"),
     Method("local programs of sizes and mounts", {_Z: _MASSES, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
-           "mounts.sizes:solve_mounted_sizes", False, _OF_SIZES | _OF_MOUNTS, _is_of_lengths, also=_minimises_loads),
+           "mounts.sizes:solve_mounted_sizes", False, _OF_SIZES | _OF_MOUNTS, _is_of_lengths, also=_minimises_loads,
+           proves="a local optimum, with the bound of any masses that the sizes may have (Z15)"),
     Method("stars, each with a smooth program", {_S: _BUILT, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
-           "mounts.stars:solve_star_mounts", False, _OF_MOUNTS | _TOLD_APART, _is_pointwise, also=_tells_stars_apart),
+           "mounts.stars:solve_star_mounts", False, _OF_MOUNTS | _TOLD_APART, _is_pointwise, also=_tells_stars_apart,
+           proves="a local optimum, with a bound"),
     Method("local programs of all numbers", dict.fromkeys(Kind, tuple(Dependence)), Reach.ASIDE,
-           "methods:solve_all_numbers", norms=lambda _: True),
+           "methods:solve_all_numbers", norms=lambda _: True,
+           proves="a local optimum by exact evaluations, without a bound; of stars each of 60 at most"),
 )  # fmt: skip
 """Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
 
