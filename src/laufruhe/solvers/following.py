@@ -13,11 +13,7 @@ import numpy as np
 
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.problem.decision import Kind
-<<<<<<< HEAD
-from laufruhe.problem.dependence import Dependence, dependence
-=======
 from laufruhe.problem.dependence import is_affine
->>>>>>> 256328f7 (solvers: route by the table of dependences alone)
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
@@ -66,19 +62,10 @@ def can_follow(problem: Problem) -> bool:
     kinds = {decision.kind for decision in problem.decisions}
     told = bool(problem.objective) and not any(term.measure.channel.is_number for term in problem.objective)
     alone = problem.over is None and problem.assembly is None and problem.phasing is None
-<<<<<<< HEAD
     # what is not known to be affine is followed by no program and no bound
-    loads = [measure for measure in problem.measures if measure.is_load or measure.is_mass]
-    known = {dependence(load.channel, kind, problem) for load in loads for kind in kinds}
-    convex = all(load.norm.is_convex for load in loads)
-    # numbers of mounts follow the masses of pistons
-    bent = Kind.PISTON in kinds and any(channel.is_number for channel in channels)
-    affine = known <= {Dependence.NONE, Dependence.AFFINE} and not any(channel.of_loads for channel in channels)
-    return bool(kinds) and kinds <= _FOLLOWED and told and alone and affine and convex and not bent
-=======
     affine = all(is_affine(measure.channel, kinds, problem) for measure in problem.measures)
-    return bool(kinds) and kinds <= _FOLLOWED and told and alone and affine
->>>>>>> 256328f7 (solvers: route by the table of dependences alone)
+    convex = all(measure.norm.is_convex for measure in problem.measures if measure.is_load)
+    return bool(kinds) and kinds <= _FOLLOWED and told and alone and affine and convex
 
 
 class Follower:
