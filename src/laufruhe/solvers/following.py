@@ -62,8 +62,9 @@ def can_follow(problem: Problem) -> bool:
     kinds = {decision.kind for decision in problem.decisions}
     told = bool(problem.objective) and not any(term.measure.channel.is_number for term in problem.objective)
     alone = problem.over is None and problem.assembly is None and problem.phasing is None
-    # what is not known to be affine is followed by no program and no bound
-    affine = all(is_affine(measure.channel, kinds, problem) for measure in problem.measures)
+    # limits on run-ups wait, and are named; what else is not known to be affine is followed by no program and no bound
+    asked = [measure for measure in problem.measures if not measure.channel.is_checked]
+    affine = all(is_affine(measure.channel, kinds, problem) for measure in asked)
     convex = all(measure.norm.is_convex for measure in problem.measures if measure.is_load)
     return bool(kinds) and kinds <= _FOLLOWED and told and alone and affine and convex
 
