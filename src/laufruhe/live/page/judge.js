@@ -87,7 +87,7 @@ function isSame(model, values, others) {
 function against(reference, told, at) {
   const best = `${reference.name}: ${told(reference.value)}`, less = at.value - reference.value;
   const aside = at.unknown.length ? ` Not followed here: ${at.unknown.join(", ")}.` : "";
-  if (at.isReference) return `This is ${best}.`;
+  if (at.isReference) return `This is ${reference.name}.`;
   if (Math.abs(less) <= AT * Math.abs(reference.value)) return `As much as ${best}.${aside}`;
   return `${at.isNothing ? `${told(less)} more than` : `${percent(less / reference.value)} against`} ${best}.${aside}`;
 }

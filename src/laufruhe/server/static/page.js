@@ -56,6 +56,7 @@ function changed(name, edit) {
 function moved() {
   state.position += 1;
   state.refused = false;
+  complain("");
   pictures.offer(false);
   trade.withdraw();
   crank.check(ranked());
