@@ -209,8 +209,6 @@ BAD = [
         "it by at most 180 deg, or wholly"),
     bad("a ring is not convex", '["0 kg", "3 kg"]', '["1 kg", "3 kg"]',
         'counterweights[1].mass = "1 kg": is a least size above zero while'),
-    bad("a circle is not convex", '{ between = ["0 kg", "3 kg"] }', '"1 kg"',
-        "counterweights[1].angle: is open while the size is fixed; leave"),
     bad("unknown objective", '"mean mount force"', '"mean mount forces"',
         """objective.minimise = "mean mount forces": is no quantity; did you mean 'mean mount force'?"""),
     bad("unknown limit", '"balancer mass"', '"balancing mass"',

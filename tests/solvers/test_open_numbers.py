@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,6 +15,10 @@ from scipy.optimize import brentq, minimize
 import laufruhe
 from files.test_reader import complaint_about
 from laufruhe.errors import InputError, ModelError
+from laufruhe.files.model_walk import number_at
+from laufruhe.files.nested import inside, put
+from laufruhe.files.problem_file import ProblemFile
+from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from problem_files import PROBLEMS, changed, loaded, written
 from searched import searched
@@ -188,3 +195,41 @@ def test_a_bound_of_what_is_given_twice_is_one_line(tmp_path: Path) -> None:
             tmp_path,
             changed(ASIDE, 'rod_length = "150 mm"', 'rod_length = "150 mm"\nrod_ratio = { between = [0.2, 0.3] }'),
         )
+
+
+def _every_number(name: str) -> Iterator[tuple[dict[str, Any], tuple[str | int, ...]]]:
+    """Yield the tables of a ready problem with one number open about where it stands, and its address, for each."""
+    tables = tables_of(PROBLEMS / f"{name}.toml")
+    for place, node in inside(tables):
+        number = None if isinstance(node, dict | list | bool) else number_at(ProblemFile, place)
+        match = None if number is None else re.fullmatch(r"\s*([-+.\deE]+)(\D*.*)", str(node))
+        if match is not None:
+            value, unit = float(match[1]), match[2] if isinstance(node, str) else ""
+            ends = [0.97 * value, 1.03 * value] if value else [0.0, 0.01]
+            low, high = ((f"{end!r}{unit}" if unit else end) for end in sorted(ends))
+            yield put(tables, place, {"between": [low, high], "start": node}), place
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["tractor-single", "boxer-four", "powertrain-torque-roll", "inline-five-torsion", "deltic-nine"]
+)
+def test_every_number_of_a_file_is_open_or_refused_in_a_line(name: str) -> None:
+    """The middle of its bounds is an engine as the file with that number draws it."""
+    opened, refused = 0, list[str]()
+    for tables, place in _every_number(name):
+        try:
+            problem = load_tables(tables, Path(f"{name}.toml"))
+        except InputError as error:
+            refused.append(str(error))
+            continue
+        numbers = [decision for decision in problem.decisions if decision.address_drives]
+        opened += len(numbers)
+        for decision in numbers:
+            middle = 0.5 * (decision.lower + decision.upper)
+            (drive,) = decision.address_drives
+            drawn = load_tables(put(tables, place, drive.written(middle)), Path(f"{name}.toml"))
+            held = problem.held([middle], [decision])
+            assert (held.engine, held.points) == (drawn.engine, drawn.points)
+    assert opened > 5
+    assert not [line for line in refused if "\n" in line]

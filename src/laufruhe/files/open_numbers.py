@@ -15,12 +15,14 @@ from pydantic_core import PydanticCustomError
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, key_path
 from laufruhe.files.model_walk import annotations_at, number_at, tables_on
-from laufruhe.files.nested import Place, inside, put
+from laufruhe.files.nested import Place, at, inside, put
 from laufruhe.files.problem_file import ProblemFile
 from laufruhe.files.rotors import FACTORS
+from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.problem.decision import AddressDrive, Decision
 from laufruhe.problem.sets import Interval
 
+_SIZES = ("mass", "unbalance")
 _PISTONS = ("reciprocating_mass", "second_reciprocating_mass")
 _TOGETHER = ("bank_angle", "split_pin_angle")
 
@@ -99,12 +101,16 @@ def _name(tables: Mapping[str, Any], place: Place) -> str:
 def _is_fixed_there(tables: Mapping[str, Any], place: Place) -> bool:
     """Whether a number that its key may leave open is none of the decisions that the key knows of in this engine."""
     engine = tables.get("engine", {})
-    if place[0] == "engine" and place[-1] in _TOGETHER:
-        return _is_given(engine.get("throws"))
+    if place[0] == "engine" and place[1] in (*_TOGETHER, "throws"):
+        kind = LAYOUTS.get(engine.get("layout"))
+        knows = kind is not None and place[1] in kind.openable
+        return not knows or (place[1] in _TOGETHER and _is_given(engine.get("throws")))
     if place[0] == "engine" and place[-1] == "rod_length":
         return bool(engine.get("rod") or engine.get("slider_cranks") or _is_offset(engine))
     if place[0] == "engine" and place[-1] in _PISTONS:
         return any(key in weight for weight in _rows(tables.get("counterweights")) for key in FACTORS)
+    if place[0] in ("counterweights", "balancer_shafts") and place[-1] == "angle":
+        return not any(isinstance(at(tables, (*place[:-1], key)), dict) for key in _SIZES)
     if place[0] == "mounts":
         return bool(tables["mounts"].get("kind", "rigid") == "rigid")
     return False
