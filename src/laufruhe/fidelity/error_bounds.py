@@ -14,7 +14,8 @@ from functools import cached_property
 
 import numpy as np
 
-from laufruhe.machine import Engine
+from laufruhe.machine import Cycle, Engine, GasModel, PressureTrace
+from laufruhe.numerics.corners import SAME_ANGLE
 from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
@@ -22,11 +23,13 @@ from laufruhe.physics.runs import missed_share
 from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, over, value_of_loads
-from laufruhe.problem.measure import Measure
+from laufruhe.problem.measure import Measure, load_rows
 from laufruhe.problem.problem import Problem
 
 REFERENCE_SAMPLES = 5760
 """Steps a cycle of the reference: what cheaper choices are compared with."""
+STRAIGHT, FEWEST = 8, 16
+"""Parts of a straight line from one point of a trace to the next, and points of which every other may go."""
 ROUNDING = 2e-12
 """Relative error that sums of a few thousand rounded terms may have (F9)."""
 
@@ -230,13 +233,60 @@ def sampling_error(problem: Problem, evaluation: Evaluation) -> float:
     Over the objective of `evaluation`, of the physics that its fidelity asks for; infinite where that is zero and the
     bound is not.
     """
-    scale, own = Scale(problem, evaluation), evaluation.fidelity
+    scale = Scale(problem, evaluation)
     bound = scale.missed(evaluation) + ROUNDING * scale.value
-    if own.is_uneven or any(own.gas_of(loads.point) for loads in evaluation.loads):
-        # integration in time is taken as wanted, and would take long
-        still = replace(own, mounts="frequency") if own.mounts == "time" else own
-        given = evaluation if still is own else scale.evaluation(still)
-        finer = scale.evaluation(replace(still, samples=2 * own.samples, gas_samples=2 * own.gas_steps))
-        # what is left of twice the steps is no more than what they change
-        bound += 2.0 * scale.lost(given, finer)
-    return relative(bound, scale.value)
+    return relative(bound + sum(missed_of_gas(problem, evaluation)), scale.value)
+
+
+def missed_of_gas(problem: Problem, evaluation: Evaluation) -> tuple[float, float]:
+    """Return what the steps of the gas, and what the points of a trace miss of the loads minimised at most (F9, F9a).
+
+    Both are the same for every design: what the gas does no unbalance changes.
+    """
+    own = evaluation.fidelity
+    if not (own.is_uneven or any(own.gas_of(loads.point) for loads in evaluation.loads)):
+        return 0.0, 0.0
+    scale = Scale(problem, evaluation)
+    # integration in time is taken as wanted, and would take long
+    still = replace(own, mounts="frequency") if own.mounts == "time" else own
+    given = evaluation if still is own else scale.evaluation(still)
+    finer = replace(still, samples=2 * own.samples, gas_samples=2 * own.gas_steps)
+    # what is left of twice the steps is no more than what they change
+    steps = 2.0 * scale.lost(given, scale.evaluation(finer))
+    if not any(isinstance(own.gas_of(loads.point), PressureTrace) for loads in evaluation.loads):
+        return steps, 0.0
+    others, cycle = [], evaluation.engine.cycle
+    for told in (lambda gas: _straight(gas, cycle), _thinned):
+        points = tuple(replace(at, gas=told(own.gas_of(at))) for at in problem.points)
+        other = evaluate(replace(problem, points=points, fidelity=still), evaluation.engine)
+        others.append(sum(term.weight * _apart(term.measure, given, other) for term in scale.terms))
+    return steps, min(others)
+
+
+def _apart(measure: Measure, ours: Evaluation, theirs: Evaluation) -> float:
+    """The norm of what two evaluations of a design have apart, at many angles: a root mean square of a spike is not."""
+    pairs = zip(ours.loads, theirs.loads, strict=True)
+    found = [measure.load.signal(a) + measure.load.signal(b).each(np.negative) for a, b in pairs]
+    engine, points = ours.engine, [loads.point for loads in ours.loads]
+    signals = over(engine.cycle.base_order, found)
+    return load_rows(measure, points, signals, engine, STRAIGHT * ours.fidelity.gas_steps).value
+
+
+def _straight(gas: GasModel | None, cycle: Cycle) -> GasModel | None:
+    """A trace that goes straight from point to point."""
+    if not isinstance(gas, PressureTrace):
+        return gas
+    angles, pressures = list(gas.angles), list(gas.pressures)
+    if angles[-1] < angles[0] + cycle.angle - SAME_ANGLE:
+        angles, pressures = [*angles, angles[0] + cycle.angle], [*pressures, pressures[0]]
+    places = np.arange(STRAIGHT * (len(angles) - 1) + 1) / STRAIGHT
+    told = [tuple(np.interp(places, range(len(angles)), own).tolist()) for own in (angles, pressures)]
+    return replace(gas, angles=told[0], pressures=told[1])
+
+
+def _thinned(gas: GasModel | None) -> GasModel | None:
+    """A trace of every other point."""
+    if not isinstance(gas, PressureTrace) or len(gas.angles) < FEWEST:
+        return gas
+    keeps = [*range(0, len(gas.angles) - 1, 2), len(gas.angles) - 1]
+    return replace(gas, angles=tuple(gas.angles[k] for k in keeps), pressures=tuple(gas.pressures[k] for k in keeps))
