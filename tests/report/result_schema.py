@@ -29,6 +29,7 @@ DECISION = table(value=NUMBER, unit=TEXT, lower=NUMBER, upper=NUMBER, at_bound={
 CONSTRAINT = table(
     name=TEXT, value=NUMBER, error_estimate=MAYBE, limit=NUMBER, unit=TEXT, active={"type": "boolean"},
     shadow_price=MAYBE,
+    tightening_price=MAYBE,
 )  # fmt: skip
 SCHEMA = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -33,7 +33,7 @@ from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof
-from laufruhe.solvers.conclusion import angle_name
+from laufruhe.solvers.prices import angle_name
 from laufruhe.solvers.result import Result
 
 ON_BLOCK = ("shaking force", "rocking couple", "roll moment")

@@ -19,7 +19,7 @@ from laufruhe.machine import Engine
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.solvers.conclusion import angle_name
+from laufruhe.solvers.prices import angle_name
 from laufruhe.solvers.result import Result
 
 SEARCHED = ("phasing", "robust", "search", "assembly")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Protocol
 
 from laufruhe.units import readable
 
@@ -82,3 +83,29 @@ def price_of(price: float, unit: str, of: str, counts: bool = False) -> str:
     (name, factor), (of_name, of_factor) = readable(unit), readable(of)
     units = f"{name} per {of_name}".strip() if of_name else name
     return f"{number(price * factor / of_factor)} {units}".rstrip()
+
+
+class Priced(Protocol):
+    """What has a price on either side."""
+
+    @property
+    def unit(self) -> str:
+        """Of what is priced."""
+
+    @property
+    def shadow_price(self) -> float:
+        """As it is relaxed."""
+
+    @property
+    def tightening_price(self) -> float | None:
+        """As it is tightened, where that is another."""
+
+
+def prices_of(priced: Priced, unit: str, counts: bool = False) -> str:
+    """The shadow price of a limit or bound, and behind a slash what it costs to tighten it, where that is another."""
+    other = priced.tightening_price
+    if other is None or math.isnan(other):
+        return price_of(priced.shadow_price, unit, priced.unit, counts)
+    relaxed = price_of(priced.shadow_price, unit, priced.unit, counts=True)
+    tightened = "no design" if math.isinf(other) else price_of(other, unit, priced.unit, counts=True)
+    return f"{relaxed} / {tightened}"

@@ -58,7 +58,11 @@ def as_dict(result: Result, series: bool = False) -> Record:
         "objective": _objective(result),
         "certificate": _certificate(result),
         "decisions": {
-            d.name: _of(d, "value unit lower upper at_bound initial shadow_price") for d in result.decisions
+            d.name: {
+                **_of(d, "value unit lower upper at_bound initial shadow_price"),
+                "tightening_price": d.price.tightened,
+            }
+            for d in result.decisions
         },
         "constraints": _constraints(result),
         **{key: _all_points(result, [point[key] for point in points]) for key in places},
@@ -128,6 +132,7 @@ def _constraints(result: Result) -> list[Record]:
             **_of(limit, "name value error_estimate limit side unit active"),
             "met": is_met(limit),
             "shadow_price": None if result.certificate is None else limit.shadow_price,
+            "tightening_price": None if result.certificate is None else limit.price.tightened,
         }
         for limit in limits_of(result)
     ]

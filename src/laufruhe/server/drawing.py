@@ -12,7 +12,7 @@ from laufruhe.machine import Rotor, SliderCrank
 from laufruhe.machine.rotor import Role
 from laufruhe.present.poses import STEEL, THICKNESS, Pose, bore_of
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.conclusion import angle_name
+from laufruhe.solvers.prices import angle_name
 
 STEPS = 72
 """Over one turn of the crank."""

@@ -9,12 +9,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-import numpy as np
-
+from laufruhe.errors import ModelError
 from laufruhe.fidelity.error_bounds import missed, relative
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.witness import is_over
 from laufruhe.problem.decision import Decision
+from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import Evaluation, evaluate, finely, objective_value
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -24,6 +24,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Certificate, Proof, Reach, certified, gap_of
 from laufruhe.prove.witness import Known
 from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.prices import ACTIVE, Price, angle_name
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.ranking import none_of_given
 from laufruhe.solvers.values import DecisionValue, LimitValue, Nearest, ObjectiveValue
@@ -32,13 +33,14 @@ FEASIBLE = 1e-6
 """Relative excess over a limit that counts as none."""
 KEPT = 10.0 * FEASIBLE
 """Relative excess that a design may have and be called one."""
-ACTIVE = 1e-5
 READINGS = 3
 """Times that an objective is read at more angles where a bound lies over it."""
 # share of the objective under which a price is a rounding
 _FELT = 1e-7
 # share of the objective from which a price tells that a limit holds the design, whatever room its tolerance left
 _TOLD = 1e-3
+NEAR, STILL = 1e-3, 1e-9
+"""Share of a decision's scale by which it is moved, and share of what is limited that is no change of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,17 +85,17 @@ class Shown:
     kkt_residual, method
         As in a certificate.
     prices
-        Fall of the objective per unit by which a side of a limit is relaxed, of those that are known.
-    slopes
-        Of the bound over the columns of a decision, by its name: they price the decision's own bounds.
+        Of sides of limits, those that are known.
+    bounds
+        Prices of bounds, by the name of the size or angle that stands at one.
     """
 
     bound: float
     reach: Reach
     kkt_residual: float
     method: str
-    prices: Mapping[Side, float] = field(default_factory=dict)
-    slopes: Mapping[str, Array] = field(default_factory=dict)
+    prices: Mapping[Side, Price] = field(default_factory=dict)
+    bounds: Mapping[str, Price] = field(default_factory=dict)
 
 
 def judged(problem: Problem, values: Sequence[Value], samples: int | None = None) -> Design:
@@ -232,7 +234,7 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
         status=Status.FAILED if not met else Status.OPTIMAL if proven else Status.FEASIBLE,
         objective=ObjectiveValue.of(problem, design.value, given),
         certificate=certificate,
-        decisions=decided(design, shown.slopes, unfelt),
+        decisions=decided(design, shown.bounds, unfelt),
         limits=limits,
         initial=initial,
         final=design.evaluation,
@@ -324,30 +326,60 @@ def nearest_of(problem: Problem, design: Evaluation, decisions: tuple[DecisionVa
 def limit_values(
     problem: Problem,
     evaluation: Evaluation,
-    prices: Mapping[Side, float] | None = None,
+    prices: Mapping[Side, Price] | None = None,
     value: float = 0.0,
     unfelt: float = _FELT,
 ) -> tuple[LimitValue, ...]:
     """How a design stands to the limits (E15); a price that moves the objective by an `unfelt` share is none."""
-    return tuple(_limit_value(limit, evaluation, prices, value, problem.tolerance, unfelt) for limit in problem.limits)
+    return tuple(_limit_value(problem, limit, evaluation, prices, value, unfelt) for limit in problem.limits)
 
 
 def _limit_value(
+    problem: Problem,
     limit: Limit,
     evaluation: Evaluation,
-    prices: Mapping[Side, float] | None,
+    prices: Mapping[Side, Price] | None,
     value: float,
-    tolerance: float,
     unfelt: float = _FELT,
 ) -> LimitValue:
     found = evaluation.standing(limit)
-    # an active side without a price has one that nothing here tells
-    price = 0.0 if prices is None else prices.get((limit, found.side), math.nan)
-    told = price * abs(found.edge) > _TOLD * value and found.excess >= -tolerance
+    if prices is None:
+        price = Price(0.0, 0.0)
+    elif found.excess >= -ACTIVE and not _is_moved(problem, evaluation, limit):
+        # nothing open moves it: relaxed it changes nothing, and tightened no design keeps it
+        price = Price(0.0, math.inf)
+    else:
+        # an active side without a price has one that nothing here tells
+        price = prices.get((limit, found.side), Price.both(math.nan))
+    told = price.relaxed * abs(found.edge) > _TOLD * value and found.excess >= -problem.tolerance
     active = bool(found.excess >= -ACTIVE or told)
-    price = 0.0 if not active or price * abs(found.edge) <= unfelt * value else price
+    price = price.felt(unfelt * value / abs(found.edge) if found.edge else 0.0) if active else Price(0.0, 0.0)
     error = relative(missed(limit.measure, evaluation), found.value)
-    return LimitValue(limit.name, found.value, found.edge, limit.measure.unit, active, price, found.side, error)
+    return LimitValue(
+        limit.name, found.value, found.edge, limit.measure.unit, active, price.relaxed, found.side, error, price.other
+    )
+
+
+def _is_moved(problem: Problem, evaluation: Evaluation, limit: Limit) -> bool:
+    """Tell if anything open moves what is limited, near a design."""
+    channel = limit.measure.channel
+    if not depends(channel, {decision.kind for decision in problem.decisions}, problem):
+        return False
+    if channel.is_load or channel.is_mass:
+        return True
+    given, there = evaluation.values(limit.measure), replace(problem, engine=evaluation.engine)
+    steps = (
+        (decision, NEAR * decision.set.scale * (direction if decision.is_affine else 1.0))
+        for decision in problem.decisions for direction in decision.set.directions
+    )  # fmt: skip
+    for decision, step in steps:
+        try:
+            values = evaluate(problem, there.design([decision.start + step], [decision])).values(limit.measure)
+        except ModelError:
+            return True
+        if len(values) != len(given) or any(abs(x - y) > STILL * abs(x) for x, y in zip(given, values, strict=True)):
+            return True
+    return False
 
 
 def with_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
@@ -355,17 +387,11 @@ def with_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
     problem, known = result.problem, dict(zip(result.problem.limits, result.limits, strict=False))
     still, finer = result.final, finely(result.final)
     shown = tuple(
-        known.get(limit)
-        or _limit_value(limit, finer if still.excess([limit]) > KEPT else still, None, 0.0, problem.tolerance)
+        known.get(limit) or _limit_value(problem, limit, finer if still.excess([limit]) > KEPT else still, None, 0.0)
         for limit in limits
     )
     resonant = not known and result.final.resonance
     return replace(result, problem=problem.changed(limits=limits), limits=() if resonant else shown)
-
-
-def angle_name(decision: Decision) -> str:
-    """What the angle of an open size is called."""
-    return decision.name.rsplit(".", 1)[0] + ".angle"
 
 
 def unbalances_of(problem: Problem, result: Result) -> list[complex]:
@@ -387,34 +413,32 @@ def values_of(problem: Problem, result: Result) -> list[Value]:
 
 
 def decided(
-    design: Design, slopes: Mapping[str, Array] | None = None, unfelt: float = 0.0
+    design: Design, bounds: Mapping[str, Price] | None = None, unfelt: float = 0.0
 ) -> tuple[DecisionValue, ...]:
-    """What is open of a design; slopes of the bound price the sides that it stands at, where that share is felt."""
-    entries = (
-        entry
-        for decision, value in zip(design.problem.decisions, design.values, strict=True)
-        for entry in decision_values(decision, value, (slopes or {}).get(decision.name))
-    )
+    """What is open of a design, with prices of the bounds that it stands at, where that share is felt."""
     least = unfelt * design.value
     return tuple(
-        replace(e, shadow_price=0.0) if e.shadow_price * max(abs(e.lower), abs(e.upper)) <= least else e
-        for e in entries
+        _priced(entry, (bounds or {}).get(entry.name), least)
+        for decision, value in zip(design.problem.decisions, design.values, strict=True)
+        for entry in decision_values(decision, value)
     )
 
 
-def decision_values(decision: Decision, value: Value, slope: Array | None = None) -> tuple[DecisionValue, ...]:
-    """Size and, where open, angle of one decision; the slope of the bound prices the side that it stands at."""
+def _priced(entry: DecisionValue, price: Price | None, least: float) -> DecisionValue:
+    if price is None or not entry.at_bound:
+        return entry
+    own = price.felt(least / (max(abs(entry.lower), abs(entry.upper)) or 1.0))
+    return replace(entry, shadow_price=own.relaxed, tightening_price=own.other)
+
+
+def decision_values(decision: Decision, value: Value) -> tuple[DecisionValue, ...]:
+    """Size and, where open, angle of one decision."""
     own = decision.set
     (size, angle), (given_size, given_angle) = own.split(value), own.split(decision.start)
     reach = own.scale * ACTIVE if decision.is_affine else (own.upper - own.lower) * ACTIVE
     high, low = size >= own.upper - reach, size <= own.lower + reach
     at_bound = high or (own.width == 1 and low)
-    price = 0.0
-    if slope is not None and at_bound:
-        price = float(np.hypot(*slope)) if own.width > 1 else float(-slope[0] if high else slope[0])
-    entry = DecisionValue(
-        decision.name, size, decision.unit, own.lower, own.upper, given_size, at_bound, max(price, 0.0)
-    )
+    entry = DecisionValue(decision.name, size, decision.unit, own.lower, own.upper, given_size, at_bound)
     if own.width == 1:
         return (entry,)
     low_angle, high_angle = own.angles

@@ -15,6 +15,7 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach, certified
 from laufruhe.solvers.conclusion import KEPT, limit_values, with_limits
+from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
 
 Solve = Callable[[Problem], Result]
@@ -51,7 +52,8 @@ def solve_relaxed(problem: Problem, fewer: Problem, prove: Solve, solve: Solve) 
 def _under_all(known: Result, problem: Problem) -> Result:
     """Return an optimum under fewer limits as one under all: a limit that it does not need has no price."""
     own = dict(zip(known.problem.limits, known.limits, strict=True))
-    shown = limit_values(problem, known.final, {}, math.inf)
+    free = {(limit, side): Price(0.0, math.nan) for limit in problem.limits for side in ("at most", "at least")}
+    shown = limit_values(problem, known.final, free)
     limits = (own.get(limit, value) for limit, value in zip(problem.limits, shown, strict=True))
     return replace(known, problem=known.problem.changed(limits=problem.limits), limits=tuple(limits))
 

@@ -16,6 +16,7 @@ from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Side
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate
+from laufruhe.solvers.prices import Price
 from laufruhe.solvers.stars.ranking import PhasingResult
 from laufruhe.solvers.tolerances.assembly_result import AssemblyResult
 from laufruhe.solvers.tolerances.result import RobustResult
@@ -187,7 +188,7 @@ class Result(Told):
         return found
 
     @property
-    def prices(self) -> dict[Side, float]:
+    def prices(self) -> dict[Side, Price]:
         """Shadow prices of the limits, at the sides that the design stands at."""
         pairs = zip(self.problem.limits, self.limits, strict=True)
-        return {(limit, shown.side): shown.shadow_price for limit, shown in pairs}
+        return {(limit, shown.side): shown.price for limit, shown in pairs}

@@ -10,6 +10,7 @@ from itertools import pairwise
 from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
+from laufruhe.solvers.prices import Price
 
 NEXT_TO_NOTHING = 1e-5
 APART = 0.05
@@ -23,7 +24,9 @@ class DecisionValue:
     Attributes
     ----------
     shadow_price
-        Fall of the objective per unit by which the bound it stands at is moved.
+        Fall of the objective per unit by which the bound it stands at is moved outwards.
+    tightening_price
+        Rise per unit by which it is moved inwards, where that is another.
     """
 
     name: str
@@ -34,6 +37,13 @@ class DecisionValue:
     initial: float
     at_bound: bool
     shadow_price: float = 0.0
+    tightening_price: float | None = None
+
+    @property
+    def price(self) -> Price:
+        """Of both sides of the bound."""
+        other = self.tightening_price
+        return Price(self.shadow_price, self.shadow_price if other is None else other)
 
     @property
     def is_nothing(self) -> bool:
@@ -106,6 +116,9 @@ class LimitValue:
         "at most" or "at least".
     error_estimate
         What samples over the cycle may have missed of the value, relative, not exceeded.
+    tightening_price
+        Rise of the objective per unit by which the limit is tightened, where that is another; infinite where no design
+        is left.
     """
 
     name: str
@@ -116,6 +129,13 @@ class LimitValue:
     shadow_price: float
     side: str = "at most"
     error_estimate: float = 0.0
+    tightening_price: float | None = None
+
+    @property
+    def price(self) -> Price:
+        """Of both sides."""
+        other = self.tightening_price
+        return Price(self.shadow_price, self.shadow_price if other is None else other)
 
 
 @dataclass(frozen=True)

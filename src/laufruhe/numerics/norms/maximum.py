@@ -10,8 +10,11 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import (
+    COUNTS,
+    TOUCHES,
     Cones,
     Grid,
+    Kinks,
     Norm,
     SmoothProgram,
     amplitudes,
@@ -41,6 +44,12 @@ class Maximum(Norm):
         if len(size) and size[k] > 0.0:
             z[k] = rows[k] / size[k]
         return z
+
+    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks:
+        """Every row that is as long as the longest, and those that the dual rows given are of."""
+        size, shares = lengths(rows), lengths(z)
+        counts = (size >= (1.0 - TOUCHES) * size.max(initial=0.0)) | (shares > COUNTS * shares.sum())
+        return Kinks(z, np.flatnonzero(counts & (size > 0.0)))
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """sum_k |z_k|."""

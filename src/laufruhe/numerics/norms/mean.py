@@ -10,8 +10,10 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import (
+    VANISHES,
     Cones,
     Grid,
+    Kinks,
     Norm,
     SmoothProgram,
     curvature,
@@ -49,6 +51,13 @@ class Mean(Norm):
         """w_k / |v_k|; that of a short row where one vanishes."""
         size = lengths(rows)
         return np.asarray(grid.weights / np.maximum(size, SHORT * float(size.max(initial=0.0)) or 1.0))
+
+    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks:
+        """Rows along the design's own, free where they vanish."""
+        size = lengths(rows)
+        vanishing = size <= VANISHES * float(size.max(initial=0.0))
+        base = np.where(vanishing[:, None], 0.0, self.subgradient(grid, rows))
+        return Kinks(base, vanishing=np.flatnonzero(vanishing))
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """max_k |z_k| / w_k; infinite where a weightless row is used."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any, ClassVar, Protocol
 
@@ -46,6 +46,30 @@ class Grid:
     steps: int
     bends: int = 0
     points: int = 1
+
+
+TOUCHES, VANISHES, COUNTS = 1e-5, 1e-6, 1e-4
+"""Shares of the longest row that a row may lack and be as long, and up to which it is none; share of all dual rows
+from which one counts."""
+
+
+@dataclass(frozen=True, eq=False)
+class Kinks:
+    """Dual rows that touch a norm at a design (P19).
+
+    Attributes
+    ----------
+    base
+        One of them, shape (k, d).
+    longest
+        Rows of which each alone, along itself, would do in its place; none where the base is needed.
+    vanishing
+        Rows that are zero: anything no longer than their weight may be added.
+    """
+
+    base: Array
+    longest: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    vanishing: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +199,10 @@ class Norm(ABC):
         """The nearest simple change of Z into the unit ball of the dual norm (P3)."""
         excess = self.dual_norm(grid, z)
         return z if excess <= 1.0 else z / excess
+
+    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks:
+        """Return all dual rows that touch the norm here, as far as it tells them from those given (P19)."""
+        return Kinks(z)
 
     def balanced(self, grid: Grid, z: Array) -> Array:
         """The nearest dual rows whose dual norm is finite (P3)."""

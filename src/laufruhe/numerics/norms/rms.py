@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.norms.norm import Cones, Grid, Norm, SmoothProgram, lengths, mean_square
+from laufruhe.numerics.norms.norm import Cones, Grid, Kinks, Norm, SmoothProgram, lengths, mean_square
 from laufruhe.numerics.spectrum import Spectrum
 
 
@@ -31,6 +31,10 @@ class RootMeanSquare(Norm):
         """w_k v_k over the norm."""
         total = self.value(grid, rows)
         return np.asarray(grid.weights[:, None] * rows / total) if total > 0.0 else np.zeros_like(rows)
+
+    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks:
+        """Rows along the design's own: it is smooth but at zero."""
+        return Kinks(self.subgradient(grid, rows) if rows.any() else z)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """sqrt(sum_k |z_k|^2 / w_k); infinite where a weightless row is used."""

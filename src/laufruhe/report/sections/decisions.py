@@ -5,7 +5,7 @@ from __future__ import annotations
 from itertools import pairwise
 
 from laufruhe.present.measures import objective_unit
-from laufruhe.present.numbers import DASH, figure, in_grams, price_of, trimmed, with_unit
+from laufruhe.present.numbers import DASH, figure, in_grams, prices_of, trimmed, with_unit
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionValue
@@ -42,4 +42,4 @@ def _row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str
     upper = abs(d.value - d.upper) <= abs(d.value - d.lower)
     mark = DASH if not d.at_bound else "upper" if upper else "lower"
     decided = figure(d.value, d.unit, scale=most) + in_grams(d.value, d.unit, most)
-    return d.name, given, decided, bounds, mark, price_of(d.shadow_price, unit, d.unit)
+    return d.name, given, decided, bounds, mark, prices_of(d, unit)

@@ -12,6 +12,7 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.measure import Side
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -21,6 +22,7 @@ from laufruhe.prove.witness import Known
 from laufruhe.solvers.boxes.search import Box, Search, divided
 from laufruhe.solvers.conclusion import Design, Shown, concluded, judged, known_of, none_within, unbalances_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
+from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
 
 SHARE = 0.25
@@ -82,6 +84,10 @@ class HeldDesigns(Search[S, HeldDesign]):
         at = self.place(found)
         return bool(np.all(box.lower <= at) and np.all(at <= box.upper))
 
+    def prices(self, _: Design) -> dict[Side, Price]:
+        """Prices of limits that the problem of the unbalances does not know."""
+        return {}
+
     def told(self, conflict: Sequence[str]) -> None:
         """What cannot be met in one box may be in another: all boxes together tell."""
         told = {*self.conflict, *conflict}
@@ -116,7 +122,7 @@ class HeldDesigns(Search[S, HeldDesign]):
             reach=Reach.WHOLE,
             kkt_residual=own.certificate.kkt_residual if own is not None and own.certificate is not None else math.inf,
             method=f"{how} {boxes} box{'es' * (boxes > 1)} of {what}",
-            prices=own.prices if own is not None else {},
+            prices=(own.prices if own is not None else {}) | self.prices(design),
         )
         return concluded(design, replace(initial, samples=design.evaluation.samples), shown, timing)
 

@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import islice, product
 
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.measure import Limit
+from laufruhe.problem.measure import Limit, Side
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import EMPTY, Box, Over, halves
 from laufruhe.prove.witness import thin
 from laufruhe.solvers.boxes.held_designs import SHARE, HeldDesign, HeldDesigns, best_with
 from laufruhe.solvers.boxes.place_boxes import Relaxation
+from laufruhe.solvers.conclusion import Design
 from laufruhe.solvers.cones.unbalances import solve_unbalances
+from laufruhe.solvers.prices import ACTIVE, Price, Slopes, edges_at, prices_of
 from laufruhe.solvers.result import Result, Status
 
 MOST_BOXES = 300
 # [m]
 EXACT = 1e-6
+# share of the bounds of a place by which it is moved to see what that is worth
+STEP = 1e-3
 # [m], by which a limit on a distance may be missed, and by which it is kept where places are moved for it
 REACH, INSIDE = 1e-9, 1e-7
 # of the part of a side that is cut away
@@ -181,6 +185,40 @@ class _Search(HeldDesigns[_Box]):
             pushed = minimize(away, start, jac=slope, method="SLSQP", bounds=sides, constraints=[kept])
             found += [at for at in (np.clip(pushed.x, lower, upper), start) if room(at).min() >= -REACH]
         return min(found, key=away, default=None)
+
+    def prices(self, design: Design) -> dict[Side, Price]:
+        """Prices of limits on distances: what the least objective loses and they gain as places move (P19)."""
+        values = dict(zip((d.name for d in self.problem.decisions), design.values, strict=True))
+        places = np.array([float(np.real(values[place.name])) for place in self.places])
+        # every shaft that stands at a limit has a distance of its own
+        held = [
+            (limit, k, side)
+            for limit in self._envelope for k, value in enumerate(design.evaluation.values(limit.measure))
+            for room, _, side in (limit.room(value),) if room <= ACTIVE
+        ]  # fmt: skip
+        if not held:
+            return {}
+        width = self.bounds[1] - self.bounds[0]
+        ends = [(self.at(places - step), self.at(places + step)) for step in np.diag(STEP * width)]
+
+        def slope(number: Callable[[Design], float]) -> Array:
+            return np.array([(number(high.design) - number(low.design)) / (2.0 * STEP) for low, high in ends])
+
+        signs = {"at most": 1.0, "at least": -1.0}
+        bends = [
+            signs[side] * slope(lambda own, limit=limit, k=k: own.evaluation.values(limit.measure)[k])  # type: ignore[misc]
+            for limit, k, side in held
+        ]  # fmt: skip
+        edges = [
+            normal * width[k] * np.eye(len(places))[k]
+            for k, place in enumerate(self.places) for normal in edges_at(place, places[k : k + 1]).values()
+        ]  # fmt: skip
+        objective = [Slopes.smooth(slope(lambda own: own.value))]
+        told = prices_of(objective, [Slopes.smooth(own) for own in bends], np.reshape(edges, (-1, len(places))))
+        found: dict[Side, Price] = {}
+        for (limit, _, side), price in zip(held, told or (), strict=False):
+            found[limit, side] = price + found.get((limit, side), Price(0.0, 0.0))
+        return found
 
     def at(self, places: Array) -> HeldDesign:
         """The best design with its places given."""

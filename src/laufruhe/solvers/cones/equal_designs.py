@@ -19,9 +19,10 @@ from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, angle_name, judged, unbalances_of
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, judged, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.lightest import distance
+from laufruhe.solvers.prices import angle_name
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionRange
 

@@ -26,6 +26,7 @@ from laufruhe.solvers.cones.equations import on_grid
 from laufruhe.solvers.cones.lightest import SAME_LOAD, lightest
 from laufruhe.solvers.cones.sharpening import Optimum, sharpened
 from laufruhe.solvers.conflicts import smallest
+from laufruhe.solvers.prices import Price, affine_prices
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.told_limits import told_excess
 
@@ -274,16 +275,16 @@ def _triangle(slope: Array) -> Array:
 
 
 def _shown(limits: Sequence[Limit], idle: Sequence[Limit], optimum: Optimum, value: float) -> Shown:
-    bound, prices = optimum.bound, optimum.bound.multipliers.shadow_prices(optimum.problem)
+    bound = optimum.bound
+    prices, bounds = affine_prices(optimum.problem, limits, optimum.x, bound.multipliers)
     unit = value if value > optimum.nothing else optimum.nothing / ROUNDING
     return Shown(
         bound=bound.value,
         reach=Reach.WHOLE,
         kkt_residual=kkt_residual(optimum.problem, optimum.x, bound, unit),
         method=f"second-order cones at {optimum.samples} angles{optimum.then}, dual bound at {optimum.problem.samples}",
-        prices=dict.fromkeys([(limit, "at most") for limit in idle], 0.0)
-        | {(limit, "at most"): price for limit, price in zip(limits, prices, strict=True)},
-        slopes={domain.decision.name: bound.gradient[domain.columns] for domain in optimum.problem.domains},
+        prices=dict.fromkeys([(limit, "at most") for limit in idle], Price(0.0, math.inf)) | prices,
+        bounds=bounds,
     )
 
 

@@ -35,6 +35,7 @@ from laufruhe.prove.mounts.convex_functions import (
 )
 from laufruhe.solvers.conclusion import Shown, better, concluded, given_design, judged, none_within
 from laufruhe.solvers.conflicts import smallest_conflict
+from laufruhe.solvers.prices import Price, bounds_of
 from laufruhe.solvers.result import Result
 
 CONVEX = (channels.SAG, channels.TORQUE_ROLL, channels.RAW_TORQUE_ROLL, channels.TOTAL_STIFFNESS)
@@ -132,22 +133,26 @@ def solve_convex_mounts(problem: Problem) -> Result:
         kkt_residual=_residual(program, x, duals, gradient),
         method="linear matrix inequalities, dual bound over the box of stiffnesses",
         prices=_prices(problem, program, duals),
-        slopes={decision.name: gradient[k : k + 1] for k, decision in enumerate(problem.decisions)},
+        bounds={
+            name: price
+            for k, (decision, value) in enumerate(zip(problem.decisions, x.tolist(), strict=True))
+            for name, price in bounds_of(decision, np.array([value]), gradient[k : k + 1]).items()
+        },
     )
     design = better(judged(problem, [float(v) for v in x]), given_design(problem, initial))
     return concluded(design, initial, shown, {**timing, "evaluate": time.perf_counter() - solved})
 
 
-def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> dict[Side, float]:
+def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> dict[Side, Price]:
     """Fall of the objective per unit by which each side of a limit is relaxed, in the limit's own unit."""
-    prices: dict[Side, float] = {}
+    prices: dict[Side, Price] = {}
     for limit, price in zip(program.limits, duals.prices, strict=True):
         source = problem.limits[limit.source]
         slope = 1.0
         if source.measure.channel is channels.FREQUENCIES:
             # the limit is on the square of 2 pi f
             slope = 2.0 * math.tau * math.sqrt(abs(limit.maximum))
-        prices[source, limit.side] = price * slope
+        prices[source, limit.side] = Price.both(price * slope)
     return prices
 
 

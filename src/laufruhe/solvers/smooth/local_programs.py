@@ -22,6 +22,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach, room_of
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, judged
+from laufruhe.solvers.prices import Price, Slopes, bounds_of, edges_at, prices_of
 from laufruhe.solvers.told_limits import over_read
 
 # designs looked at for each start of the search; step of a slope, room that is none, and an objective that is far off
@@ -238,8 +239,8 @@ def shown(program: LocalProgram, design: Design, bound: float, reach: Reach, met
     columns += [sign * np.eye(len(best))[k] for mask, sign in ((low, -1.0), (high, 1.0)) for k in np.flatnonzero(mask)]
     scale = max(size, design.value)
     shares, rest = nnls(np.column_stack(columns), -slopes[0] / scale) if columns else (np.zeros(0), size / scale)
-    prices: dict[Side, float] = {}
-    left = slopes[0].copy()
+    prices: dict[Side, Price] = {}
+    left, sides = slopes[0].copy(), list[tuple[int, Side, float]]()
     for k, share in zip(held, shares, strict=False):
         if k >= len(problem.limits):
             # a set's own edge, which its decision has a price for
@@ -248,7 +249,32 @@ def shown(program: LocalProgram, design: Design, bound: float, reach: Reach, met
         steep = float(np.abs(slopes[1 + k]).max()) or 1.0
         _, edge, side = limit.room(design.evaluation.standing(limit).value)
         # rooms are relative to the edge of their limit
-        prices[limit, side] = float(share) * scale / (steep * (abs(edge) or 1.0))
+        sides.append((k, (limit, side), abs(edge) or 1.0))
+        prices[limit, side] = Price.both(float(share) * scale / (steep * (abs(edge) or 1.0)))
         left = left - float(share) * scale / steep * slopes[1 + k]
-    widths = program.upper - program.lower
-    return Shown(bound, reach, float(rest), method, prices, program.by_decision(left / widths))
+    bounds = _both_sides(program, best, slopes, left, sides, prices)
+    return Shown(bound, reach, float(rest), method, prices, bounds)
+
+
+def _both_sides(
+    program: LocalProgram, shares: Array, slopes: Array, left: Array, sides: Sequence[tuple[int, Side, float]],
+    prices: dict[Side, Price],
+) -> dict[str, Price]:  # fmt: skip
+    """Prices of bounds, and of limits where their two sides differ."""
+    widths, columns = program.upper - program.lower, program.columns(shares)
+    rest = program.by_decision(left / widths)
+    found, normals = dict[str, Price](), list[Array]()
+    for domain in program.domains:
+        at = columns[domain.columns]
+        found |= bounds_of(domain.decision, at, rest[domain.decision.name])
+        for normal in edges_at(domain.decision, at).values():
+            normals.append(np.zeros(len(shares)))
+            normals[-1][domain.columns] = normal
+    held = [Slopes.smooth(-slopes[1 + k]) for k, *_ in sides]
+    told = prices_of([Slopes.smooth(slopes[0])], held, np.array(normals).reshape(-1, len(shares)) * widths)
+    if told is None:
+        return found
+    for (_, side, edge), price in zip(sides, told, strict=False):
+        if not price.is_one:
+            prices[side] = Price(price.relaxed / edge, price.tightened / edge)
+    return dict(zip(found, told[len(sides) :], strict=True))

@@ -44,6 +44,7 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
+from laufruhe.solvers.prices import Price
 from laufruhe.solvers.smooth.cases import StaticCases
 from laufruhe.solvers.smooth.gathered import Gathered
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum
@@ -295,7 +296,7 @@ class SmoothProgram:
 
     # between variables and decisions
 
-    def prices(self, optimum: LocalOptimum) -> dict[Side, float]:
+    def prices(self, optimum: LocalOptimum) -> dict[Side, Price]:
         """Fall of the objective per unit by which each side of a limit is relaxed."""
         found: dict[Side, float] = defaultdict(float)
         for (least, most), m in zip(self._held.slopes, optimum.multipliers, strict=True):
@@ -303,7 +304,8 @@ class SmoothProgram:
                 if held is not None:
                     found[held[0]] += float(held[1] * own)
         first, symbols = self._turned.stop, self._modes.symbols.numel()
-        return found | self._modes.prices(optimum.x[first : first + symbols], optimum.multipliers)
+        found |= self._modes.prices(optimum.x[first : first + symbols], optimum.multipliers)
+        return {side: Price.both(price) for side, price in found.items()}
 
     def _inner(self, mounts: Sequence[float]) -> Array:
         """Decisions about mounts as the program has them: by ratio where bounds lie far apart."""

@@ -29,6 +29,7 @@ from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified
 from laufruhe.prove.throws.uneven import steady_bound, uneven_bound
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, quoted, result_under, unbalances_of
+from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.nonlinear import solve_nonlinear, try_all
 from laufruhe.solvers.smooth.program import TURN, SmoothProgram
@@ -170,7 +171,7 @@ def local_optimum(
     moves = ThrowMoves(phasing, phasing.layout_of(start), start, intervals)
     if not moves.size or _is_nothing(best):
         return best
-    prices: Mapping[Side, float] | None = None
+    prices: Mapping[Side, Price] | None = None
     margin = 0.0
     for _ in range(_ATTEMPTS):
         smooth = SmoothProgram(problem, _size(problem, best), margin, moves, slack=SOFT_LIMIT, softest=SOFTEST)
@@ -197,7 +198,7 @@ def local_optimum(
     return None if best is None else _priced(best, prices or {})
 
 
-def _priced(design: StarDesign, prices: Mapping[Side, float]) -> StarDesign:
+def _priced(design: StarDesign, prices: Mapping[Side, Price]) -> StarDesign:
     """With what its limits cost while throws may move, less than with fixed ones; unknown where not told."""
     result = design.result
     limits = limit_values(result.problem, result.final, prices, design.value)

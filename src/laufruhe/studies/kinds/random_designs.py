@@ -53,7 +53,7 @@ class RandomDesigns(Sampled):
             problem = scenes.problem(Point(case))
             columns["objective"] = Column(problem.objective_unit or "", problem.objective_name)
             columns[WITHIN] = Column("1", "1 where a design keeps all limits")
-            told = [one for d in problem.unbalances for one in decision_values(d, d.start, None)]
+            told = [one for d in problem.unbalances for one in decision_values(d, d.start)]
             columns |= {one.name: Column(one.unit, one.name) for one in told}
         return columns
 
@@ -73,7 +73,7 @@ class RandomDesigns(Sampled):
         found[:, names.index("objective")] = designs.objective(values)
         found[:, names.index(WITHIN)] = designs.within(values)
         for k, decision in enumerate(problem.unbalances):
-            for told, drawn in zip(decision_values(decision, decision.start, None), (sizes, angles), strict=False):
+            for told, drawn in zip(decision_values(decision, decision.start), (sizes, angles), strict=False):
                 found[:, names.index(told.name)] = drawn[:, k]
         return {VALUES: found}
 

@@ -66,7 +66,7 @@ class RandomScenes(Sampled):
             name, unit = problem.objective_name, problem.objective_unit or ""
             found |= {key: Column(unit, f"{name} {words}") for key, words in _WORDS.items()}
             found |= {key: Column("1", key) for key in _CODES}
-            told = [one for d in problem.decisions for one in decision_values(d, d.start, None)]
+            told = [one for d in problem.decisions for one in decision_values(d, d.start)]
             found |= {one.name: Column(one.unit, f"decided: {one.name}") for one in told}
         return found
 

@@ -1,0 +1,288 @@
+"""What limits and bounds are worth on either side: least and largest multipliers that hold an optimum (P5, P19)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from laufruhe.load_models.affine import AffineNorm, AffineProblem
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.decision import Decision
+from laufruhe.problem.measure import Limit, Side
+from laufruhe.problem.sets import EDGE
+from laufruhe.prove.certificate import Multipliers
+
+ALIKE = 0.02
+"""Share of the larger price up to which two sides are one."""
+INDEPENDENT, BALANCED = 1e-3, 1e-2
+"""Least share of its length that a slope has across all others, and what may be left of all, where prices are told."""
+_SPARE = 1e-9
+ACTIVE = 1e-5
+"""Share of a limit, and of the scale of a decision, by which it may be missed and be active."""
+MOST_VANISHING, _WAYS = 64, 8
+"""Rows that vanish of a number that is told, and ways in which a segment stands for a disc."""
+
+
+@dataclass(frozen=True)
+class Price:
+    """What an edge is worth [unit of the objective per unit of the edge].
+
+    Attributes
+    ----------
+    relaxed
+        Fall of the objective as the edge is relaxed.
+    tightened
+        Rise as it is tightened; not a number where that is not known.
+    """
+
+    relaxed: float
+    tightened: float
+
+    def __post_init__(self) -> None:
+        if self.tightened < self.relaxed:
+            object.__setattr__(self, "tightened", self.relaxed)
+
+    @classmethod
+    def both(cls, price: float) -> Price:
+        """Return the price of an edge that is worth the same on both sides."""
+        return cls(price, price)
+
+    def __add__(self, other: Price) -> Price:
+        """Return the price of two edges that move together."""
+        return Price(self.relaxed + other.relaxed, self.tightened + other.tightened)
+
+    @property
+    def is_one(self) -> bool:
+        """Tell if both sides are alike."""
+        return self.relaxed >= (1.0 - ALIKE) * self.tightened
+
+    @property
+    def other(self) -> float | None:
+        """The price as it is tightened, None where that is the same."""
+        return None if self.is_one or math.isnan(self.relaxed) else self.tightened
+
+    def felt(self, least: float) -> Price:
+        """Return it without what is no more than a rounding."""
+        relaxed, tightened = (0.0 if price <= least else price for price in (self.relaxed, self.tightened))
+        return Price(relaxed, tightened)
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """All slopes of a convex number at a design: those of a hull, and segments about them (P19).
+
+    Attributes
+    ----------
+    hull
+        Shape (m, n): one row of a number that is smooth there.
+    segments
+        Shape (s, n): each may be added up to once, in both senses.
+    """
+
+    hull: Array
+    segments: Array
+
+    @classmethod
+    def smooth(cls, slope: Array) -> Slopes:
+        """Return the only slope of a number without a kink."""
+        return cls(slope[None], np.zeros((0, len(slope))))
+
+    def scaled(self, units: Array) -> Slopes:
+        """Return them in other units of the decisions."""
+        return Slopes(self.hull * units, self.segments * units)
+
+    @property
+    def rows(self) -> Array:
+        """One slope, the others less it, and the segments."""
+        return np.concatenate([self.hull[:1], self.hull[1:] - self.hull[:1], self.segments])
+
+
+def prices_of(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array) -> list[Price] | None:
+    """Return the price of every limit, then of every edge of a set (P19).
+
+    Parameters
+    ----------
+    objective
+        Of every term, its weight in it.
+    limits
+        Of those that the design stands at.
+    edges
+        Outward normals of the sets' edges that it stands at, shape (edges, n).
+
+    Returns
+    -------
+    None where slopes do not balance: the design is no optimum to first order, or a kink of it is not told.
+    """
+    count = len(limits) + len(edges)
+    if not count:
+        return []
+    kinks = [own.rows[1:] for own in objective]
+    held = [*(own.rows for own in limits), *(edge[None] for edge in edges)]
+    slope = np.sum([own.hull[0] for own in objective], axis=0)
+    size = max(float(np.abs(slope).max()), *(float(np.abs(own).max(initial=0.0)) for own in kinks), 0.0)
+    if not size:
+        return None
+    if all(not len(own) for own in kinks) and all(len(own) == 1 for own in held):
+        unique = _unique(np.concatenate(held), slope)
+        if unique is not None:
+            return [Price.both(price) for price in unique]
+    return _ranges(objective, limits, edges, size)
+
+
+def _unique(rows: Array, slope: Array) -> list[float] | None:
+    """The only multipliers of independent slopes, None where slopes hang together or do not balance."""
+    lengths = np.linalg.norm(rows, axis=1)
+    if not lengths.all():
+        return None
+    scaled = rows / lengths[:, None]
+    if np.linalg.svd(scaled, compute_uv=False).min() < INDEPENDENT or len(rows) > rows.shape[1]:
+        return None
+    found = np.linalg.lstsq(scaled.T, -slope)[0]
+    if np.abs(scaled.T @ found + slope).max() > BALANCED * np.abs(slope).max():
+        return None
+    return [float(price) for price in np.maximum(found, 0.0) / lengths]
+
+
+def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array, size: float) -> list[Price] | None:
+    """Least and largest multiplier of each by linear programs over all that balance."""
+    from scipy.optimize import linprog
+
+    shares = [*objective, *limits, *(Slopes.smooth(edge) for edge in edges)]
+    columns, totals, below = list[Array](), list[list[int]](), list[tuple[int, int]]()
+    bounds: list[tuple[float | None, float | None]] = []
+    for k, own in enumerate(shares):
+        totals.append(list(range(len(columns), len(columns) + len(own.hull))))
+        columns += list(own.hull)
+        bounds += [(0.0, None)] * len(own.hull)
+        for segment in own.segments:
+            below.append((k, len(columns)))
+            columns.append(segment)
+            bounds.append((-1.0, 1.0) if k < len(objective) else (None, None))
+    matrix = np.array(columns).T / size
+    n, m = matrix.shape
+    # the last variable is what is left of the balance
+    balance = np.block([[matrix, -np.ones((n, 1))], [-matrix, -np.ones((n, 1))]])
+    whole = np.zeros((len(objective), m + 1))
+    for k in range(len(objective)):
+        whole[k, totals[k]] = 1.0
+    within = []
+    for k, at in below:
+        if k >= len(objective):
+            for sign in (1.0, -1.0):
+                row = np.zeros(m + 1)
+                row[at], row[totals[k]] = sign, -1.0
+                within.append(row)
+    above = np.array([*balance, *within])
+    told: dict[str, Any] = {
+        "A_ub": above, "b_ub": np.zeros(len(above)), "A_eq": whole, "b_eq": np.ones(len(objective)), "method": "highs"
+    }  # fmt: skip
+    first = linprog(np.eye(m + 1)[m], **told, bounds=[*bounds, (0.0, None)])
+    if first.x is None or first.x[m] > BALANCED:
+        return None
+    rest = [*bounds, (0.0, 1.01 * float(first.x[m]) + _SPARE)]
+    found = []
+    for total in totals[len(objective) :]:
+        aim = np.zeros(m + 1)
+        aim[total] = 1.0
+        ends = [linprog(sign * aim, **told, bounds=rest) for sign in (1.0, -1.0)]
+        low = max(float(ends[0].fun), 0.0) if ends[0].x is not None else 0.0
+        high = -float(ends[1].fun) if ends[1].x is not None else np.inf
+        found.append(Price(low, high))
+    return found
+
+
+def edges_at(decision: Decision, column: Array) -> dict[str, Array]:
+    """Outward normals of the edges that a decision stands at, by the name of its size or angle, shape (width,)."""
+    own = decision.set
+    if own.width == 1:
+        reach = (own.scale if decision.is_affine else own.upper - own.lower) * ACTIVE
+        at = float(column[0])
+        found = {decision.name: np.ones(1)} if at >= own.upper - reach else {}
+        return {decision.name: -np.ones(1)} if at <= own.lower + reach else found
+    size = float(np.hypot(*column))
+    if size <= own.scale * ACTIVE:
+        return {}
+    along = column / size
+    found = {decision.name: along} if size >= own.upper - own.scale * ACTIVE else {}
+    turn = np.array([-along[1], along[0]])
+    for edge, sign in zip(own.edges, (-1.0, 1.0), strict=False):
+        if along @ edge >= 1.0 - EDGE:
+            # a turn of one radian moves as far as the size
+            found[angle_name(decision)] = sign * turn / size
+    return found
+
+
+def bounds_of(decision: Decision, column: Array, slope: Array) -> dict[str, Price]:
+    """Return prices of the edges that a decision stands at, where this slope is left of all else."""
+    edges = edges_at(decision, column).items()
+    return {name: Price.both(max(-float(slope @ normal) / float(normal @ normal), 0.0)) for name, normal in edges}
+
+
+def affine_prices(
+    problem: AffineProblem, limits: Sequence[Limit], x: Array, found: Multipliers
+) -> tuple[dict[Side, Price], dict[str, Price]]:
+    """Return prices of limits and of the bounds of sizes and angles, at an optimum of affine norms (P19)."""
+    solver = found.shadow_prices(problem)
+    prices = {(limit, "at most"): Price(price, price) for limit, price in zip(limits, solver, strict=True)}
+    active = [k for k, (most, norm) in enumerate(problem.limits) if norm.value(x) >= most * (1.0 - ACTIVE)]
+    edges = {
+        name: (domain.columns, normal)
+        for domain in problem.domains
+        for name, normal in edges_at(domain.decision, x[domain.columns]).items()
+    }
+    if not active and not edges:
+        return prices, {}
+    objective = [_slopes(norm, x, z, weight) for (weight, norm), z in zip(problem.terms, found.terms, strict=True)]
+    held = [
+        _slopes(problem.limits[k][1], x, found.limits[k] / solver[k] if solver[k] else None) for k in active
+    ]  # fmt: skip
+    normals = np.zeros((len(edges), problem.size))
+    for row, (columns, normal) in zip(normals, edges.values(), strict=True):
+        row[columns] = normal
+    told = [None if own is None else own.scaled(problem.units) for own in (*objective, *held)]
+    known = [own for own in told if own is not None]
+    count, ranges = len(objective), None
+    if len(known) == len(told) and not problem.groups:
+        ranges = prices_of(known[:count], known[count:], normals * problem.units)
+    if ranges is None:
+        return prices, {}
+    for k, price in zip(active, ranges, strict=False):
+        if not price.is_one:
+            prices[limits[k], "at most"] = price
+    return prices, dict(zip(edges, ranges[len(active) :], strict=True))
+
+
+def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) -> Slopes | None:
+    """All slopes of a norm at a design; None where too much of it vanishes."""
+    rows = norm.rows(x)
+    kinks = norm.norm.kinks(norm.grid, rows, norm.norm.subgradient(norm.grid, rows) if z is None else z)
+    if len(kinks.vanishing) > MOST_VANISHING:
+        return None
+    hull = norm.pulled(kinks.base)[None]
+    if len(kinks.longest):
+        own = rows[kinks.longest]
+        hull = np.einsum("ad,adn->an", own / np.linalg.norm(own, axis=1)[:, None], norm.slope[kinks.longest])
+    segments = [
+        segment for k in kinks.vanishing for segment in _disc(float(norm.grid.weights[k]) * norm.slope[k])
+    ]  # fmt: skip
+    return Slopes(weight * hull, weight * np.array(segments).reshape(-1, len(x)))
+
+
+def _disc(slope: Array) -> list[Array]:
+    """Segments that add up to what the unit ball of a row becomes, shape (n,) each."""
+    sizes, ways = np.linalg.svd(slope, full_matrices=False)[1:]
+    strong = sizes > EDGE * sizes.max(initial=0.0)
+    axes = sizes[strong, None] * ways[strong]
+    if len(axes) != 2:
+        return list(axes)
+    turns = math.pi * np.arange(_WAYS) / _WAYS
+    return [0.5 * math.pi / _WAYS * (math.cos(t) * axes[0] + math.sin(t) * axes[1]) for t in turns]
+
+
+def angle_name(decision: Decision) -> str:
+    """What the angle of an open size is called."""
+    return decision.name.rsplit(".", 1)[0] + ".angle"
