@@ -321,3 +321,21 @@ def test_angles_as_given_are_those_of_the_design_that_is_evaluated(bank, split):
     again = load_tables({**text, "engine": {**engine, open_key: given}}, Path("ten.toml"))
     assert objective_value(again, evaluate(again)) == pytest.approx(result.objective.initial, rel=1e-9)
     assert given == pytest.approx(72.0 if isinstance(split, int) else -18.0)
+
+
+def test_a_star_that_breaks_a_limit_which_nothing_open_moves_is_no_design(tmp_path):
+    """Weights of order 1 move nothing of order 2: its own couple keeps the limit or breaks it, star by star."""
+    rest = engines.MOUNTS + engines.WEIGHTS + engines.MOUNT_FORCE
+    limit = '[[constraints]]\nlimit = "rms rocking couple"\norders = [2]\nmax = "{:.9g} N m"\n'
+    model, stars = model_of(engines.problem(tmp_path, 4, rest=rest + limit.format(1e6)))
+    ((_, norm),) = model.at(model.samples).limits
+    star_values = {star: norm.at(star).value(np.zeros(norm.slope.shape[-1])) for star in map(tuple, stars.tolist())}
+    low, high = min(star_values.values()), max(star_values.values())
+    assert low < 0.9 * high
+    model, _ = model_of(engines.problem(tmp_path, 4, rest=rest + limit.format(0.5 * (low + high))))
+    owners = owners_of(model)
+    for aim in (min, max):
+        star = aim(star_values, key=star_values.__getitem__)
+        solved, cut = solve_design(model, star, (), owners, 1e-4)
+        assert (solved is None) == (aim is max)
+        assert solved is not None or cut is None

@@ -11,12 +11,15 @@ import pytest
 
 from laufruhe.errors import InputError, ModelError
 from laufruhe.files.reader import load
-from laufruhe.problem.assembly import assembled
+from laufruhe.load_models.affine import AffineNorm
+from laufruhe.numerics.norms import MEAN, Grid
+from laufruhe.problem.assembly import Lot, assembled
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.tolerances.assembly import _Search
 from problem_files import FOUR, MOUNTS
 
 THREE = FOUR.replace("[1, 3, 4, 2]", "[1, 3, 2]")
@@ -125,3 +128,24 @@ def test_what_is_open_beside_is_refused(read: Read) -> None:
     text = THREE + POINT + LEAST.format("rms rocking couple") + '[assembly]\npistons = "p.csv"\n' + weight
     with pytest.raises(ModelError, match="engine that is fixed"):
         solve(read(text))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_part_of_the_search_is_left_out_that_holds_the_best(seed: int) -> None:
+    """Norms of random rows: a search that keeps the parts it should leave out misses the best of all assemblies."""
+    rng = np.random.default_rng(seed)
+    cylinders = 3
+    grid = Grid(np.full(6, 1.0 / 6.0), 6)
+    rows, slope = rng.normal(size=(6, 2)), rng.normal(size=(6, 2, 2 * cylinders))
+    terms = [(1.0, AffineNorm(MEAN, rows, 20.0 * slope, grid))]
+    lots = [Lot("piston", tuple((float(a), 0.0) for a in rng.uniform(0.9, 1.1, 4)))]
+    lots.append(Lot("rod", tuple((float(a), float(b)) for a, b in rng.uniform(0.4, 0.6, (4, 2)))))
+    search = _Search(terms, lots, cylinders, 1e-4)
+    bound = search.run()
+    every = [
+        search._value(chosen)
+        for chosen in itertools.product(*(itertools.permutations(range(4), cylinders) for _ in lots))
+    ]
+    assert search.value == pytest.approx(min(every), rel=1e-4)
+    assert bound <= min(every) * (1.0 + 1e-12)
+    assert bound >= min(every) * (1.0 - 1e-4)

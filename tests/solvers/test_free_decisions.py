@@ -12,6 +12,7 @@ import pytest
 
 import laufruhe
 from laufruhe.files.reader import load, load_tables
+from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval
@@ -21,7 +22,7 @@ from laufruhe.report.sections.decisions import tables
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import Shown, concluded, judged
-from laufruhe.solvers.cones.equal_designs import FREE, free_decisions
+from laufruhe.solvers.cones.equal_designs import FREE, _ranges, free_decisions
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import meaningful
 from problem_files import PROBLEMS
@@ -184,3 +185,16 @@ def test_conditions_that_hardly_hold_are_not_said_to() -> None:
     assert "which leaves no gap" in explained(loose)
     assert "are met to 6.7 % only" in explained(loose)
     assert "hold with a residual" in explained(result)
+
+
+def test_a_free_angle_runs_from_the_first_to_the_last_of_its_designs() -> None:
+    """Of one size, at 0.5 rad and up to 0.4 rad to either side."""
+    table = {"title": "one weight", "engine": ENGINE, "operating_points": [{"speed": "1000 rpm"}],
+             "counterweights": [{"name": "web", "x": "0 mm", "unbalance": {"between": ["0 kg m", "0.1 kg m"]},
+                                 "angle": {"between": [0, 360]}}],
+             "objective": {"minimise": "rms shaking force"}}  # fmt: skip
+    (domain,) = domains_of(load_tables(table, Path("one.toml")).decisions)
+    turns = (0.5, 0.2, 0.9)
+    told = _ranges(domain, [0.05 * np.array([math.cos(turn), math.sin(turn)]) for turn in turns])
+    assert [(one.name, one.unit) for one in told] == [("web.angle", "rad")]
+    assert (told[0].low, told[0].high) == pytest.approx((0.2, 0.9))
