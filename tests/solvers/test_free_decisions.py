@@ -23,6 +23,7 @@ from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import Shown, concluded, judged
 from laufruhe.solvers.cones.equal_designs import FREE, _ranges, free_decisions
+from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import meaningful
 from problem_files import PROBLEMS
@@ -166,7 +167,7 @@ def test_prices_within_the_accuracy_are_none() -> None:
     design = judged(problem, [0.0])
     scale = design.value / 2.0
     for slope, priced in ((1e-10, False), (5e-5, False), (1e-2, True)):
-        shown = Shown(design.value * (1.0 - 1e-4), Reach.WHOLE, 0.0, "", {}, {"web.mass": np.array([slope * scale])})
+        shown = Shown(design.value * (1.0 - 1e-4), Reach.WHOLE, 0.0, "", {}, {"web.mass": Price.both(slope * scale)})
         (told,) = concluded(design, design.evaluation, shown, {}).decisions
         assert told.at_bound
         assert told.shadow_price == (pytest.approx(slope * scale) if priced else 0.0)
