@@ -22,7 +22,12 @@ from laufruhe.solvers.values import DecisionValue, LimitValue, ObjectiveValue
 
 def _numbers(entry: Any) -> Any:
     """Where JSON has null there is no number."""
-    return {k: math.nan if v is None else v for k, v in entry.items()} if isinstance(entry, dict) else entry
+    if not isinstance(entry, dict):
+        return entry
+    # the price as an edge is tightened is told again where it is the same
+    same = entry.get("tightening_price") in (None, entry.get("shadow_price"))
+    kept = {k: v for k, v in entry.items() if not (same and k == "tightening_price")}
+    return {k: math.nan if v is None else v for k, v in kept.items()}
 
 
 def _named(entries: Any) -> Any:

@@ -110,8 +110,12 @@ def _together(
         status=Status.OPTIMAL if whole and weakest is Proof.GLOBAL else Status.FEASIBLE,
         objective=ObjectiveValue.of(problem, ranks[0].final, first.objective.initial if first.objective else math.nan),
         certificate=_certificate(first, ranks, weakest),
-        decisions=tuple(replace(d, shadow_price=math.nan if d.at_bound else 0.0) for d in last.decisions),
-        limits=tuple(replace(x, shadow_price=math.nan if x.active else 0.0) for x in last.limits[:count]),
+        decisions=tuple(
+            replace(d, shadow_price=math.nan if d.at_bound else 0.0, tightening_price=None) for d in last.decisions
+        ),
+        limits=tuple(
+            replace(x, shadow_price=math.nan if x.active else 0.0, tightening_price=None) for x in last.limits[:count]
+        ),
         initial=replace(first.initial, samples=last.final.samples),
         message=message,
         error=partial(largest_error, stages),

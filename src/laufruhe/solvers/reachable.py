@@ -255,7 +255,9 @@ def _recovered(found: Result, problem: Problem, result: Result) -> Result:
         status=Status.OPTIMAL if proof.kind is Proof.GLOBAL else Status.FEASIBLE,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, found.initial)),
         certificate=proof,
-        decisions=tuple(replace(d, shadow_price=math.nan if d.at_bound else 0.0) for d in result.decisions),
+        decisions=tuple(
+            replace(d, shadow_price=math.nan if d.at_bound else 0.0, tightening_price=None) for d in result.decisions
+        ),
         limits=limit_values(problem, result.final, {}, value),
         initial=found.initial,
         error=partial(error_of, own, result.final),
