@@ -20,7 +20,9 @@ ALIKE = 0.02
 """Share of the larger price up to which two sides are one."""
 INDEPENDENT, BALANCED = 1e-3, 1e-2
 """Least share of its length that a slope has across all others, and what may be left of all, where prices are told."""
-_SPARE = 1e-9
+_SPARE = 1e-6
+UNBOUNDED = 3
+"""Status of a linear program that has no least value."""
 ACTIVE = 1e-5
 """Share of a limit, and of the scale of a decision, by which it may be missed and be active."""
 MOST_VANISHING, _WAYS = 64, 8
@@ -188,9 +190,11 @@ def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array,
     for total in totals[len(objective) :]:
         aim = np.zeros(m + 1)
         aim[total] = 1.0
-        ends = [linprog(sign * aim, **told, bounds=rest) for sign in (1.0, -1.0)]
-        low = max(float(ends[0].fun), 0.0) if ends[0].x is not None else 0.0
-        high = -float(ends[1].fun) if ends[1].x is not None else np.inf
+        least, most = (linprog(sign * aim, **told, bounds=rest) for sign in (1.0, -1.0))
+        if least.x is None or (most.x is None and most.status != UNBOUNDED):
+            return None
+        low = max(float(least.fun), 0.0)
+        high = math.inf if most.x is None else -float(most.fun)
         found.append(Price(low, high))
     return found
 
