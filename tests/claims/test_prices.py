@@ -172,10 +172,10 @@ def test_multipliers_of_edges_that_hang_together() -> None:
     found = prices_of(objective, [Slopes.smooth(np.array([-1.0, -1.0]))], np.array([[1.0, 0.0]]))
     assert found is not None
     (limit, edge) = found
-    assert (limit.relaxed, limit.tightened) == pytest.approx((1.0, 1.0), abs=1e-6)
-    assert edge.tightened == pytest.approx(0.0, abs=1e-6)
+    assert (limit.relaxed, limit.tightened) == pytest.approx((1.0, 1.0), abs=1e-5)
+    assert edge.tightened == pytest.approx(0.0, abs=1e-5)
     # a peak of two rows: any mixture balances, so each edge may carry all or nothing
     peak = [Slopes(np.array([[1.0, 0.0], [-1.0, 0.0]]), np.zeros((0, 2)))]
     (only,) = prices_of(peak, [], np.array([[1.0, 0.0]])) or ()
-    assert (only.relaxed, only.tightened) == pytest.approx((0.0, 1.0), abs=1e-6)
+    assert (only.relaxed, only.tightened) == pytest.approx((0.0, 1.0), abs=1e-5)
     assert prices_of([Slopes.smooth(np.array([1.0, 0.0]))], [], np.array([[0.0, 1.0]])) is None
