@@ -148,7 +148,7 @@ class Reading:
 
 def read_under(
     problem: Problem, evaluation: Evaluation, value: float, bound: float, nothing: float,
-    prices: Mapping[Side, float] | None = None,
+    prices: Mapping[Side, Price] | None = None,
 ) -> Reading:  # fmt: skip
     """Return the objective of a design, read at so many angles that what bounds all of a cycle lies under it (P7).
 
@@ -189,7 +189,7 @@ def is_sampled(measure: Measure) -> bool:
     return measure.is_load and not measure.norm.is_euclidean
 
 
-def _doubt(problem: Problem, evaluation: Evaluation, prices: Mapping[Side, float] | None) -> float:
+def _doubt(problem: Problem, evaluation: Evaluation, prices: Mapping[Side, Price] | None) -> float:
     """What a value may be read too low by; without end where many angles tell that its design breaks limits (P7)."""
     many = finely(evaluation) if problem.limits else evaluation
     if many.excess(problem.limits) > FEASIBLE:
@@ -197,8 +197,8 @@ def _doubt(problem: Problem, evaluation: Evaluation, prices: Mapping[Side, float
     missing = sum(term.weight * missed(term.measure, evaluation) for term in problem.objective)
     for (limit, side), price in (prices or {}).items():
         found = many.standing(limit)
-        if found.side == side and price > 0.0:
-            missing += price * max(found.excess, 0.0) * abs(found.edge)
+        if found.side == side and price.relaxed > 0.0:
+            missing += price.relaxed * max(found.excess, 0.0) * abs(found.edge)
     return missing
 
 
