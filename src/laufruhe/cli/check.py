@@ -1,6 +1,7 @@
 """What check says of a problem: whether the design as given can be evaluated, and what is open.
 
-Nothing that decides or reports is loaded unless its JSON is asked for: an editor may call this on every save.
+Nothing that reports, and no library that solves, is loaded unless its JSON is asked for: an editor may call this on
+every save. What no method decides is said as `solve` says it.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
+from laufruhe.solvers.methods import refuse
 
 
 def checked(path: Path) -> tuple[str, Callable[[], str]]:
@@ -26,6 +28,8 @@ def checked(path: Path) -> tuple[str, Callable[[], str]]:
     objective_value(drawing, given)
     if not given.resonance:
         given.excess(drawing.limits)
+    # what solve refuses is not ok
+    refuse(problem)
     return f"ok: {problem.summary}\n", lambda: _as_given(problem)
 
 

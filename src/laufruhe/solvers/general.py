@@ -92,11 +92,16 @@ def _in_turns(program: LocalProgram, best: Array, decide: Decide) -> Array:
     return best
 
 
-def solve_star_by_star(problem: Problem, phasing: Phasing, decide: Decide) -> Result:
-    """Decide each star that fires evenly, with each set of shafts, as a problem of its own; of many, some drawn."""
+def refuse_uneven(phasing: Phasing) -> None:
+    """Refuse throws that leave the even steps where every star is decided as a problem of its own."""
     if phasing.continuous or phasing.throw_bounds is not None:
         rule = "[robust] decides cranks that fire evenly"
         raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out, or leave [robust] out")
+
+
+def solve_star_by_star(problem: Problem, phasing: Phasing, decide: Decide) -> Result:
+    """Decide each star that fires evenly, with each set of shafts, as a problem of its own; of many, some drawn."""
+    refuse_uneven(phasing)
     stars = every_star(phasing)
     if not stars:
         return no_star(problem, none_fires(phasing)[0])

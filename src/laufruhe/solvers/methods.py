@@ -45,7 +45,7 @@ from laufruhe.solvers.apart import is_apart, solve_apart
 from laufruhe.solvers.conclusion import KEPT, Shown, concluded, judged, none_within, with_limits
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import beyond_mounts
-from laufruhe.solvers.general import solve_generally, solve_star_by_star
+from laufruhe.solvers.general import refuse_uneven, solve_generally, solve_star_by_star
 from laufruhe.solvers.in_order import solve_in_order
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex
 from laufruhe.solvers.reachable import with_reachable
@@ -330,6 +330,38 @@ def _method(problem: Problem) -> Method:
     return next(method for method in METHODS if method.suits(problem))
 
 
+def refuse(problem: Problem) -> None:
+    """Refuse what no method decides, before anything is solved: `solve` and `check` say the same of a problem.
+
+    Raises
+    ------
+    ModelError
+        If nothing is minimised of what is open, or what is asked is not decided together.
+    """
+    if problem.ranks:
+        for rank in problem.ranks:
+            refuse(problem.changed(ranks=(), objective=rank.terms))
+    elif problem.assembly is not None:
+        called("laufruhe.solvers.tolerances.assembly:refuse", problem)
+    elif problem.over is not None and problem.phasing is not None:
+        refuse_uneven(problem.phasing)
+    elif problem.over is not None:
+        called("laufruhe.solvers.tolerances.robust:refuse", problem)
+    else:
+        _refuse_of_drawing(problem)
+
+
+def _refuse_of_drawing(problem: Problem) -> None:
+    kinds = kinds_of(problem)
+    if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
+        raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
+    if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
+        raise ModelError("flywheel is open, and nothing that is asked depends on it; fix it, or ask for its inertia")
+    if kinds and not problem.objective:
+        words = " and ".join(kind.name.lower() for kind in sorted(kinds))
+        raise ModelError(f"{words} is open and nothing is minimised; add [objective] or [mounts]")
+
+
 def _by_what_is_open(problem: Problem) -> Result:
     """By the first method that suits."""
     if problem.ranks:
@@ -340,8 +372,6 @@ def _by_what_is_open(problem: Problem) -> Result:
         return solve_star_by_star(problem, problem.phasing, _decided)
     if problem.over is not None:
         return _by("tolerances.robust:solve_robust", problem, _decided)
-    if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
-        raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
     kinds = kinds_of(problem)
     fixed = [limit for limit in problem.limits if not depends(limit.measure.channel, kinds, problem)]
     if fixed:
@@ -354,19 +384,15 @@ def _by_what_is_open(problem: Problem) -> Result:
             return none_within(problem, given, broken, {})
         moved = tuple(limit for limit in problem.limits if limit not in fixed)
         return with_limits(_decided(problem.changed(limits=moved)), problem.limits)
+    _refuse_of_drawing(problem)
     if kinds and asks_runs(problem) and Kind.NUMBER not in kinds:
         return _by("runs:solve_runs", problem, kinds, _decided)
-    if Kind.FLYWHEEL in kinds and not any(measure.channel.is_flywheel for measure in problem.measures):
-        raise ModelError("flywheel is open, and nothing that is asked depends on it; fix it, or ask for its inertia")
     moving = any(depends(term.measure.channel, kinds, problem) for term in problem.objective)
     if problem.objective and kinds and not moving and problem.phasing is None:
         design = judged(problem, problem.start)
         if design.excess <= KEPT:
             shown = Shown(design.value, Reach.WHOLE, 0.0, "nothing open changes what is minimised")
             return concluded(design, design.evaluation, shown, {})
-    words = " and ".join(kind.name.lower() for kind in sorted(kinds))
-    if kinds and not problem.objective:
-        raise ModelError(f"{words} is open and nothing is minimised; add [objective] or [mounts]")
     method = _method(problem)
     # what is decided apart is asked once more, each part by itself
     tell(method.name)

@@ -59,7 +59,7 @@ def solve_assembly(problem: Problem) -> Result:
     assembly = problem.assembly
     if assembly is None:
         raise ValueError("there are no parts to choose among")
-    _check(problem)
+    refuse(problem)
     started = time.perf_counter()
     tell("what every part adds")
     terms, lots = _terms(problem), assembly.lots
@@ -87,7 +87,7 @@ def solve_assembly(problem: Problem) -> Result:
     )  # fmt: skip
 
 
-def _check(problem: Problem) -> None:
+def refuse(problem: Problem) -> None:
     """Refuse what is not decided with the parts."""
     if problem.decisions or problem.phasing is not None:
         raise ModelError(

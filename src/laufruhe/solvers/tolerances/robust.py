@@ -100,7 +100,7 @@ def solve_robust(problem: Problem, solve: Solve) -> Result:
     over = problem.over
     if over is None:
         raise ValueError("nothing is asked of built engines")
-    _check(problem)
+    refuse(problem)
     started = time.perf_counter()
     with within("drawing"):
         drawing = solve(problem.changed(over=None))
@@ -149,7 +149,7 @@ def _found(problem: Problem, over: Over, start: tuple[Value, ...], drawing: Resu
     return drawn, found
 
 
-def _check(problem: Problem) -> None:
+def refuse(problem: Problem) -> None:
     """Refuse what no method decides for built engines."""
     open_kinds = {decision.kind for decision in problem.decisions} - {Kind.UNBALANCE}
     if open_kinds:
