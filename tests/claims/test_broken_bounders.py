@@ -161,6 +161,7 @@ def test_a_broken_bounder_of_leads_between_shared_chambers(monkeypatch: pytest.M
         laufruhe.solve(load_tables(told, Path("shared.toml")))
 
 
+@pytest.mark.slow
 def test_parts_are_left_out_in_one_place_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever a search says of what is enough, its bound is that of all parts: the gap grows, and no more."""
     monkeypatch.setattr(assembly._Search, "enough", property(lambda _: -math.inf))
@@ -185,6 +186,7 @@ def test_a_proof_that_contradicts_a_design_is_withheld(monkeypatch: pytest.Monke
     assert bound > value > 0.0
 
 
+@pytest.mark.slow
 def test_workers_report_what_they_met(monkeypatch: pytest.MonkeyPatch) -> None:
     """No report leaves a worker process by itself: it comes with the answer."""
     monkeypatch.delenv(STRICT)

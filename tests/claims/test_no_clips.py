@@ -70,6 +70,7 @@ def is_bound(node: ast.expr) -> bool:
     return any(part in name for name in names_of(node) for part in BOUNDS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", ROOMS)
 def test_no_bound_is_brought_to_a_value(room: str) -> None:
     found = {

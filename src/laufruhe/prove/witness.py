@@ -45,7 +45,7 @@ class Known:
     @cached_property
     def most(self) -> float:
         """No bound of a part that holds the design is over it."""
-        return self.value if self.read is None else max(self.value, self.read())
+        return self.value if self.read is None else self.read()
 
     def check(self, what: str, bound: float) -> None:
         """Report a bound that lies over the design."""
