@@ -20,6 +20,7 @@ def heated() -> Problem:
     return laufruhe.load(INPUTS / "absorber-under-a-limit-of-heat.toml")
 
 
+@pytest.mark.slow
 def test_boxes_whose_absorber_gives_off_too_much_hold_no_design(heated: Problem) -> None:
     boxes, (limit,) = TwistBoxes(heated, evaluate(heated)), heated.limits
     edges = np.linspace(boxes.coordinates.lower[0], boxes.coordinates.upper[0], 33)
