@@ -14,7 +14,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.measure import Limit, Side
 from laufruhe.problem.sets import EDGE
-from laufruhe.prove.certificate import Multipliers
+from laufruhe.prove.certificate import Bound
 
 ALIKE = 0.02
 """Share of the larger price up to which two sides are one."""
@@ -227,9 +227,10 @@ def bounds_of(decision: Decision, column: Array, slope: Array) -> dict[str, Pric
 
 
 def affine_prices(
-    problem: AffineProblem, limits: Sequence[Limit], x: Array, found: Multipliers
+    problem: AffineProblem, limits: Sequence[Limit], x: Array, bound: Bound
 ) -> tuple[dict[Side, Price], dict[str, Price]]:
     """Return prices of limits and of the bounds of sizes and angles, at an optimum of affine norms (P19)."""
+    found = bound.multipliers
     solver = found.shadow_prices(problem)
     prices = {(limit, "at most"): Price(price, price) for limit, price in zip(limits, solver, strict=True)}
     active = [k for k, (most, norm) in enumerate(problem.limits) if norm.value(x) >= most * (1.0 - ACTIVE)]
@@ -253,7 +254,11 @@ def affine_prices(
     if len(known) == len(told) and not problem.groups:
         ranges = prices_of(known[:count], known[count:], normals * problem.units)
     if ranges is None:
-        return prices, {}
+        # what the bound itself leaves over prices the edges
+        left: dict[str, Price] = {}
+        for domain in problem.domains:
+            left |= bounds_of(domain.decision, x[domain.columns], bound.gradient[domain.columns])
+        return prices, left
     for k, price in zip(active, ranges, strict=False):
         if not price.is_one:
             prices[limits[k], "at most"] = price

@@ -276,7 +276,7 @@ def _triangle(slope: Array) -> Array:
 
 def _shown(limits: Sequence[Limit], idle: Sequence[Limit], optimum: Optimum, value: float) -> Shown:
     bound = optimum.bound
-    prices, bounds = affine_prices(optimum.problem, limits, optimum.x, bound.multipliers)
+    prices, bounds = affine_prices(optimum.problem, limits, optimum.x, bound)
     unit = value if value > optimum.nothing else optimum.nothing / ROUNDING
     return Shown(
         bound=bound.value,
