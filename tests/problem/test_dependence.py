@@ -100,7 +100,8 @@ def _entries(names: Sequence[str], rounds: int) -> Iterator[tuple[str, Channel, 
     for number, name in enumerate(names):
         problem = laufruhe.load(PROBLEMS / f"{name}.toml")
         rng = np.random.default_rng(number)
-        for kind in sorted({d.kind for d in problem.decisions}):
+        # of any other number of the file nothing is claimed
+        for kind in sorted({d.kind for d in problem.decisions} - {Kind.NUMBER}):
             for _ in range(rounds):
                 try:
                     own, evaluations = _sampled(_random(problem, rng), kind, rng)
