@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from laufruhe.errors import LaufruheError
+from laufruhe.errors import BoundError, LaufruheError
 from laufruhe.fidelity.error_bounds import missed, relative
 from laufruhe.machine.firing import firing_turns, from_one, intervals_of, lap_orders
 from laufruhe.numerics.arrays import Array
@@ -26,7 +26,7 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import SOONEST, Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Certificate, Proof
+from laufruhe.prove.certificate import withheld
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import Design, decided, limit_values, values_of
 from laufruhe.solvers.result import Result, Status
@@ -35,6 +35,7 @@ from laufruhe.solvers.stars.ranking import candidates_of, ranked_star
 from laufruhe.solvers.told_limits import told_excess
 from laufruhe.solvers.tolerances.assembly_result import Place
 from laufruhe.solvers.values import ObjectiveValue, RankValue
+from laufruhe.solvers.withheld import without_proof
 
 MOST, SEED = 64, 0
 """Evaluations of a walk at most, and the seed of its random directions."""
@@ -443,64 +444,47 @@ def _withheld(problem: Problem, found: Result, witness: Visit, bound: float) -> 
     shown = own if stand.chosen else replace(stand.problem, phasing=own.phasing)
     design = Design(shown, stand.values, witness.evaluation, witness.value, witness.excess)
     decisions, details, assembly = decided(design), found.phasing, found.assembly
-    if details is not None:
-        ranking = tuple(replace(star, lower_bound=0.0, proven=False) for star in details.ranking)
-        if candidate is not None and own.phasing is not None:
-            decisions = (*phase_decisions(problem, own.phasing, candidate), *decisions)
-            if candidate != next(iter(candidates_of(own.phasing, details.ranking[:1])), None):
-                ranking = (ranked_star(own.phasing, candidate, None, witness.value, 0.0, False), *ranking)
-        trade = tuple(replace(point, lower_bound=0.0) for point in details.trade)
-        details = replace(details, ranking=ranking, trade=trade)
+    if details is not None and candidate is not None and own.phasing is not None:
+        decisions = (*phase_decisions(problem, own.phasing, candidate), *decisions)
+        if candidate != next(iter(candidates_of(own.phasing, details.ranking[:1])), None):
+            first = ranked_star(own.phasing, candidate, None, witness.value, 0.0, False)
+            details = replace(details, ranking=(first, *details.ranking))
     if assembly is not None and own.assembly is not None:
         lots = own.assembly.lots
-        parts = zip(*stand.chosen, strict=True)
+        masses = [[lot.masses[part] for part in parts] for lot, parts in zip(lots, stand.chosen, strict=True)]
+        numbers = zip(*stand.chosen, strict=True)
         places = tuple(
-            Place(
-                place.cylinder,
-                tuple(p + 1 for p in each),
-                tuple(lot.masses[p] for lot, p in zip(lots, each, strict=True)),
-            )
-            for place, each in zip(assembly.places, parts, strict=True)
+            Place(place.cylinder, tuple(part + 1 for part in parts), own_masses)
+            for place, parts, own_masses in zip(assembly.places, numbers, zip(*masses, strict=True), strict=True)
         )
         assembly = replace(assembly, places=places)
-    objective = ObjectiveValue.of(own, witness.value, objective_value(own, found.initial))
-    return replace(
+    moved = replace(
         found,
         problem=shown,
         status=Status.FEASIBLE,
-        objective=objective,
-        certificate=Certificate(Proof.NONE, 0.0, 1.0, math.inf, "a walk by exact evaluations, which proves nothing"),
+        objective=ObjectiveValue.of(own, witness.value, objective_value(own, found.initial)),
+        certificate=withheld(witness.value, math.inf, "a walk by exact evaluations, which proves nothing"),
         decisions=decisions,
         limits=limit_values(shown, witness.evaluation),
         final=witness.evaluation,
-        message=_message(found, objective, bound),
-        conflict=(),
+        message="",
         error=partial(error_of, shown, witness.evaluation),
         phasing=details,
         assembly=assembly,
-        ranks=_unproven(found, witness),
+        ranks=_reached(found, witness),
         nearest=None,
     )
+    what, least = "a walk", bound
+    if found.status is Status.INFEASIBLE:
+        what, least = "a walk; it was said that no design keeps the limits", math.inf
+    return without_proof(moved, BoundError(what, least, witness.value))
 
 
-def _message(found: Result, objective: ObjectiveValue, bound: float) -> str:
-    said = "no design exists"
-    if found.status is not Status.INFEASIBLE:
-        said = f"no design has less than {bound:.6g} {objective.unit}".rstrip()
-    value = f"{objective.value:.6g} {objective.unit}".rstrip()
-    return (
-        f"the proof is withheld: it said that {said}, and this design, found by a walk, has {value}; please report it"
-    )
-
-
-def _unproven(found: Result, witness: Visit) -> tuple[RankValue, ...]:
+def _reached(found: Result, witness: Visit) -> tuple[RankValue, ...]:
     """Several objectives in order, each of the design of the walk."""
     own = found.problem
-    shown: list[RankValue] = []
-    for rank, value in zip(own.ranks, found.ranks, strict=False):
-        final = objective_value(replace(own, objective=rank.terms), witness.evaluation)
-        least = min(value.least, final) if not shown else value.least
-        shown.append(
-            replace(value, least=least, lower_bound=0.0, gap=1.0, proof=Proof.NONE, final=final, price=math.nan)
-        )
-    return tuple(shown)
+    values = [objective_value(replace(own, objective=rank.terms), witness.evaluation) for rank in own.ranks]
+    return tuple(
+        replace(rank, least=min(rank.least, value) if k == 0 else rank.least, final=value, price=math.nan)
+        for k, (rank, value) in enumerate(zip(found.ranks, values, strict=False))
+    )
