@@ -289,8 +289,8 @@ def judge_robust(verdict: Any, table: Table, result: Any, most: int) -> None:
     vector, star = openings.read(result.final.engine, {d.name: d.value for d in result.decisions})
     value, bound = result.objective.value, result.certificate.lower_bound
     own = worst(openings, vector, star)
-    reading = 2e-5 + result.error_estimate
-    if abs(own - value) > 1.5 * reading * value:
+    reading, floor = 2e-5 + result.error_estimate, 1e-9 * result.objective.initial
+    if abs(own - value) > 1.5 * reading * value + floor:
         verdict.wrong.append(f"worst case {value:.9g} is {own:.9g}")
     best = own
     for told in designs_told(openings):
@@ -301,9 +301,9 @@ def judge_robust(verdict: Any, table: Table, result: Any, most: int) -> None:
             )  # fmt: skip
             best = min(best, float(found.fun))
             verdict.rivals += int(found.nfev)
-    if bound > best * (1.0 + reading):
+    if bound > best * (1.0 + reading) + floor:
         verdict.wrong.append(f"bound {bound:.9g}, a rival has {best:.9g}")
-    if verdict.kind == "global" and value > best * (1.0 + 1e-4 + reading):
+    if verdict.kind == "global" and value > best * (1.0 + 1e-4 + reading) + floor:
         verdict.wrong.append(f"global {value:.9g}, a rival has {best:.9g}")
 
 
