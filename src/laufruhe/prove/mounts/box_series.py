@@ -139,6 +139,12 @@ class Answer:
     rest: Array
     bends: Array
 
+    @property
+    def most(self) -> Array:
+        """What no length in a box is over, (...)."""
+        size = np.linalg.norm(self.value, axis=-1) + np.linalg.norm(self.slopes, axis=-1).sum(axis=-1)
+        return np.asarray(size + self.rest)
+
 
 def series(
     centres: Array, halves: Array, inverse: Any, sides: Sides, inside: Any, motion: Any

@@ -1,4 +1,4 @@
-"""What no mounts and unbalances of a box go under, all of them numbers from -1 to 1: linear functions (E71).
+"""What no mounts, unbalances and throws of a box go under, all numbers from -1 to 1: linear functions (E71, E72).
 
 What orders make of loads on open mounts is a series in the numbers s of the mounts (E37, E68), and affine in the
 unbalances, u = u_c + h t with t from -1 to 1:
@@ -21,7 +21,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
-from laufruhe.problem.decision import ends_of, sides_of
+from laufruhe.problem.decision import Kind, ends_of, sides_of
 from laufruhe.problem.dependence import Dependence, dependence
 from laufruhe.problem.evaluation import at_many
 from laufruhe.problem.measure import Measure
@@ -34,6 +34,7 @@ from laufruhe.prove.mounts.box_series import Answer, Expansion, Sides, balanced,
 from laufruhe.prove.mounts.mount_loops import Loop, is_looped, mount_loop
 from laufruhe.prove.mounts.mounted_loads import MountedLoads, Orders
 from laufruhe.prove.mounts.named import is_named
+from laufruhe.prove.mounts.open_throws import OpenThrows, along_arcs
 from laufruhe.prove.mounts.ranges import SLACK
 from laufruhe.prove.mounts.ratios import groups_of, is_ratio, ratio_under
 from laufruhe.prove.mounts.rest_limits import RestLimits
@@ -58,18 +59,20 @@ LIMITS = 0.3
 FORCE = Measure(channels.MOUNT_FORCE, NORMS["rms"])
 
 
-def is_boxed(problem: Problem) -> bool:
-    """Whether all that is open are unbalances and numbers of mounts that a loop knows, few of them together."""
+def is_boxed(problem: Problem, throws: OpenThrows | None = None) -> bool:
+    """Whether all that is open are unbalances, throws and numbers of mounts that a loop knows, few of them together."""
     if problem.engine.block is None or problem.known_rows or not problem.decisions:
         return False
     affine = all(decision.is_affine for decision in problem.decisions)
     known = is_looped(problem) if problem.mount_decisions else affine
     count = len(problem.mount_decisions) + sum(d.set.width for d in problem.unbalances)
-    return known and count <= MOST_NUMBERS and any(_is_bounded(term.measure, problem) for term in problem.objective)
+    count, turns = count + (len(throws.open) if throws else 0), throws is not None
+    return known and count <= MOST_NUMBERS and any(_is_bounded(t.measure, problem, turns) for t in problem.objective)
 
 
 def load_bound(
-    problem: Problem, value: float, room: float, told: float = 0.0, known: Known | None = None
+    problem: Problem, value: float, room: float, told: float = 0.0, known: Known | None = None,
+    throws: OpenThrows | None = None,
 ) -> Divided:  # fmt: skip
     """Divide the bounds until no design is more than `room` better than `value`, or as often as is worth it.
 
@@ -78,11 +81,13 @@ def load_bound(
     told
         What no design goes under; boxes that have not come to it after a share of them are not worth the others.
     known
-        A design by its numbers of the mounts and the columns of its unbalances.
+        A design by its numbers of the mounts, the columns of its unbalances, and its open throws.
+    throws
+        That are open too.
     """
-    if not is_boxed(problem) or not 0.0 < value < math.inf:
+    if not is_boxed(problem, throws) or not 0.0 < value < math.inf:
         return Divided(0.0, 0)
-    boxes = LoadBoxes(problem, LEFT_OUT * room)
+    boxes = LoadBoxes(problem, LEFT_OUT * room, throws)
     most = boxes.most_boxes
     if not most or not boxes.is_sampled_fully:
         return Divided(0.0, 0)
@@ -98,9 +103,10 @@ def _is_affine(measure: Measure, problem: Problem) -> bool:
     return not measure.channel.is_number and found <= {Dependence.NONE, Dependence.AFFINE}
 
 
-def _is_bounded(measure: Measure, problem: Problem) -> bool:
-    own = is_ratio(measure) or measure.on_mounts
-    return is_named(measure, problem) and (own or _is_affine(measure, problem))
+def _is_bounded(measure: Measure, problem: Problem, turns: bool = False) -> bool:
+    own = (is_ratio(measure) and not turns) or measure.on_mounts
+    stays = not turns or dependence(measure.channel, Kind.STAR, problem) is Dependence.NONE
+    return is_named(measure, problem) and (own or (stays and _is_affine(measure, problem)))
 
 
 class LoadBoxes:
@@ -109,27 +115,28 @@ class LoadBoxes:
     Attributes
     ----------
     lower, upper
-        Of the open numbers of the mounts, and of the columns of the unbalances.
+        Of the open numbers of the mounts, of the columns of the unbalances, and of the open throws.
 
     Parameters
     ----------
     left_out
         What small orders may take of the objective.
+    throws
+        That are open beside mounts and unbalances.
     """
 
     what = "boxes of mounts and unbalances"
 
-    def __init__(self, problem: Problem, left_out: float) -> None:
+    def __init__(self, problem: Problem, left_out: float, throws: OpenThrows | None = None) -> None:
         # as they are told
         self.problem = problem = at_many(problem)
-        self.loads = MountedLoads(problem)
+        self.loads, turns = MountedLoads(problem, throws), throws is not None
         (low, high), (least, most) = sides_of(problem.mount_decisions), ends_of(self.loads.domains)
-        self.lower, self.upper = np.concatenate([low, least]), np.concatenate([high, most])
+        first, last = throws.sides if throws else (np.zeros(0), np.zeros(0))
+        self.lower, self.upper = np.concatenate([low, least, first]), np.concatenate([high, most, last])
         self._numbers, self._orders = len(low), self.loads.orders
-        self._terms = [(term.weight, term.measure) for term in problem.objective if _is_bounded(term.measure, problem)]
-        held = [
-            limit for limit in problem.limits if _is_bounded(limit.measure, problem) and math.isfinite(limit.maximum)
-        ]
+        self._terms = [(t.weight, t.measure) for t in problem.objective if _is_bounded(t.measure, problem, turns)]
+        held = [x for x in problem.limits if _is_bounded(x.measure, problem, turns) and math.isfinite(x.maximum)]
         self._limits = [(limit.maximum * (1.0 + SLACK), limit.measure) for limit in held]
         self._ratios = any(is_ratio(measure) for _, measure in (*self._terms, *self._limits))
         self._rest = RestLimits(problem) if self._numbers else None
@@ -162,8 +169,7 @@ class LoadBoxes:
     def _most(self, measure: Measure) -> Array:
         """What every order does to all mounts that count at most, anywhere in the bounds."""
         answer = self._box(self.lower[None], self.upper[None]).answer(measure)
-        size = np.linalg.norm(answer.value[0], axis=-1) + np.linalg.norm(answer.slopes[0], axis=-1).sum(axis=-1)
-        return np.asarray(np.nan_to_num(size + answer.rest[0], nan=np.inf))
+        return np.asarray(np.nan_to_num(answer.most[0], nan=np.inf))
 
     @property
     def is_sampled_fully(self) -> bool:
@@ -283,9 +289,15 @@ class _Boxes:
         self.count = lower.shape[1] + numbers * self.columns
         centres, self._halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
         self._centres = centres[:, numbers:]
-        given = orders.loads[:, :1] + np.einsum("bq,wqi->bwi", self._centres, orders.loads[:, 1:])[:, :, None]
-        moved = self._halves[:, None, numbers:, None] * orders.loads[:, 1:]
-        self._columns: ComplexArray = np.concatenate([given, moved], axis=2)
+        self._unbalances = unbalances = orders.loads.shape[1] - 1
+        centres, halves = np.split(np.array([self._centres, self._halves[:, numbers:]]), [unbalances], axis=2)
+        given = orders.loads[:, :1] + np.einsum("bq,wqi->bwi", centres[0], orders.loads[:, 1:])[:, :, None]
+        moved = centres[1][:, None, :, None] * orders.loads[:, 1:]
+        at, reach = halves[0], halves[1]
+        turned = orders.turned * np.exp(1j * orders.numbers[:, None] * at[:, None])[..., None]
+        middle, slope, rest = (each[..., None] for each in along_arcs(orders.numbers[:, None] * reach[:, None]))
+        given = given + (middle * turned).sum(axis=2, keepdims=True)
+        self._columns: ComplexArray = np.concatenate([given, moved, 1j * slope * turned, rest * turned], axis=2)
         sides = list(zip(lower[:, :numbers], upper[:, :numbers], strict=True))
         self._running = self._expanded([mount_loop(loads.problem, orders.omegas, *box) for box in sides])
         still = np.zeros_like(orders.omegas)
@@ -321,12 +333,14 @@ class _Boxes:
         return self._known[key]
 
     def _together(self, found: list[Answer]) -> Answer:
-        given, moved = found[0], found[1:]
+        given, moved, beyond = found[0], found[1 : 1 + self.columns], found[1 + self.columns :]
         value, (boxes, lines, rows) = given.value, given.value.shape
         own = np.array([each.value for each in moved]).reshape(self.columns, boxes, lines, rows)
         crossed = [each.slopes for each in moved]
         slopes = np.concatenate([given.slopes, np.moveaxis(own, 0, 2), *crossed], axis=2)
         rests = np.array([each.rest for each in moved]).reshape(self.columns, boxes, lines)
+        for k, each in enumerate(beyond):
+            rests[self._unbalances + k] += each.most
         bends = given.bends + sum((each.bends for each in moved), np.zeros_like(given.bends))
         # halves of unbalances do not make a series end
         bends = np.concatenate([bends, np.moveaxis(np.where(np.isfinite(rests), rests, 0.0), 0, -1)], axis=2)
@@ -341,13 +355,14 @@ class _Boxes:
 
     def affine_under(self, measure: Measure, near: Array, averaged: bool) -> Under:
         """Return the tangent of a norm that mounts do not change."""
-        norm, own = self._loads.still(measure, averaged), slice(self._numbers, self._numbers + self.columns)
+        norm, own = self._loads.still(measure, averaged), slice(self._numbers, self._numbers + self._unbalances)
+        centres, halves = self._centres[:, : self._unbalances], self._halves[:, own]
         value, slopes = np.zeros(len(near)), np.zeros((len(near), self.count))
         for k, t in enumerate(near[:, own]):
-            z = norm.dual_feasible(norm.subgradient(self._centres[k] + self._halves[k, self._numbers :] * t))
+            z = norm.dual_feasible(norm.subgradient(centres[k] + halves[k] * t))
             by = norm.pulled(z)
-            value[k] = float(np.vdot(z, norm.constant)) + by @ self._centres[k]
-            slopes[k, own] = by * self._halves[k, self._numbers :]
+            value[k] = float(np.vdot(z, norm.constant)) + by @ centres[k]
+            slopes[k, own] = by * halves[k]
         return Under(value, slopes, np.zeros(len(near)), np.abs(slopes[:, : self.lower.shape[1]]))
 
 

@@ -24,6 +24,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Multipliers, minorant
 from laufruhe.prove.mounts.box_response import NOTHING, is_travel
 from laufruhe.prove.mounts.mount_loops import mount_loop
+from laufruhe.prove.mounts.open_throws import OpenThrows
 from laufruhe.prove.mounts.ranges import SLACK
 
 COARSER = 8
@@ -43,6 +44,8 @@ class Orders:
     loads
         r of all but the unbalances, and of one unit of every column, in coordinates in which the mass is one, shape
         (w, 1 + columns, 6).
+    turned
+        r of what turns with every open throw at an angle of zero, shape (w, throws, 6).
     """
 
     points: Indices
@@ -50,11 +53,12 @@ class Orders:
     numbers: Array
     omegas: Array
     loads: ComplexArray
+    turned: ComplexArray
 
     def kept(self, which: Indices) -> Orders:
         """Return some of them."""
         own = self.points[which], self.places[which], self.numbers[which], self.omegas[which]
-        return Orders(*own, self.loads[which])
+        return Orders(*own, self.loads[which], self.turned[which])
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,13 +86,19 @@ class MountedLoads:
     ----------
     samples
         Of the rows, over their period.
+
+    Parameters
+    ----------
+    throws
+        That are open too; loads beside the unbalances are then without what turns with these.
     """
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
+    def __init__(self, problem: Problem, throws: OpenThrows | None = None) -> None:
+        self.problem, self._throws = problem, throws
         known = off_resonance(problem)
         self._model = AffineModel(known, keep_all=True)
-        if self._model.full_samples * self._model.base != problem.fidelity.samples * known.engine.cycle.base_order:
+        told = problem.fidelity.samples * known.engine.cycle.base_order
+        if throws or self._model.full_samples * self._model.base != told:
             # rows stand where the exact model has them
             self._model = AffineModel(known, keep_all=True, whole_cycle=True)
         self.samples, self.domains = self._model.full_samples, self._model.domains
@@ -117,15 +127,20 @@ class MountedLoads:
         """Those that are loaded."""
         moved = moved_wrench(NUMBERS, mounting_in(self.problem.engine).block.centre_of_gravity).T @ self.root.T
         found: list[tuple[int, int, float, float, ComplexArray]] = []
+        at = self._throws.given[self._throws.open] if self._throws else np.zeros(0)
         for p, (point, (bare, slopes)) in enumerate(zip(self.problem.points, self._model.wrenches(), strict=True)):
-            base, series = in_one_base([bare, *slopes])
+            base, series = in_one_base([bare, *slopes, *(self._throws.wrenches(p) if self._throws else ())])
             loads = series @ moved
+            waves = np.exp(1j * float(base) * np.outer(at, np.arange(loads.shape[1])))
+            loads[0] -= np.einsum("pk,pki->ki", waves, loads[1 + len(slopes) :])
             size = np.abs(loads).max(axis=(0, 2), initial=0.0)
             for k in np.flatnonzero(size > NOTHING * size.max(initial=0.0)):
                 number, place = float(k) * float(base), int(k) * base / self._model.base
                 found.append((p, round(place), number, number * point.speed, loads[:, k]))
         points, places, numbers, omegas, each = zip(*found, strict=True)
-        return Orders(np.array(points), np.array(places), np.array(numbers), np.array(omegas), np.array(each))
+        own = np.array(points), np.array(places), np.array(numbers), np.array(omegas)
+        loads, turned = np.split(np.array(each), [len(each[0]) - len(at)], axis=1)
+        return Orders(*own, loads, turned)
 
     def at(self, mounts: Array) -> AffineProblem:
         """Norms of the unbalances on these mounts; infinite rows on a resonance that nothing damps."""

@@ -90,7 +90,7 @@ def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tup
         Result of the star itself, to start from first.
     """
     first = place_of(problem, even) if even is not None and even.decisions else None
-    # throws that move are in no bound
+    # throws that move are in no bound of mounts alone
     result, turns = _solved(problem, None, moves, first, True)
     return result, moves.candidate(turns)
 

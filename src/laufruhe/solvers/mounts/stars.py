@@ -5,7 +5,8 @@ program, whose dual rows bound every other star (S14): that ranks them. The best
 ranking then have mounts and balance decided together, each as a problem of its own. The
 ranking chooses what is looked at and proves nothing of the joint problem, so the result
 says how many stars were left out. Where firing may be uneven, throws then leave the
-best of these stars, as further variables of the same smooth program (E36).
+best of these stars, as further variables of the same smooth program (E36). Throws between
+bounds have a bound with mounts and balance: boxes of all of them (E72).
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from dataclasses import replace
 from functools import partial
 from typing import TypeAlias
 
+import numpy as np
+
 from laufruhe.errors import ModelError, counted
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.budget import limited, passed
@@ -23,14 +26,18 @@ from laufruhe.numerics.norms import RMS
 from laufruhe.numerics.progress import tell, within
 from laufruhe.numerics.workers import executor_for, in_turn, working_on
 from laufruhe.problem import channels
+from laufruhe.problem.decision import domains_of, vector_of
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.certificate import Certificate, Proof, Reach, certified
-from laufruhe.solvers.conclusion import contradiction, result_under
-from laufruhe.solvers.mounts.bounds import bounded_under
+from laufruhe.prove.best_first import Divided
+from laufruhe.prove.certificate import Certificate, Proof, Reach, certified, room_of
+from laufruhe.prove.mounts.load_boxes import load_bound
+from laufruhe.prove.mounts.open_throws import throws_at
+from laufruhe.solvers.conclusion import contradiction, judged, known_of, result_under, values_of
+from laufruhe.solvers.mounts.bounds import bounded_under, mount_numbers
 from laufruhe.solvers.mounts.nonlinear import solve_mounts, solve_moved
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
@@ -41,6 +48,7 @@ from laufruhe.solvers.stars.design import StarDesign
 from laufruhe.solvers.stars.families import Family, families_of
 from laufruhe.solvers.stars.ranking import RankedStar, ranked_star, ranking_result, told_orders
 from laufruhe.solvers.throws.starts import firing_intervals, none_fires, starts_of
+from laufruhe.solvers.told_limits import over_read
 
 MOST_SEARCHED = 3
 # starts of a star beside those that are good for the first of the ranking
@@ -238,10 +246,32 @@ def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs
     details = ranking_result(phasing, best.candidate, ranking, designs, len(found), _method(found, designs))
     nothing = nothing_of(problem, best.result.final.engine)
     bound = _bound(found) if whole else 0.0
+    divided = _divided(problem, phasing, best)
+    bound = max(bound, divided.bound)
     result, doubt = result_under(best.result, bound, nothing)
     best = replace(best, result=result)
-    certificate = _certificate(best, bound, doubt, details.method, nothing, problem.tolerance)
+    method = details.method
+    if divided.boxes:
+        method += f"; {divided.boxes} box{'es' if divided.boxes > 1 else ''} of throws, mounts and unbalances"
+    certificate = _certificate(best, bound, doubt, method, nothing, problem.tolerance)
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
+
+
+def _divided(problem: Problem, phasing: Phasing, best: StarDesign) -> Divided:
+    """Return what boxes of throws between bounds, mounts and unbalances prove, in whatever order these fire (E72)."""
+    if not best.is_met or not problem.search.proves or passed():
+        return Divided(0.0, 0)
+    throws = throws_at(problem, phasing, best.candidate)
+    if throws is None:
+        return Divided(0.0, 0)
+    realised = throws.waves.problem
+    design = judged(realised, values_of(realised, best.result))
+    own = [value for value, decision in zip(design.values, realised.decisions, strict=True) if decision.is_affine]
+    columns = vector_of(domains_of(realised.unbalances), own)
+    known = known_of(design, np.concatenate([mount_numbers(design), columns, throws.given[throws.open]]))
+    value = design.value - over_read(realised, design.evaluation)
+    room = room_of(value, problem.tolerance, nothing_of(problem, design.evaluation.engine))
+    return load_bound(realised, value, room, 0.0, known, throws)
 
 
 def _bound(found: list[StarDesign]) -> float:
