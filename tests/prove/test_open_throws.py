@@ -34,6 +34,7 @@ CASES = (
     problem_of("rms mount force", [[0, 0], [150, 200]]),
     problem_of("mean mount force", THREE, counterweights=RIDING),
     problem_of("maximum mount travel", THREE, counterweights=RIDING),
+    problem_of("peak to peak mount force", [[0, 0], [150, 200]]),
     problem_of("rms mount force", [[-40, 10], [150, 200]], engine={"layout": "vee", "bank_angle": 70, "cylinders": 4}),
 )
 

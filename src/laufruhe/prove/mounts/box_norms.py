@@ -114,7 +114,11 @@ def norm_under(problem: Problem, quantity: Measure, answer: Answer, lines: Sampl
         best = np.argmax([each.value for each in found], axis=0)
         pick = np.arange(len(best))
         parts = (np.array([getattr(each, part) for each in found]) for part in ("value", "slopes", "rest", "bends"))
-        return Under(*(part[best, pick] for part in parts))
+        largest = Under(*(part[best, pick] for part in parts))
+        # the largest length is not under the root mean square, nor the largest distance of two rows under that of all
+        # distances, whose mean square is twice that of the rows about their mean
+        squares = 2.0 * weights * (lines.orders > 0.0) if quantity.norm.is_diameter else weights
+        return largest if quantity.norm.is_largest_mean else largest.or_else(root_under(answer, squares))
     value, slopes = (
         sum(share[p] * getattr(each, part) for p, each in zip(points, found, strict=True))
         for part in ("value", "slopes")
@@ -149,15 +153,22 @@ def _sampled(quantity: Measure, answer: Answer, lines: Sampled, p: int) -> Under
     rows = np.matmul(waves, np.concatenate([parts.real, parts.imag], axis=1)).reshape(boxes, samples, 3, mounts)
     if quantity.norm.sums_lengths or quantity.norm.is_largest_mean:
         size = _lengths(rows)
-        along = rows / np.where(size > 0.0, size, 1.0)[:, :, None]
-        share = 1.0 / (samples * mounts)
-        duals = np.matmul(waves.T, along.reshape(boxes, samples, -1)).reshape(boxes, 2, len(own), 3, mounts)
-        there = slopes.reshape(*slopes.shape[:3], mounts, 3)
-        slope = np.einsum("bkxm,bknmx->bn", duals[:, 0], there.real)
-        slope = share * (slope + np.einsum("bkxm,bknmx->bn", duals[:, 1], there.imag))
         # a mean of lengths is not over their root mean square
         squares = np.where(lines.orders[own] > 0.0, 0.5, 1.0) / mounts
-        return Under(share * size.sum(axis=(1, 2)), slope, root_of(squares, rest), root_of(squares, bends))
+        rests = root_of(squares, rest), root_of(squares, bends)
+        there, share = slopes.reshape(*slopes.shape[:3], mounts, 3), 1.0 / (samples * mounts)
+
+        def paired(length: Array) -> Under:
+            dual = rows / np.where(length > 0.0, length, 1.0)[:, :, None]
+            duals = np.matmul(waves.T, dual.reshape(boxes, samples, -1)).reshape(boxes, 2, len(own), 3, mounts)
+            slope = np.einsum("bkxm,bknmx->bn", duals[:, 0], there.real)
+            slope = share * (slope + np.einsum("bkxm,bknmx->bn", duals[:, 1], there.imag))
+            value = share * (size**2 / np.where(length > 0.0, length, 1.0)).sum(axis=(1, 2))
+            return Under(value, slope, *rests)
+
+        # where squares are least the rows have no slope, and their directions may have one
+        most = np.broadcast_to(size.max(axis=(1, 2), keepdims=True), size.shape)
+        return paired(size).or_else(paired(most))
     # a signal reaches as far as its longest row; of a peak to peak as its row farthest from another
     box, first, times = np.arange(boxes), np.zeros((boxes, 3, mounts)), 1.0
     if quantity.norm.is_diameter:
