@@ -161,6 +161,12 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
     return found
 
 
+def kinds_of(problem: Problem) -> frozenset[Kind]:
+    """Return the kinds of what is open."""
+    stars = [Kind.STAR] if problem.phasing is not None else []
+    return frozenset([*stars, *(decision.kind for decision in problem.decisions)])
+
+
 def depends(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool:
     """Return whether a channel may change with decisions of these kinds; what is UNKNOWN may."""
     return any(dependence(channel, kind, problem) is not Dependence.NONE for kind in kinds)

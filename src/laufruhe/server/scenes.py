@@ -13,7 +13,7 @@ from laufruhe.errors import ModelError
 from laufruhe.files.asked import EDGES
 from laufruhe.live import live_model
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.dependence import depends
+from laufruhe.problem.dependence import depends, kinds_of
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -22,7 +22,6 @@ from laufruhe.problem.tolerance import NO_TOLERANCES
 from laufruhe.server.claims import Simpler, listed
 from laufruhe.server.drawing import drawing_of
 from laufruhe.server.front import partners
-from laufruhe.solvers import kinds_of
 from laufruhe.solvers.conclusion import decision_values, limit_values
 from laufruhe.solvers.following import Followed, Follower, can_follow
 from laufruhe.solvers.result import Result, Status

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from laufruhe.solvers.conclusion import state
-    from laufruhe.solvers.methods import METHODS, kinds_of, solve
+    from laufruhe.solvers.methods import METHODS, solve
     from laufruhe.solvers.result import Result, Status
 else:
-    _HOMES = dict.fromkeys(("METHODS", "kinds_of", "solve"), "methods")
+    _HOMES = dict.fromkeys(("METHODS", "solve"), "methods")
     _HOMES |= {"state": "conclusion", "Result": "result", "Status": "result"}
 
     def __getattr__(name: str) -> object:
@@ -23,4 +23,4 @@ else:
         return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
 
 
-__all__ = ["METHODS", "Result", "Status", "kinds_of", "solve", "state"]
+__all__ = ["METHODS", "Result", "Status", "solve", "state"]

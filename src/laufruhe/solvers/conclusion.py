@@ -13,8 +13,8 @@ from laufruhe.errors import ModelError
 from laufruhe.fidelity.error_bounds import missed, relative
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.witness import is_over
-from laufruhe.problem.decision import Decision
-from laufruhe.problem.dependence import depends
+from laufruhe.problem.decision import Decision, Kind
+from laufruhe.problem.dependence import depends, kinds_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, finely, objective_value
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -363,9 +363,11 @@ def _limit_value(
 def _is_moved(problem: Problem, evaluation: Evaluation, limit: Limit) -> bool:
     """Tell if anything open moves what is limited, near a design."""
     channel = limit.measure.channel
-    if not depends(channel, {decision.kind for decision in problem.decisions}, problem):
+    if not depends(channel, kinds_of(problem), problem):
         return False
-    if channel.is_load or channel.is_mass:
+    # no step of a decision moves a throw
+    turns = problem.phasing is not None and depends(channel, {Kind.STAR}, problem)
+    if channel.is_load or channel.is_mass or turns:
         return True
     given, there = evaluation.values(limit.measure), replace(problem, engine=evaluation.engine)
     steps = (

@@ -34,7 +34,7 @@ from laufruhe.problem.channels import (
     Channel,
 )
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.dependence import Dependence, dependence, depends
+from laufruhe.problem.dependence import Dependence, dependence, depends, kinds_of
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -152,12 +152,6 @@ class Method:
 def _by(home: str, *asked: Any) -> Result:
     found: Result = called(f"laufruhe.solvers.{home}", *asked)
     return found
-
-
-def kinds_of(problem: Problem) -> frozenset[Kind]:
-    """Kinds of what is open."""
-    stars = [Kind.STAR] if problem.phasing is not None else []
-    return frozenset([*stars, *(decision.kind for decision in problem.decisions)])
 
 
 def solve_each_apart(problem: Problem) -> Result:

@@ -16,12 +16,13 @@ from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.machine import Engine
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import kinds_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem, Search
 from laufruhe.solvers.conclusion import given_design, values_of
 from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.methods import kinds_of, solve
+from laufruhe.solvers.methods import solve
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import candidates_of
 

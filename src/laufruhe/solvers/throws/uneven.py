@@ -195,13 +195,13 @@ def local_optimum(
         if not FEASIBLE < least < _MOST_TIGHTENED:
             break
         margin += _TIGHTENED * least
-    return None if best is None else _priced(best, prices or {})
+    return None if best is None else _priced(best, phasing, prices or {})
 
 
-def _priced(design: StarDesign, prices: Mapping[Side, Price]) -> StarDesign:
-    """With what its limits cost while throws may move, less than with fixed ones; unknown where not told."""
+def _priced(design: StarDesign, phasing: Phasing, prices: Mapping[Side, Price]) -> StarDesign:
+    """Return it with what its limits cost while throws may move, less than with fixed ones; unknown where not told."""
     result = design.result
-    limits = limit_values(result.problem, result.final, prices, design.value)
+    limits = limit_values(replace(result.problem, phasing=phasing), result.final, prices, design.value)
     return replace(design, result=replace(result, limits=limits))
 
 
