@@ -84,7 +84,7 @@ def test_a_page_is_served_until_it_is_interrupted(tmp_path: Path) -> None:
     told = answer(address, "/begin", {})
     assert (told["title"], told["file"]) == ("Tractor four-cylinder with a Lanchester balancer", "mine.toml")
     found = answer(address, "/follow", {"edits": [["set", "constraints.1.max", "0.5 kg"]]})
-    assert found["stage"] == "following"
+    assert found["claim"]["kind"] == "estimate"
     running.send_signal(signal.SIGINT)
     began = time.monotonic()
     _, err = running.communicate(timeout=LONG)

@@ -30,6 +30,7 @@ title = "t"
 name = "three"
 kind = "economics"
 title = "Three"
+alternating = false
 mass_limits = ["0 kg", "1 kg"]
 [[study.parts.cases]]
 name = "three cylinders"

@@ -143,7 +143,8 @@ class Spectrum:
         value is that of the whole series at its angle.
         """
         if self.corners is not None:
-            angles = self.period * np.arange(samples) / samples
+            # a step on a jump is taken behind it, whatever its rounding: parts of a sum have to agree on the side
+            angles = self.period * np.arange(samples) / samples + 0.5 * SAME_ANGLE
             return self.smooth.sample(samples) + self.corners.values(angles, self.period)
         if len(self.coefficients) <= FEW:
             # a product with few waves takes less time than a transform
