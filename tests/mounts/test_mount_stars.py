@@ -147,6 +147,25 @@ def test_throws_that_may_move_are_never_worse_and_keep_their_intervals(decided, 
 
 
 @pytest.mark.slow
+def test_a_limit_that_only_throws_move_has_the_price_of_a_looser_one(tmp_path):
+    """No mount moves the torque of the crank: its limit would cost nothing but for the throws."""
+    engine = ENGINE.partition("[[counterweights]]")[0]
+
+    def found(most):
+        force = f'{FORCE}[[constraints]]\nlimit = "rms crank torque"\nmax = "{most} N m"\n'
+        force = changed(force, ("mean mount force", "rms mount force"))
+        return solve(problem_of(tmp_path, engine, changed(BLOCK, HEAVY_END), MOUNTS, force, UNBOUNDED, UNEVEN))
+
+    low, middle, high = (found(most) for most in (41.83, 41.84, 41.85))
+    (limit,) = (one for one in middle.limits if one.name == "rms crank torque")
+    slope = (low.objective.value - high.objective.value) / 0.02
+    assert slope > 0.05
+    assert limit.active
+    assert limit.price.relaxed == pytest.approx(slope, rel=0.02)
+    assert limit.price.is_one
+
+
+@pytest.mark.slow
 def test_no_star_near_an_uneven_one_is_better(uneven):
     phasing = uneven.problem.phasing
     candidate = _candidate(uneven)

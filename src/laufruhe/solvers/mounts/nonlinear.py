@@ -233,6 +233,9 @@ def _result(
         method=_method(search.optima, max(design.value, nothing), proven, divided),
         prices=found.joint.prices(optimum) if optimum is not None else {},
     )
+    if search.moves is not None:
+        # its throws are open, and move what is limited
+        design = replace(design, problem=replace(design.problem, phasing=search.moves.phasing))
     return concluded(design, initial, shown, timing)
 
 
