@@ -85,6 +85,10 @@ class Mapped(Composed):
         """Samples of its source, mapped."""
         return self.linear(self.source.sample(samples))
 
+    def sample_behind(self, samples: int) -> NDArray[np.float64]:
+        """Return samples of its source behind jumps, mapped."""
+        return self.linear(self.source.sample_behind(samples))
+
 
 _NEVER = object()
 
@@ -123,6 +127,12 @@ class Held(Spectrum):
     def sample(self, samples: int) -> NDArray[np.float64]:
         """Values at equal steps, which nobody may change."""
         return self.once("sample", samples, lambda _: _fixed(np.ascontiguousarray(super(Held, self).sample(samples))))
+
+    def sample_behind(self, samples: int) -> NDArray[np.float64]:
+        """Return values at equal steps behind jumps, which nobody may change."""
+        return self.once(
+            "behind", samples, lambda _: _fixed(np.ascontiguousarray(super(Held, self).sample_behind(samples)))
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Held, (self.base, self.coefficients, self.corners)
@@ -190,3 +200,7 @@ class Summed(Composed):
     def sample(self, samples: int) -> NDArray[np.float64]:
         """Values of both."""
         return self.held.sample(samples) + self.own.sample(samples)
+
+    def sample_behind(self, samples: int) -> NDArray[np.float64]:
+        """Return values of both behind jumps."""
+        return self.held.sample_behind(samples) + self.own.sample_behind(samples)

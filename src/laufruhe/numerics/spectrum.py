@@ -18,6 +18,8 @@ from laufruhe.numerics.turns import Turn, phasors
 
 MOST_CORNERS = 24
 """Of one function that are taken out in closed form."""
+BEHIND = 1e-3 * SAME_ANGLE
+"""Angle behind a step at which corners are read [rad]: far over its rounding, and far under what a signal feels."""
 T = TypeVar("T")
 FEW = 9
 """Coefficients of a signal that is sampled wave by wave."""
@@ -143,8 +145,7 @@ class Spectrum:
         value is that of the whole series at its angle.
         """
         if self.corners is not None:
-            # a step on a jump is taken behind it, whatever its rounding: parts of a sum have to agree on the side
-            angles = self.period * np.arange(samples) / samples + 0.5 * SAME_ANGLE
+            angles = self.period * np.arange(samples) / samples
             return self.smooth.sample(samples) + self.corners.values(angles, self.period)
         if len(self.coefficients) <= FEW:
             # a product with few waves takes less time than a transform
@@ -165,6 +166,16 @@ class Spectrum:
         first = samples // 2 + 1
         half = folded[:first] + folded[-np.arange(first) % samples].conj()
         return _transformed(np.asarray(0.5 * half, dtype=complex), samples)
+
+    def sample_behind(self, samples: int) -> NDArray[np.float64]:
+        """Return values at equal steps, those of a step on a jump behind it, shape (samples, ...).
+
+        Parts of a sum have to agree on the side, which rounding decides otherwise.
+        """
+        if self.corners is None:
+            return self.sample(samples)
+        angles = self.period * np.arange(samples) / samples + BEHIND
+        return self.smooth.sample(samples) + self.corners.values(angles, self.period)
 
     def values(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at any crank angles [rad], shape (len(angles), ...)."""

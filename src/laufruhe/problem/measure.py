@@ -283,7 +283,7 @@ def load_rows(
         if measure.norm.refinement == 1:
             values = counted.series.sample(samples)
         else:
-            values = np.concatenate([counted.sample(samples), counted.values(own)])
+            values = np.concatenate([counted.sample_behind(samples), counted.values(own)])
         # an engine may lack what is named: then it has no load there
         if not values.shape[1]:
             continue

@@ -178,6 +178,9 @@ function constantOf(signal, point, bends, at, steps, between) {
   return out;
 }
 
+/** A step on a jump is read behind it, by this angle [rad]. */
+const BEHIND = 1e-13;
+
 /** Adds the pieces of polynomials between the corners (L5a). */
 function addCorners(out, signal, bends, at, steps, between) {
   const period = TURN / signal.base, [powers, corners] = bends.pieces.shape, stride = signal.count * signal.parts;
@@ -186,7 +189,7 @@ function addCorners(out, signal, bends, at, steps, between) {
     const factors = Array.from({ length: powers }, (_, power) => piece(power, k));
     if (factors.every((factor) => factor === 0)) continue;
     for (let i = 0; i < out.length; i++) {
-      const angle = i < steps ? (period * i) / steps : between[i - steps];
+      const angle = i < steps ? (period * i) / steps + BEHIND : between[i - steps];
       const turns = (angle - bends.corners[k]) / period, x = turns - Math.floor(turns) - 0.5;
       let value = 0;
       for (let power = powers - 1; power >= 0; power--) value = value * x + factors[power];
