@@ -43,6 +43,12 @@ BETTER = {
 """A design of the file within its limits, of 37.21 N."""
 
 
+@pytest.fixture(autouse=True)
+def whole_walks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No step is left out for want of time, however slow the machine is."""
+    monkeypatch.setattr(walk, "SECONDS", 20.0)
+
+
 def told_as_optimum(result: Result) -> Result:
     """The design as given, told as the proven optimum."""
     value = result.objective.initial if result.objective is not None else math.nan
