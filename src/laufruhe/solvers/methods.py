@@ -45,7 +45,6 @@ from laufruhe.solvers.apart import is_apart, solve_apart
 from laufruhe.solvers.conclusion import KEPT, Shown, concluded, judged, none_within, with_limits
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import beyond_mounts
-from laufruhe.solvers.general import refuse_uneven, solve_generally, solve_star_by_star
 from laufruhe.solvers.in_order import solve_in_order
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex
 from laufruhe.solvers.reachable import with_reachable
@@ -161,7 +160,7 @@ def solve_each_apart(problem: Problem) -> Result:
 
 def solve_all_numbers(problem: Problem) -> Result:
     """Numbers that nothing better decides, by local programs; what loads are affine in by cones within them."""
-    return solve_generally(problem, _decided, lambda part: _method(part).home == _CONES)
+    return _by("general:solve_generally", problem, _decided, lambda part: _method(part).home == _CONES)
 
 
 def _is_rigid(problem: Problem) -> bool:
@@ -338,7 +337,7 @@ def refuse(problem: Problem) -> None:
     elif problem.assembly is not None:
         called("laufruhe.solvers.tolerances.assembly:refuse", problem)
     elif problem.over is not None and problem.phasing is not None:
-        refuse_uneven(problem.phasing)
+        called("laufruhe.solvers.general:refuse_uneven", problem.phasing)
     elif problem.over is not None:
         called("laufruhe.solvers.tolerances.robust:refuse", problem)
     else:
@@ -363,7 +362,7 @@ def _by_what_is_open(problem: Problem) -> Result:
     if problem.assembly is not None:
         return _by("tolerances.assembly:solve_assembly", problem)
     if problem.over is not None and problem.phasing is not None:
-        return solve_star_by_star(problem, problem.phasing, _decided)
+        return _by("general:solve_star_by_star", problem, problem.phasing, _decided)
     if problem.over is not None:
         return _by("tolerances.robust:solve_robust", problem, _decided)
     kinds = kinds_of(problem)

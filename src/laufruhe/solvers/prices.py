@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,18 +14,18 @@ from laufruhe.problem.decision import Decision
 from laufruhe.problem.measure import Limit, Side
 from laufruhe.problem.sets import EDGE
 from laufruhe.prove.certificate import Bound
+from laufruhe.solvers.cones.program import told
+from laufruhe.solvers.cones.rows import Rows
 
 ALIKE = 0.02
 """Share of the larger price up to which two sides are one."""
 INDEPENDENT, BALANCED = 1e-3, 1e-2
 """Least share of its length that a slope has across all others, and what may be left of all, where prices are told."""
 _SPARE = 1e-6
-UNBOUNDED = 3
-"""Status of a linear program that has no least value."""
 ACTIVE = 1e-5
 """Share of a limit, and of the scale of a decision, by which it may be missed and be active."""
-MOST_VANISHING, _WAYS = 64, 8
-"""Rows that vanish of a number that is told, and ways in which a segment stands for a disc."""
+MOST_VANISHING, _WAYS, MOST_CORNERS = 64, 8, 256
+"""Rows that vanish of a number that is told, ways in which a segment stands for a disc, and corners of a hull."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +97,18 @@ class Slopes:
         return Slopes(self.hull * units, self.segments * units)
 
     @property
+    def corners(self) -> Array:
+        """The hull, or of a large one its outermost rows in as many directions as corners are told.
+
+        All rows of a signal of constant length are as long as the longest; a circle of 256 corners lacks 1e-4.
+        """
+        step = -(-len(self.hull) // MOST_CORNERS)
+        if step == 1:
+            return self.hull
+        ways = (self.hull - self.hull.mean(axis=0))[::step]
+        return np.asarray(self.hull[np.unique(np.argmax(self.hull @ ways.T, axis=0))])
+
+    @property
     def rows(self) -> Array:
         """One slope, the others less it, and the segments."""
         return np.concatenate([self.hull[:1], self.hull[1:] - self.hull[:1], self.segments])
@@ -150,53 +161,61 @@ def _unique(rows: Array, slope: Array) -> list[float] | None:
 
 
 def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array, size: float) -> list[Price] | None:
-    """Least and largest multiplier of each by linear programs over all that balance."""
-    from scipy.optimize import linprog
-
-    shares = [*objective, *limits, *(Slopes.smooth(edge) for edge in edges)]
-    columns, totals, below = list[Array](), list[list[int]](), list[tuple[int, int]]()
-    bounds: list[tuple[float | None, float | None]] = []
-    for k, own in enumerate(shares):
-        totals.append(list(range(len(columns), len(columns) + len(own.hull))))
-        columns += list(own.hull)
-        bounds += [(0.0, None)] * len(own.hull)
-        for segment in own.segments:
-            below.append((k, len(columns)))
-            columns.append(segment)
-            bounds.append((-1.0, 1.0) if k < len(objective) else (None, None))
-    matrix = np.array(columns).T / size
-    n, m = matrix.shape
-    # the last variable is what is left of the balance
-    balance = np.block([[matrix, -np.ones((n, 1))], [-matrix, -np.ones((n, 1))]])
-    whole = np.zeros((len(objective), m + 1))
-    for k in range(len(objective)):
-        whole[k, totals[k]] = 1.0
-    within = []
-    for k, at in below:
-        if k >= len(objective):
-            for sign in (1.0, -1.0):
-                row = np.zeros(m + 1)
-                row[at], row[totals[k]] = sign, -1.0
-                within.append(row)
-    above = np.array([*balance, *within])
-    told: dict[str, Any] = {
-        "A_ub": above, "b_ub": np.zeros(len(above)), "A_eq": whole, "b_eq": np.ones(len(objective)), "method": "highs"
-    }  # fmt: skip
-    first = linprog(np.eye(m + 1)[m], **told, bounds=[*bounds, (0.0, None)])
-    if first.x is None or first.x[m] > BALANCED:
+    """Return least and largest multiplier of each by linear programs over all that balance."""
+    shares, count = [*objective, *limits, *(Slopes.smooth(edge) for edge in edges)], len(objective)
+    scales = [size] * count + [float(np.abs(own.rows).max()) or 1.0 for own in shares[count:]]
+    parts = [part / scale for own, scale in zip(shares, scales, strict=True) for part in (own.corners, own.segments)]
+    columns = np.concatenate(parts)
+    numbers = np.split(np.arange(len(columns)), np.cumsum([len(part) for part in parts])[:-1])
+    # the last number is what is left of the balance
+    each, last = np.eye(len(columns) + 1), len(columns)
+    totals = np.array([each[own].sum(axis=0) for own in numbers[::2]])
+    pulled = np.concatenate([columns.T, np.zeros((columns.shape[1], 1))], axis=1)
+    above = [pulled - each[last], -pulled - each[last], *(-each[own] for own in numbers[::2]), -each[last:]]
+    most = [np.zeros(sum(map(len, above)))]
+    for k, own in enumerate(numbers[1::2]):
+        # a segment of the objective is added once, that of a limit as often as its price
+        held = totals[k] if k >= count else np.zeros(last + 1)
+        above += [each[own] - held, -each[own] - held]
+        most.append(np.full(2 * len(own), 1.0 if k < count else 0.0))
+    program = _Program(np.concatenate([totals[:count], *above]), np.concatenate([np.ones(count), *most]), count)
+    left = program.least(each[last])
+    if not left <= BALANCED:
         return None
-    rest = [*bounds, (0.0, 1.01 * float(first.x[m]) + _SPARE)]
+    program = program.under(each[last], 1.01 * left + _SPARE)
     found = []
-    for total in totals[len(objective) :]:
-        aim = np.zeros(m + 1)
-        aim[total] = 1.0
-        least, most = (linprog(sign * aim, **told, bounds=rest) for sign in (1.0, -1.0))
-        if least.x is None or (most.x is None and most.status != UNBOUNDED):
+    for total, scale in zip(totals[count:], scales[count:], strict=True):
+        low, high = program.least(total), -program.least(-total)
+        if math.isnan(low) or math.isnan(high):
             return None
-        low = max(float(least.fun), 0.0)
-        high = math.inf if most.x is None else -float(most.fun)
-        found.append(Price(low, high))
+        found.append(Price(max(low, 0.0) * size / scale, high * size / scale))
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Program:
+    """Linear program of numbers: the first rows are equal to the right, the others no more."""
+
+    rows: Array
+    right: Array
+    equal: int
+
+    def under(self, row: Array, most: float) -> _Program:
+        """Return it with one more row."""
+        return replace(self, rows=np.vstack([self.rows, row]), right=np.append(self.right, most))
+
+    def least(self, cost: Array) -> float:
+        """Return the least cost; less than any number where it has none, and no number where the solver stopped."""
+        import clarabel
+
+        rows = Rows(len(cost))
+        rows.add(np.arange(len(self.right))[:, None], np.arange(len(cost)), self.rows, self.right)
+        rows.cones += [clarabel.ZeroConeT(self.equal), clarabel.NonnegativeConeT(len(self.right) - self.equal)]
+        answer = told(rows, cost, {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10})
+        status = str(answer.status)
+        if "DualInfeasible" in status:
+            return -math.inf
+        return float(cost @ np.asarray(answer.x)) if "Solved" in status else math.nan
 
 
 def edges_at(decision: Decision, column: Array) -> dict[str, Array]:
@@ -232,7 +251,11 @@ def affine_prices(
     """Return prices of limits and of the bounds of sizes and angles, at an optimum of affine norms (P19)."""
     found = bound.multipliers
     solver = found.shadow_prices(problem)
-    prices = {(limit, "at most"): Price(price, price) for limit, price in zip(limits, solver, strict=True)}
+    prices = {
+        # no design is under a limit of nothing
+        (limit, "at most"): Price(price, math.inf if most == 0.0 else price)
+        for limit, price, (most, _) in zip(limits, solver, problem.limits, strict=True)
+    }  # fmt: skip
     active = [k for k, (most, norm) in enumerate(problem.limits) if norm.value(x) >= most * (1.0 - ACTIVE)]
     edges = {
         name: (domain.columns, normal)
@@ -248,10 +271,10 @@ def affine_prices(
     normals = np.zeros((len(edges), problem.size))
     for row, (columns, normal) in zip(normals, edges.values(), strict=True):
         row[columns] = normal
-    told = [None if own is None else own.scaled(problem.units) for own in (*objective, *held)]
-    known = [own for own in told if own is not None]
+    scaled = [None if own is None else own.scaled(problem.units) for own in (*objective, *held)]
+    known = [own for own in scaled if own is not None]
     count, ranges = len(objective), None
-    if len(known) == len(told) and not problem.groups:
+    if len(known) == len(scaled) and not problem.groups:
         ranges = prices_of(known[:count], known[count:], normals * problem.units)
     if ranges is None:
         # what the bound itself leaves over prices the edges
@@ -261,7 +284,8 @@ def affine_prices(
         return prices, left
     for k, price in zip(active, ranges, strict=False):
         if not price.is_one:
-            prices[limits[k], "at most"] = price
+            side = limits[k], "at most"
+            prices[side] = Price(price.relaxed, math.inf if problem.limits[k][0] == 0.0 else price.tightened)
     return prices, dict(zip(edges, ranges[len(active) :], strict=True))
 
 

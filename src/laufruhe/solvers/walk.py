@@ -39,7 +39,7 @@ from laufruhe.solvers.withheld import without_proof
 
 MOST, SEED = 64, 0
 """Evaluations of a walk at most, and the seed of its random directions."""
-SHARE, SECONDS = 0.03, 0.02
+SHARE, SECONDS = 0.03, 0.01
 """Processor time of a walk: so many seconds, or a share of the time of the solve where that is more."""
 STEP, SHORTER, LONGER = 0.1, 0.2, 2.0
 """First step as a share of the bounds, and its factors after a failure and after a success."""

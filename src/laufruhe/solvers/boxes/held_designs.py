@@ -66,6 +66,8 @@ class HeldDesigns(Search[S, HeldDesign]):
     """What a search over boxes knows of its designs, and of the limits that were not met in boxes."""
 
     conflict: tuple[str, ...] = ()
+    angles = 0
+    """Angles of a cycle at which programs begin, at least."""
 
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
@@ -127,16 +129,23 @@ class HeldDesigns(Search[S, HeldDesign]):
         return concluded(design, replace(initial, samples=design.evaluation.samples), shown, timing)
 
 
-def best_with(problem: Problem, held: Problem, where: dict[str, Value]) -> HeldDesign:
-    """The best design with some decisions given, by the problem of its unbalances.
+def best_with(problem: Problem, held: Problem, where: dict[str, Value], angles: int = 0) -> HeldDesign:
+    """Find the best design with some decisions given, by the problem of its unbalances.
 
     Where none is allowed the unbalances stay as given, and the design breaks its limits.
+
+    Parameters
+    ----------
+    where
+        Values of the decisions that are given.
+    angles
+        Of a cycle, at which the program begins at least.
     """
     result, samples = None, None
     values: dict[str, Value] = {decision.name: decision.start for decision in problem.decisions} | where
     if held.decisions:
         held = replace(held, tolerance=SHARE * problem.tolerance)
-        result = solve_unbalances(held)
+        result = solve_unbalances(held, angles=angles)
         if result.status is not Status.INFEASIBLE:
             found = unbalances_of(held, result)
             values |= dict(zip((decision.name for decision in held.decisions), found, strict=True))

@@ -107,7 +107,9 @@ class _Search(HeldDesigns[_Box]):
             return EMPTY
         lower, upper = self._shrunk(lower, upper)
         relaxed = self.relaxation.program(lower, upper)
-        result = solve_unbalances(relaxed)
+        result = solve_unbalances(relaxed, angles=self.angles)
+        # what all places needed, their parts need too
+        self.angles = self.angles or result.final.samples // 2
         if result.status is Status.INFEASIBLE:
             self.told(result.conflict)
             return EMPTY
@@ -119,8 +121,9 @@ class _Search(HeldDesigns[_Box]):
         return _Box(lower, upper, max(bound, floor), middle if allowed is None else allowed, np.maximum(spread, moved))
 
     def around(self, found: HeldDesign) -> _Box | Over:
-        """Return a thin box around the places of a design, and its bound."""
-        return self.box(*thin(self.place(found), *self.bounds))
+        """Return a thin box around the places of a design, and its bound at the first angles that are tried."""
+        few = _Search(self.problem.changed(search=replace(self.problem.search, proves=False)))
+        return few.box(*thin(self.place(found), *self.bounds))
 
     def _spans(self, lower: Array, upper: Array) -> Iterator[tuple[Limit, float, float]]:
         """Least and largest of each distance that is limited, with its places in a box."""
@@ -224,4 +227,5 @@ class _Search(HeldDesigns[_Box]):
         """The best design with its places given."""
         where: dict[str, Value] = {p.name: float(x) for p, x in zip(self.places, places, strict=True)}
         engine = self.problem.design(list(where.values()), self.places)
-        return best_with(self.problem, replace(self.problem, engine=engine, decisions=self.problem.unbalances), where)
+        held = replace(self.problem, engine=engine, decisions=self.problem.unbalances)
+        return best_with(self.problem, held, where, self.angles)

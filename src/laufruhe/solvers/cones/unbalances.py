@@ -51,8 +51,13 @@ def solve_sharply(problem: Problem) -> Result:
     return solve_unbalances(problem, problem.sharply)
 
 
-def solve_unbalances(problem: Problem, sharply: bool = False) -> Result:
+def solve_unbalances(problem: Problem, sharply: bool = False, angles: int = 0) -> Result:
     """Global optimum of a problem whose decisions are unbalances.
+
+    Parameters
+    ----------
+    angles
+        Of a cycle, at which the first program stands at least: as many as problems like it needed.
 
     Returns
     -------
@@ -68,7 +73,8 @@ def solve_unbalances(problem: Problem, sharply: bool = False) -> Result:
     if hopeless:
         return none_within(problem, initial, hopeless, {"model": modelled - started})
     model = model.with_limits([limit for limit in problem.limits if limit not in idle])
-    optimum, samples = _refine(model.problem, model, nothing_of(problem))
+    begin = int(angles * float(problem.engine.cycle.base_order / model.base))
+    optimum, samples = _refine(model.problem, model, nothing_of(problem), begin)
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
     if optimum is None:
@@ -90,14 +96,19 @@ def solve_unbalances(problem: Problem, sharply: bool = False) -> Result:
     return concluded(design, initial, _shown(model.problem.load_limits, idle, optimum, design.value), timing)
 
 
-def _refine(problem: Problem, model: AffineModel, nothing: float) -> tuple[Optimum | None, int]:
+def _refine(problem: Problem, model: AffineModel, nothing: float, begin: int) -> tuple[Optimum | None, int]:
     """Solve at more and more angles until the bound on a grid twice as fine meets the design (P6).
+
+    Parameters
+    ----------
+    begin
+        Angles of a period of the loads at which it begins, at least.
 
     Returns
     -------
     The optimum, None where the limits cannot be met, and the angles that told.
     """
-    samples, best = _first_samples(model), None
+    samples, best = max(_first_samples(model), begin), None
     # a mean that is all but as little as can be is kept at no few angles
     most = max(MOST_DOUBLINGS, math.ceil(math.log2(2 * FINE / samples)))
     for k in in_time(range(most + 1)):
