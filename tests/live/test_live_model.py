@@ -18,11 +18,13 @@ from laufruhe.live import live_model, page_assets
 from laufruhe.live.parts import Reference
 from laufruhe.live.saving import written
 from laufruhe.live.signals import NORMS_OF_PAGE
+from laufruhe.numerics.spectrum import BEHIND
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.result_report import result_document
 from laufruhe.report.web_page import as_html
 from laufruhe.solvers import state
+from laufruhe.solvers.conclusion import KEPT
 from live.pages import EVERY_NORM, designs, evaluated, model_of, problem_of, with_unknown_norm
 from problem_files import PROBLEMS
 
@@ -195,3 +197,11 @@ def test_a_served_page_takes_its_reference_from_its_server(every):
     result = ready.solved("tractor-four-lanchester")
     assert live_model(result.problem, result).reference.is_proven
     assert live_model(result.problem, result, is_served=True).reference is None
+
+
+@pytest.mark.parametrize(("script", "name", "value"), [("signals.js", "BEHIND", BEHIND), ("judge.js", "KEPT", KEPT)])
+def test_scripts_have_the_constants_of_the_package(script: str, name: str, value: float) -> None:
+    """A page reads jumps on the same side, and keeps limits as near, as the package."""
+    text = (files("laufruhe.live") / "page" / script).read_text()
+    (found,) = re.findall(rf"\b{name} = ([^,;]+)[,;]", text)
+    assert float(found) == pytest.approx(value, rel=1e-12)

@@ -26,11 +26,11 @@ from tractor import GAS, SPEED, TWO_ORDER, engine, problem, shaft_rotor, web
 
 # travel needs elastic mounts, and is tested with them
 ALL_LOADS = tuple(c for c in channels.CHANNELS.values() if isinstance(c, LoadChannel))
-LOADS = tuple(c for c in ALL_LOADS if c is not channels.MOUNT_TRAVEL and not c.is_inside)
+LOADS = tuple(c for c in ALL_LOADS if c is not channels.MOUNT_TRAVEL and c.of_wrench)
 # twist needs discs and shafts, and is tested with them
 OF_CRANKCASE = (channels.Needs.NOTHING, channels.Needs.BEARINGS)
 INSIDE = tuple(
-    Measure(c, NORMS[norm]) for c in ALL_LOADS if c.needs in OF_CRANKCASE and c.is_inside for norm in c.norms
+    Measure(c, NORMS[norm]) for c in ALL_LOADS if c.needs in OF_CRANKCASE and not c.of_wrench for norm in c.norms
 )
 MASSES = tuple(c for c in channels.CHANNELS.values() if isinstance(c, MassChannel))
 HALF_ORDERS = Measure(channels.ROLL_MOMENT, NORMS["rms"], orders=(0.5, 1.5), points=("slow",))

@@ -12,7 +12,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from laufruhe.numerics.composed import Mapped, Summed, held
-from laufruhe.numerics.spectrum import Spectrum, bent_spectrum, common_base, orders_equal, spectrum_of
+from laufruhe.numerics.spectrum import BEHIND, Spectrum, bent_spectrum, common_base, orders_equal, spectrum_of
 
 BASES = st.sampled_from([Fraction(1), Fraction(1, 2), Fraction(2), Fraction(3, 2), Fraction(1, 3)])
 NUMBERS = st.complex_numbers(max_magnitude=10.0, allow_subnormal=False)
@@ -225,8 +225,8 @@ def test_orders_are_told_apart_to_a_thousandth() -> None:
 def test_a_step_on_a_jump_is_read_behind_it_wherever_the_signal_was_moved(steps: int) -> None:
     """Parts of a sum that jump at one angle have to agree on the side."""
     saw = bent_spectrum(lambda angles: np.mod(angles, math.tau), 720, Fraction(1), np.array([0.0]))
-    assert saw.sample_behind(steps)[0] == pytest.approx(0.0, abs=1e-6)
+    assert saw.sample(steps, BEHIND)[0] == pytest.approx(0.0, abs=1e-6)
     for moved in range(1, steps, max(steps // 48, 1)):
         share = Fraction(moved, steps)
         there = saw.later(share, math.tau * float(share))
-        assert there.sample_behind(steps) == pytest.approx(np.roll(saw.sample_behind(steps), moved), abs=1e-6)
+        assert there.sample(steps, BEHIND) == pytest.approx(np.roll(saw.sample(steps, BEHIND), moved), abs=1e-6)

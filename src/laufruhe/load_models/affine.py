@@ -199,7 +199,7 @@ class AffineModel:
 
     def _shortest_base(self, bare: Evaluation, orders: Sequence[Fraction]) -> Fraction:
         """Of the wrench, and of loads inside the crankcase: a bearing feels each cylinder beside it alone."""
-        inside = {measure.load for measure in self.problem.measures if measure.is_load and measure.load.is_inside}
+        inside = {measure.load for measure in self.problem.measures if measure.is_inside}
         signals = [*(loads.wrench for loads in bare.loads), *(s for channel in inside for s in bare.signals(channel))]
         return common_base([signal.repeats(tuple(orders)) for signal in signals] or [Fraction(1)])
 

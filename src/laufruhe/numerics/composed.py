@@ -81,13 +81,9 @@ class Mapped(Composed):
         """Its source over another period."""
         return Mapped(self.source.over(base), self.linear)
 
-    def sample(self, samples: int) -> NDArray[np.float64]:
-        """Samples of its source, mapped."""
-        return self.linear(self.source.sample(samples))
-
-    def sample_behind(self, samples: int) -> NDArray[np.float64]:
-        """Return samples of its source behind jumps, mapped."""
-        return self.linear(self.source.sample_behind(samples))
+    def sample(self, samples: int, behind: float = 0.0) -> NDArray[np.float64]:
+        """Return samples of its source, mapped."""
+        return self.linear(self.source.sample(samples, behind))
 
 
 _NEVER = object()
@@ -124,15 +120,12 @@ class Held(Spectrum):
             return self
         return self.once("over", base, lambda _: held(super(Held, self).over(base)))
 
-    def sample(self, samples: int) -> NDArray[np.float64]:
-        """Values at equal steps, which nobody may change."""
-        return self.once("sample", samples, lambda _: _fixed(np.ascontiguousarray(super(Held, self).sample(samples))))
-
-    def sample_behind(self, samples: int) -> NDArray[np.float64]:
-        """Return values at equal steps behind jumps, which nobody may change."""
+    def sample(self, samples: int, behind: float = 0.0) -> NDArray[np.float64]:
+        """Return values at equal steps, which nobody may change."""
         return self.once(
-            "behind", samples, lambda _: _fixed(np.ascontiguousarray(super(Held, self).sample_behind(samples)))
-        )
+            f"sample {behind}", samples,
+            lambda _: _fixed(np.ascontiguousarray(super(Held, self).sample(samples, behind))),
+        )  # fmt: skip
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Held, (self.base, self.coefficients, self.corners)
@@ -197,10 +190,6 @@ class Summed(Composed):
         """Both over another period."""
         return Summed(self.held.over(base), self.own.over(base))
 
-    def sample(self, samples: int) -> NDArray[np.float64]:
-        """Values of both."""
-        return self.held.sample(samples) + self.own.sample(samples)
-
-    def sample_behind(self, samples: int) -> NDArray[np.float64]:
-        """Return values of both behind jumps."""
-        return self.held.sample_behind(samples) + self.own.sample_behind(samples)
+    def sample(self, samples: int, behind: float = 0.0) -> NDArray[np.float64]:
+        """Return values of both."""
+        return self.held.sample(samples, behind) + self.own.sample(samples, behind)

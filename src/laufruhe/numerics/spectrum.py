@@ -138,14 +138,20 @@ class Spectrum:
         """The signal less its mean over the period (M7); its corners stay, for they have none."""
         return self.holding(np.concatenate([np.zeros_like(self.coefficients[:1]), self.coefficients[1:]]))
 
-    def sample(self, samples: int) -> NDArray[np.float64]:
-        """Values at `samples` equal steps over one period 2 pi / b, shape (samples, ...).
+    def sample(self, samples: int, behind: float = 0.0) -> NDArray[np.float64]:
+        """Return values at `samples` equal steps over one period 2 pi / b, shape (samples, ...).
 
         Orders above half the number of samples are folded, not dropped: every
         value is that of the whole series at its angle.
+
+        Parameters
+        ----------
+        behind
+            Angle behind a step at which corners are read [rad]. Parts of a sum have to agree on the side of a jump,
+            which rounding decides otherwise: `BEHIND` is enough.
         """
         if self.corners is not None:
-            angles = self.period * np.arange(samples) / samples
+            angles = self.period * np.arange(samples) / samples + behind
             return self.smooth.sample(samples) + self.corners.values(angles, self.period)
         if len(self.coefficients) <= FEW:
             # a product with few waves takes less time than a transform
@@ -166,16 +172,6 @@ class Spectrum:
         first = samples // 2 + 1
         half = folded[:first] + folded[-np.arange(first) % samples].conj()
         return _transformed(np.asarray(0.5 * half, dtype=complex), samples)
-
-    def sample_behind(self, samples: int) -> NDArray[np.float64]:
-        """Return values at equal steps, those of a step on a jump behind it, shape (samples, ...).
-
-        Parts of a sum have to agree on the side, which rounding decides otherwise.
-        """
-        if self.corners is None:
-            return self.sample(samples)
-        angles = self.period * np.arange(samples) / samples + BEHIND
-        return self.smooth.sample(samples) + self.corners.values(angles, self.period)
 
     def values(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values at any crank angles [rad], shape (len(angles), ...)."""

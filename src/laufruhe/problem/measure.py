@@ -19,7 +19,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Role, Rotor, SliderCrank
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
-from laufruhe.numerics.spectrum import Spectrum, orders_equal
+from laufruhe.numerics.spectrum import BEHIND, Spectrum, orders_equal
 from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel, is_at_mounts
 from laufruhe.problem.loads import PointLoads
 
@@ -118,8 +118,8 @@ class Measure:
 
     @property
     def is_inside(self) -> bool:
-        """Whether it is of a load inside the crankcase."""
-        return self.is_load and self.load.is_inside
+        """Tell if it is of a load inside the crankcase."""
+        return self.is_load and not self.load.of_wrench
 
     @property
     def feels_gas(self) -> bool:
@@ -283,7 +283,7 @@ def load_rows(
         if measure.norm.refinement == 1:
             values = counted.series.sample(samples)
         else:
-            values = np.concatenate([counted.sample_behind(samples), counted.values(own)])
+            values = np.concatenate([counted.sample(samples, BEHIND), counted.values(own)])
         # an engine may lack what is named: then it has no load there
         if not values.shape[1]:
             continue

@@ -228,14 +228,9 @@ class LoadChannel(Channel):
         self.factors_of(engine, point)
 
     @property
-    def is_inside(self) -> bool:
-        """Whether more than the wrench on the block is in it, as inside the crankcase."""
-        return not self.of_wrench
-
-    @property
     def feels_order(self) -> bool:
-        """Whether it changes with the firing order of one star, where gas acts: cylinders are felt one by one."""
-        return self.is_inside
+        """Tell if it changes with the firing order of one star, where gas acts: cylinders are felt one by one."""
+        return not self.of_wrench
 
     @property
     def norms(self) -> Collection[str]:
