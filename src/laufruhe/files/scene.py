@@ -197,6 +197,8 @@ def _stray(key: str, channel: Channel) -> str:
         return "is for masses and places of shafts only"
     if channel.is_mass:
         return "means nothing for a mass"
+    if channel.is_load and key == "alternating":
+        return f"means nothing for {channel}: its steady part rubs as well"
     if channel.is_load and key in PLACES:
         return f"means nothing for a {channel}, which has no {PLACES[key]} of its own"
     if channel.is_load and key == "direction_weights":

@@ -62,5 +62,6 @@ def _with_loads(problem: Problem, alternating: bool) -> Problem:
     terms = []
     for term in problem.objective:
         whole = replace(term.measure, alternating=False)
-        terms.append(replace(term, measure=replace(whole, alternating=alternating and whole.counts_mean)))
+        may = whole.counts_mean and "alternating" in whole.channel.keys
+        terms.append(replace(term, measure=replace(whole, alternating=alternating and may)))
     return replace(problem, objective=tuple(terms))

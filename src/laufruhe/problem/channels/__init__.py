@@ -174,8 +174,9 @@ CRANK_PIN_PRESSURE = inside("crank-pin pressure", "Pa", AT_EACH_CRANK_PIN, pin_f
 SIDE_FORCE = inside("side force", "N", IN_EACH_CYLINDER, _side_forces)
 ROD_FORCE = inside("rod force", "N", IN_EACH_CYLINDER, piston_pin_forces)
 FRICTION_POWER = replace(
-    inside("friction power", "W", OF_EACH_BEARING, main_bearing_forces, drag_factors), adds_up=True
-)
+    inside("friction power", "W", OF_EACH_BEARING, main_bearing_forces, drag_factors),
+    adds_up=True, keys=("operating_points", "orders", "bearings"),
+)  # fmt: skip
 
 COUNTERWEIGHT_MASS = MassChannel("counterweight mass", "kg", roles=(Role.COUNTERWEIGHT,))
 BALANCER_MASS = MassChannel("balancer mass", "kg", roles=(Role.BALANCER,))
