@@ -1,4 +1,4 @@
-"""What check says of a problem: whether the design as given can be evaluated, and what is open.
+"""Say of a problem whether the design as given can be evaluated, and what is open.
 
 Nothing that reports, and no library that solves, is loaded unless its JSON is asked for: an editor may call this on
 every save. What no method decides is said as `solve` says it.

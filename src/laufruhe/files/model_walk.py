@@ -1,4 +1,4 @@
-"""What the models of a file say of a place in it: the tables on the way there, and how a number is read."""
+"""Places of a file by its models: the tables on the way there, and how a number is read."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ def _name(tables: Mapping[str, Any], place: Place) -> str:
 
 
 def _is_fixed_there(tables: Mapping[str, Any], place: Place) -> bool:
-    """Whether a number that its key may leave open is none of the decisions that the key knows of in this engine."""
+    """Tell if a number that its key may leave open is none of the decisions that the key knows of in this engine."""
     engine = tables.get("engine", {})
     if place[0] == "engine" and place[1] in (*_TOGETHER, "throws"):
         kind = LAYOUTS.get(engine.get("layout"))
@@ -117,7 +117,7 @@ def _is_fixed_there(tables: Mapping[str, Any], place: Place) -> bool:
 
 
 def _is_given(throws: Any) -> bool:
-    """Whether every throw is a number, or the crank a named one."""
+    """Tell if every throw is a number, or the crank a named one."""
     if isinstance(throws, list):
         return not any(isinstance(throw, dict) for throw in throws)
     return throws is not None and throws != "open"

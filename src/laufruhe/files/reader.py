@@ -185,7 +185,7 @@ class _Origin:
 
 @dataclass(frozen=True)
 class _Rebuilt:
-    """What a file describes with other numbers at some of its places.
+    """A file with other numbers at some of its places.
 
     Attributes
     ----------

@@ -76,7 +76,7 @@ class StarProblem:
 
     @property
     def is_bilinear(self) -> bool:
-        """Whether unbalances are counted from a throw that is decided, so that no cone program has all stars."""
+        """Tell if unbalances are counted from a throw that is decided, so that no cone program has all stars."""
         return any(norm.turns is not None for _, norm in (*self.terms, *self.limits))
 
     @property

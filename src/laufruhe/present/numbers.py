@@ -86,19 +86,19 @@ def price_of(price: float, unit: str, of: str, counts: bool = False) -> str:
 
 
 class Priced(Protocol):
-    """What has a price on either side."""
+    """A limit or a bound with a price on either side."""
 
     @property
     def unit(self) -> str:
-        """Of what is priced."""
+        """Unit of the number that is priced."""
 
     @property
     def shadow_price(self) -> float:
-        """As it is relaxed."""
+        """Price as the edge is relaxed."""
 
     @property
     def tightening_price(self) -> float | None:
-        """As it is tightened, where that is another."""
+        """Price as the edge is tightened, where that is another."""
 
 
 def prices_of(priced: Priced, unit: str, counts: bool = False) -> str:

@@ -39,7 +39,7 @@ _HALVINGS = 10
 
 @dataclass(frozen=True)
 class Critical:
-    """Where an order meets a natural frequency.
+    """A speed at which an order meets a natural frequency.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ class Barred:
 
 @dataclass(frozen=True, eq=False)
 class TorsionFacts:
-    """Of one design.
+    """Torsional numbers of one design.
 
     Attributes
     ----------

@@ -190,7 +190,7 @@ def shares_gas(problem: Problem) -> bool:
 
 
 def _moves_carried(problem: Problem) -> bool:
-    """Whether a bearing carries a shaft whose rotors have open places."""
+    """Tell if a bearing carries a shaft whose rotors have open places."""
     carried = {bearing.shaft.name for bearing in problem.engine.bearings}
     moved = {drive.rotor for decision in problem.decisions for drive in decision.place_drives}
     return any(rotor.shaft.name in carried for rotor in problem.engine.rotors if rotor.name in moved)

@@ -113,7 +113,7 @@ class Measure:
 
     @property
     def on_mounts(self) -> bool:
-        """Whether it is of the force or the travel of each mount."""
+        """Tell if it is of the force or the travel of each mount."""
         return is_at_mounts(self.channel)
 
     @property
@@ -165,7 +165,7 @@ class Measure:
 
     @property
     def counts_mean(self) -> bool:
-        """Whether the mean of a load over the cycle is a part of it."""
+        """Tell if the mean of a load over the cycle is a part of it."""
         return self.is_load and bool(self.counted([0.0])[0])
 
     @property

@@ -31,7 +31,7 @@ class StaticPart:
 
     @property
     def is_floor(self) -> bool:
-        """Whether the whole is as small as its static part lets it be: a norm is never under that of the mean."""
+        """Tell if the whole is as small as its static part lets it be: a norm is never under that of the mean."""
         return self.whole <= self.static * (1.0 + NEGLIGIBLE)
 
 

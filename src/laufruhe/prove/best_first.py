@@ -200,7 +200,7 @@ def widest(lower: Array, upper: Array, whole: Array) -> int:
 
 @dataclass(frozen=True, eq=False)
 class Divided:
-    """What dividing the bounds of open numbers has proven.
+    """Outcome of dividing the bounds of open numbers.
 
     Attributes
     ----------
@@ -299,7 +299,7 @@ class Around:
 
     @property
     def what(self) -> str:
-        """What is bounded, in words."""
+        """Name of the parts that are bounded."""
         return self.search.what
 
     def around(self, place: Array) -> tuple[Array, Array]:

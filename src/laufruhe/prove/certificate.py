@@ -129,7 +129,7 @@ class Certificate:
 
     @property
     def is_useful(self) -> bool:
-        """Whether the bound is more than a hundredth of the value, or closes."""
+        """Tell if the bound is more than a hundredth of the value, or closes."""
         return self.kind is Proof.GLOBAL or self.gap < USELESS
 
 

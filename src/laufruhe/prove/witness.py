@@ -58,7 +58,7 @@ class Bounder(Protocol[D, P]):
 
     @property
     def what(self) -> str:
-        """What is bounded, in words."""
+        """Name of the parts that are bounded."""
 
     def around(self, design: D) -> P | None:
         """Return a thin part that holds a design; None where it cannot be stated."""

@@ -1,4 +1,4 @@
-"""What a page claims of the numbers that it shows. Every claim is made here; the page's scripts only render it."""
+"""Claims of a page on the numbers that it shows. Every claim is made here; the page's scripts only render it."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Simpler:
-    """What makes the problem that follows a slider simpler than the whole one; false where nothing does.
+    """Reasons that make the problem behind a slider simpler than the whole one; false where nothing does.
 
     Attributes
     ----------

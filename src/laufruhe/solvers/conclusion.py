@@ -74,7 +74,7 @@ class Design:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What a method shows of the best design that it proposes.
+    """Proof of a method for the best design that it proposes.
 
     Attributes
     ----------
@@ -190,7 +190,7 @@ def is_sampled(measure: Measure) -> bool:
 
 
 def _doubt(problem: Problem, evaluation: Evaluation, prices: Mapping[Side, Price] | None) -> float:
-    """What a value may be read too low by; without end where many angles tell that its design breaks limits (P7)."""
+    """Return by how much a value may be read too low; infinite where its design breaks limits at many angles (P7)."""
     many = finely(evaluation) if problem.limits else evaluation
     if many.excess(problem.limits) > FEASIBLE:
         return math.inf
@@ -417,7 +417,7 @@ def values_of(problem: Problem, result: Result) -> list[Value]:
 def decided(
     design: Design, bounds: Mapping[str, Price] | None = None, unfelt: float = 0.0
 ) -> tuple[DecisionValue, ...]:
-    """What is open of a design, with prices of the bounds that it stands at, where that share is felt."""
+    """Return the decisions of a design, with prices of the bounds that it stands at, where that share is felt."""
     least = unfelt * design.value
     return tuple(
         _priced(entry, (bounds or {}).get(entry.name), least)

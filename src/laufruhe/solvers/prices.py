@@ -1,4 +1,4 @@
-"""What limits and bounds are worth on either side: least and largest multipliers that hold an optimum (P5, P19)."""
+"""Prices of limits and bounds on either side: least and largest multipliers that hold an optimum (P5, P19)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ MOST_VANISHING, _WAYS, MOST_CORNERS = 64, 8, 256
 
 @dataclass(frozen=True)
 class Price:
-    """What an edge is worth [unit of the objective per unit of the edge].
+    """Price of an edge [unit of the objective per unit of the edge].
 
     Attributes
     ----------
@@ -317,5 +317,5 @@ def _disc(slope: Array) -> list[Array]:
 
 
 def angle_name(decision: Decision) -> str:
-    """What the angle of an open size is called."""
+    """Name the angle of an open size."""
     return decision.name.rsplit(".", 1)[0] + ".angle"

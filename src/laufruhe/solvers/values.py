@@ -41,7 +41,7 @@ class DecisionValue:
 
     @property
     def price(self) -> Price:
-        """Of both sides of the bound."""
+        """Price of the bound on both sides."""
         other = self.tightening_price
         return Price(self.shadow_price, self.shadow_price if other is None else other)
 
@@ -133,7 +133,7 @@ class LimitValue:
 
     @property
     def price(self) -> Price:
-        """Of both sides."""
+        """Price on both sides."""
         other = self.tightening_price
         return Price(self.shadow_price, self.shadow_price if other is None else other)
 

@@ -426,7 +426,7 @@ def _spare(drawing: Problem, lot: int, k: int, number: int) -> Move:
 
 
 def _is_shown(found: Result, witness: Visit, bound: float | None) -> bool:
-    """Whether a design keeps the limits, and lies under the bound if there is one, by more than samples may miss."""
+    """Tell if a design keeps the limits, and lies under the bound if there is one, by more than samples may miss."""
     problem, own = witness.stand.problem, witness.evaluation
     standings = ((limit, own.standing(limit)) for limit in problem.limits)
     kept = all(stands.excess + relative(missed(limit.measure, own), stands.value) <= 0.0 for limit, stands in standings)

@@ -89,7 +89,7 @@ def _making_room() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Answer:
-    """What became of a task, and how long it took on one core [s].
+    """Outcome of a task, and how long it took on one core [s].
 
     Attributes
     ----------
@@ -188,7 +188,6 @@ def _shared(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -> Ite
 
 
 def _served(piece: _Piece) -> list[Answer]:
-    """Return the answers to all tasks of a piece."""
     if Path.cwd() != piece.folder:
         piece.scenes.folder = piece.folder / piece.scenes.folder
     return [_answer(k, task, piece.scenes) for k, task in zip(piece.numbers, piece.tasks, strict=True)]

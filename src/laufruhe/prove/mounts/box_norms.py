@@ -83,7 +83,7 @@ class Sampled:
 
     @property
     def is_full(self) -> bool:
-        """Whether every order has more than two samples, so that sums over samples are those over the period."""
+        """Tell if every order has more than two samples, so that sums over samples are those over the period."""
         return bool(2 * self.places.max(initial=0) < self.samples)
 
     def turns(self, own: NDArray[np.intp]) -> NDArray[np.complex128]:

@@ -141,7 +141,7 @@ class Answer:
 
     @property
     def most(self) -> Array:
-        """What no length in a box is over, (...)."""
+        """Bound lengths anywhere in a box from above, shape (...)."""
         size = np.linalg.norm(self.value, axis=-1) + np.linalg.norm(self.slopes, axis=-1).sum(axis=-1)
         return np.asarray(size + self.rest)
 

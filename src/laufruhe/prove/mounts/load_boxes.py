@@ -1,4 +1,4 @@
-"""What no mounts, unbalances and throws of a box go under, all numbers from -1 to 1: linear functions (E71, E72).
+"""Bounds of mounts, unbalances and throws in a box, all numbers from -1 to 1: linear functions (E71, E72).
 
 What orders make of loads on open mounts is a series in the numbers s of the mounts (E37, E68), and affine in the
 unbalances, u = u_c + h t with t from -1 to 1:
@@ -60,7 +60,7 @@ FORCE = Measure(channels.MOUNT_FORCE, NORMS["rms"])
 
 
 def is_boxed(problem: Problem, throws: OpenThrows | None = None) -> bool:
-    """Whether all that is open are unbalances, throws and numbers of mounts that a loop knows, few of them together."""
+    """Tell if all that is open are unbalances, throws and numbers of mounts that a loop knows, few of them together."""
     if problem.engine.block is None or problem.known_rows or not problem.decisions:
         return False
     affine = all(decision.is_affine for decision in problem.decisions)
@@ -97,7 +97,7 @@ def load_bound(
 
 
 def _is_affine(measure: Measure, problem: Problem) -> bool:
-    """Whether a norm is one of rows that mounts do not change, and that unbalances change affinely or not at all."""
+    """Tell if a norm is one of rows that mounts do not change, and that unbalances change affinely or not at all."""
     kinds = {decision.kind for decision in problem.decisions}
     found = {dependence(measure.channel, kind, problem) for kind in kinds}
     return not measure.channel.is_number and found <= {Dependence.NONE, Dependence.AFFINE}
@@ -167,18 +167,18 @@ class LoadBoxes:
         return {m: (2.0 if m.norm.is_diameter else 1.0) * float(felt[k, out].sum()) for k, m in enumerate(own)}
 
     def _most(self, measure: Measure) -> Array:
-        """What every order does to all mounts that count at most, anywhere in the bounds."""
+        """Bound the load of every order on all mounts that count from above, anywhere in the bounds."""
         answer = self._box(self.lower[None], self.upper[None]).answer(measure)
         return np.asarray(np.nan_to_num(answer.most[0], nan=np.inf))
 
     @property
     def is_sampled_fully(self) -> bool:
-        """Whether sums of squares over orders are those over samples, as the rests suppose."""
+        """Tell if sums of squares over orders are those over samples, as the rests suppose."""
         return self._sampled.is_full
 
     @property
     def _cost(self) -> float:
-        """Of one box, in about a microsecond of one core."""
+        """Estimate the time of one box, in about a microsecond of one core."""
         columns, rows = len(self.lower) - self._numbers, 3 * len(self.problem.engine.mounts)
         lifted, lines = len(self.lower) + self._numbers * columns, len(self._orders.numbers)
         asked = 1 + len(self._limits) + len(self._terms) + 2 * self._ratios
@@ -196,7 +196,7 @@ class LoadBoxes:
 
     @property
     def most_boxes(self) -> int:
-        """As many as asked for, or as some seconds allow."""
+        """Count the boxes that are asked for, or that some seconds allow."""
         asked = self.problem.search.boxes
         return int(min(WORK / self._cost, MOST_BOXES)) if asked is None else asked
 
@@ -384,7 +384,6 @@ def _counted(answer: Answer, which: Mask) -> Answer:
 
 
 def _times(answer: Answer, factors: Array) -> Answer:
-    """Return an answer with a factor on every order."""
     one, two = factors[:, None], factors[:, None, None]
     return Answer(answer.value * one, answer.slopes * two, answer.rest * factors, answer.bends * one)
 

@@ -80,7 +80,7 @@ class Pairing:
 
 
 class MountedLoads:
-    """Of a problem that is open in unbalances and numbers of mounts.
+    """Loads of a problem that is open in unbalances and numbers of mounts.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What bounds of open mounts name as their own; of all else they claim nothing."""
+"""Channels that bounds of open mounts name as their own; of all else they claim nothing."""
 
 from __future__ import annotations
 

@@ -155,7 +155,7 @@ def _by_levels(boxes: SpringBoxes, room: float, ladder: _Ladder, known: Known | 
 
 
 def _under(boxes: SpringBoxes, share: float, room: float, known: Known | None) -> SpringBoxes:
-    """Of designs under a level; at the last one the best design itself is among them."""
+    """Bound designs under a level; at the last one the best design itself is among them."""
     found = boxes.under(_level(boxes, share, room))
     return found if share or known is None else found.up_to(known.most * (1.0 + EXCESS))
 

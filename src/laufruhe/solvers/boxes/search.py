@@ -122,7 +122,6 @@ class _Designed(Division[B], Generic[B, F]):
         return gap <= NEARLY * self._tolerance or (gap < np.inf and one.part.is_exact)
 
     def _take(self, found: F) -> None:
-        """The better of the best design and another."""
         if found.rank < self.best.rank:
             self.best, self.value, self.known = found, found.value, self._search.known(found)
 
