@@ -36,7 +36,6 @@ from laufruhe.report.sections import stars
 from laufruhe.solvers import solve
 from laufruhe.solvers.stars.cuts import search_designs
 from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.mixed_conic import solve_program
 from laufruhe.solvers.stars.program import owners_of, solve_design
 from laufruhe.solvers.stars.search import enumerate_stars, search_stars
 
@@ -48,8 +47,6 @@ RANKED = (
 COUPLE = AmplitudeObjective((1, 2), (AmplitudeTerm(1.0, (0.0, 0.0), (1.0, 0.25)),))
 SIZES = range(4, 14)
 MOST_ENUMERATED = 12
-MOST_PROGRAMMED = 10
-MOST_JOINT_PROGRAMMED = 8
 SCORED = 400_000
 ORDERS = (1, 2, 4)
 TEXT = """title = "bench"
@@ -97,7 +94,6 @@ class Row:
     search: float
     nodes: int
     enumeration: float | None
-    program: float | None
     value: float
 
 
@@ -144,23 +140,14 @@ def rows() -> list[Row]:
             whole = time.process_time() - start
             assert abs(listed.values[0] - found.values[0]) <= 1e-9 * max(1.0, listed.values[0])
             enumeration = whole if n > 10 else seconds(lambda s=space: enumerate_stars(s, COUPLE))
-        program = None
-        if 5 <= n <= MOST_PROGRAMMED:
-            problem = problem_of(TEXT.format(n=n) + COUPLE_TEXT)
-            assert problem.phasing is not None
-            model = StarModel(problem.phasing, space, (None, None))
-            start = time.process_time()
-            answer = solve_program(model.at(model.samples), space, time_limit=300.0)
-            program = time.process_time() - start
-            assert answer.status == "optimal"
         took = seconds(lambda s=space: search_stars(s, COUPLE))
-        out.append(Row(n, space.size, took, found.nodes, enumeration, program, float(found.values[0])))
+        out.append(Row(n, space.size, took, found.nodes, enumeration, float(found.values[0])))
         print(out[-1], flush=True)
     return out
 
 
 def joint(n: int) -> tuple[str, ...]:
-    """Counterweights free, mean mount force: cuts beside solving every star, and SCIP at 24 angles."""
+    """Counterweights free, mean mount force: cuts beside solving every star."""
     problem = problem_of(TEXT.format(n=n) + JOINT_TEXT)
     phasing = problem.phasing
     assert phasing is not None
@@ -176,15 +163,10 @@ def joint(n: int) -> tuple[str, ...]:
     for star in some.tolist():
         solve_design(model, tuple(star), (), owners, problem.tolerance, floor)
     every = (time.process_time() - start) * len(family.stars) / len(some)
-    scip = ""
-    if n <= MOST_JOINT_PROGRAMMED:
-        start = time.process_time()
-        program = solve_program(model.at(24), family.space, owners, time_limit=60.0)
-        scip = f"{time.process_time() - start:.2f} ({program.status})"
     gap = (found.solved[0].value - found.lower_bound) / max(found.solved[0].value, floor)
     return (
         f"{n}", f"{len(family.stars)}", f"{by_cuts:.2f}", f"{len(found.solved)}", f"{gap:.1e}",
-        f"{every:.1f}{'' if len(some) == len(family.stars) else ' (from 60)'}", f"{every / by_cuts:.1f}", scip,
+        f"{every:.1f}{'' if len(some) == len(family.stars) else ' (from 60)'}", f"{every / by_cuts:.1f}",
     )  # fmt: skip
 
 
@@ -237,7 +219,6 @@ def growth(found: list[Row]) -> None:
     series = (
         ("halves that meet, proven", [(r.throws, r.search) for r in found], "#0072B2", "o-"),
         ("enumeration, vectorised", [(r.throws, r.enumeration) for r in found if r.enumeration], "#8a8a8a", "s-"),
-        ("mixed-integer program, SCIP", [(r.throws, r.program) for r in found if r.program], "#D55E00", "^-"),
     )
     for name, points, colour, mark in series:
         axes.semilogy(*zip(*points, strict=True), mark, color=colour, label=name, markersize=5, linewidth=1.5)
@@ -297,12 +278,12 @@ def main() -> None:
             f"{r.throws}", f"{r.stars}", f"{r.search:.3f}", f"{r.nodes}",
             "" if r.enumeration is None else f"{r.enumeration:.3f}",
             "" if r.enumeration is None else f"{r.enumeration / r.search:.2f}",
-            "" if r.program is None else f"{r.program:.2f}", f"{r.value:.6f}",
+            f"{r.value:.6f}",
         )
         for r in found
     ]  # fmt: skip
-    head = ("throws", "stars", "search s", "nodes", "enumeration s", "enumeration / search", "SCIP s", "least couple")
-    joined = ("throws", "stars", "cuts s", "programs", "gap", "every star s", "every / cuts", "SCIP at 24 angles s")
+    head = ("throws", "stars", "search s", "nodes", "enumeration s", "enumeration / search", "least couple")
+    joined = ("throws", "stars", "cuts s", "programs", "gap", "every star s", "every / cuts")
     text = [
         "# Crank phasing: time to a proven optimum",
         "Seconds of processor time on one core, medians of up to three runs.",

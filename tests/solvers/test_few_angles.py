@@ -192,7 +192,6 @@ def test_stars_are_not_excluded_by_means_at_the_few_angles_of_a_program() -> Non
             "unbalances": [{"x": "60 mm", "unbalance": {"between": ["0 kg m", "0.01 kg m"]},
                             "angle": {"between": [0, 360]}}],
         }],
-        "phasing": {"method": "program"},
         "fidelity": {"samples": 720},
         "objective": {"minimise": "rms rocking couple"},
         "constraints": [{"limit": "mean rocking couple", "max": "470.277 N m"}],

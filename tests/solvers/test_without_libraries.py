@@ -1,4 +1,4 @@
-"""CasADi and SCIP are loaded where something open needs them, and what needs them says so where they are missing."""
+"""CasADi is loaded where something open needs it, and what needs it says so where it is missing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from problem_files import PROBLEMS
 
 SCRIPT = """
 import sys
-sys.modules |= {"casadi": None, "pyscipopt": None}
+sys.modules |= {"casadi": None}
 import laufruhe
 from laufruhe.errors import SolverError
 print(laufruhe.solve(sys.argv[1]).status)
@@ -24,7 +24,7 @@ except SolverError as error:
 
 QUICK = """
 import sys
-sys.modules |= dict.fromkeys(("casadi", "cvxpy", "matplotlib", "pandas", "pyscipopt", "scipy", "xarray"))
+sys.modules |= dict.fromkeys(("casadi", "cvxpy", "matplotlib", "pandas", "scipy", "xarray"))
 import laufruhe
 print(laufruhe.solve(sys.argv[1]).status)
 """

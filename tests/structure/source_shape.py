@@ -28,7 +28,6 @@ HEAVY = {
     "netCDF4",
     "pandas",
     "pint",
-    "pyscipopt",
     "scipy",
     "xarray",
     "xlsxwriter",

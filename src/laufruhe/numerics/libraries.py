@@ -5,7 +5,7 @@ from __future__ import annotations
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
-PACKAGES = ("numpy", "scipy", "cvxpy", "clarabel", "casadi", "pyscipopt")
+PACKAGES = ("numpy", "scipy", "cvxpy", "clarabel", "casadi")
 
 
 def version_of(package: str) -> str:

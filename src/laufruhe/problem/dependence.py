@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from enum import StrEnum
 
+from laufruhe.extension import extensions
 from laufruhe.problem.channels import CHANNELS, Channel
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.problem import Problem
@@ -124,7 +125,8 @@ absorber heat                       0 0 s  0 s 0  w  0 0  0 s
 
 def _parsed(text: str) -> dict[str, dict[Kind, Dependence]]:
     found: dict[str, dict[Kind, Dependence]] = {}
-    for line in text.strip().splitlines()[1:]:
+    added = [line for extension in extensions() for line in extension.dependences]
+    for line in (*text.strip().splitlines()[1:], *added):
         name, letters = line.split("  ", 1)
         kinds = zip(_COLUMNS, letters.split(), strict=True)
         found[name] = {kind: _LETTERS[letter] for kind, letter in kinds}

@@ -27,7 +27,6 @@ class Method(StrEnum):
 
     AUTO = "auto"
     SEARCH = "search"
-    PROGRAM = "program"
     ENUMERATION = "enumeration"
 
 

@@ -158,13 +158,11 @@ def explained(result: Result) -> str:
             f"For this design {_conditions(c.kkt_residual)}. {bound if c.is_useful else NO_BOUND.capitalize() + '.'}"
         )
     gap = f"a gap of {percent_of(c.gap)}" if c.gap > 0.0 else "which leaves no gap"
-    origin = "was not taken from the solver but computed from the exact model"
-    if "SCIP" in c.method:
-        origin = "is SCIP's dual bound less its tolerances, or that of dual rows where it is better"
     return (
         f"No design within the bounds and limits has less than {figure(c.lower_bound, o.unit, 6)}; "
         f"this one has {figure(o.value, o.unit, 6)}, {gap} (proof: {c.kind}). "
-        f"The bound {origin} ({c.method}), and {_conditions(c.kkt_residual)}."
+        f"The bound was not taken from the solver but computed from the exact model ({c.method}), "
+        f"and {_conditions(c.kkt_residual)}."
     )
 
 

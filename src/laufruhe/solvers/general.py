@@ -51,7 +51,7 @@ def solve_generally(problem: Problem, decide: Decide, by_cones: Callable[[Proble
     if phasing is not None and (phasing.continuous or phasing.throw_bounds is not None):
         return solve_moved_throws(problem, phasing, lambda moved: solve_generally(moved, decide, by_cones))
     if phasing is not None:
-        return solve_star_by_star(problem, phasing, decide)
+        return solve_star_by_star(problem, decide)
     started = time.perf_counter()
     initial, program = evaluate_start(problem), LocalProgram.of(problem)
     # what cannot be evaluated is refused first
@@ -99,8 +99,10 @@ def refuse_uneven(phasing: Phasing) -> None:
         raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out, or leave [robust] out")
 
 
-def solve_star_by_star(problem: Problem, phasing: Phasing, decide: Decide) -> Result:
+def solve_star_by_star(problem: Problem, decide: Decide) -> Result:
     """Decide each star that fires evenly, with each set of shafts, as a problem of its own; of many, some drawn."""
+    phasing = problem.phasing
+    assert phasing is not None
     refuse_uneven(phasing)
     stars = every_star(phasing)
     if not stars:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -36,7 +36,7 @@ from laufruhe.problem.channels import (
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence, depends, kinds_of
 from laufruhe.problem.evaluation import objective_value
-from laufruhe.problem.measure import Measure
+from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach
@@ -55,9 +55,10 @@ from laufruhe.solvers.told_limits import solve_told, told_excess
 from laufruhe.solvers.walk import walked
 from laufruhe.solvers.withheld import without_proof
 
-LIBRARIES = ("casadi", "clarabel", "cvxpy", "pyscipopt")
+LIBRARIES = ("casadi", "clarabel", "cvxpy")
 """Packages that are imported where something open needs them, named as their modules."""
 CUT_SHORT = "stopped at the time limit"
+Decide = Callable[[Problem], Result]
 
 
 def _is_convex(norm: Norm) -> bool:
@@ -271,6 +272,7 @@ def solve(
         begun, spent = time.perf_counter(), time.thread_time()
         found: Result | None
         try:
+            refuse(problem)
             found = _decided(problem)
         except ModuleNotFoundError as error:
             if error.name not in LIBRARIES:
@@ -313,11 +315,6 @@ def _cut_short(problem: Problem, found: Result | None) -> Result:
     return replace(found, certificate=replace(own, method=f"{own.method}; {CUT_SHORT}"))
 
 
-def _decided(problem: Problem) -> Result:
-    """For the drawing or for the engines that are built to it, at so many angles that limits are what these tell."""
-    return solve_told(problem, _by_what_is_open)
-
-
 def _method(problem: Problem) -> Method:
     """The first that suits a problem; the last suits all."""
     return next(method for method in METHODS if method.suits(problem))
@@ -355,54 +352,112 @@ def _refuse_of_drawing(problem: Problem) -> None:
         raise ModelError(f"{words} is open and nothing is minimised; add [objective] or [mounts]")
 
 
-def _by_what_is_open(problem: Problem) -> Result:
-    """By the first method that suits."""
-    if problem.ranks:
-        return solve_in_order(problem, _decided)
-    if problem.assembly is not None:
-        return _by("tolerances.assembly:solve_assembly", problem)
-    if problem.over is not None and problem.phasing is not None:
-        return _by("general:solve_star_by_star", problem, problem.phasing, _decided)
-    if problem.over is not None:
-        return _by("tolerances.robust:solve_robust", problem, _decided)
-    kinds = kinds_of(problem)
-    fixed = [limit for limit in problem.limits if not depends(limit.measure.channel, kinds, problem)]
-    if fixed:
-        given = evaluate_start(problem)
-        # what cannot be evaluated is refused first
-        objective_value(problem, given)
-        problem, least = with_room(problem, fixed, given)
-        broken = surely_broken(fixed, least)
-        if broken:
-            return none_within(problem, given, broken, {})
-        moved = tuple(limit for limit in problem.limits if limit not in fixed)
-        return with_limits(_decided(problem.changed(limits=moved)), problem.limits)
-    _refuse_of_drawing(problem)
-    if kinds and asks_runs(problem) and Kind.NUMBER not in kinds:
-        return _by("runs:solve_runs", problem, kinds, _decided)
-    moving = any(depends(term.measure.channel, kinds, problem) for term in problem.objective)
-    if problem.objective and kinds and not moving and problem.phasing is None:
-        design = judged(problem, problem.start)
-        if design.excess <= KEPT:
-            shown = Shown(design.value, Reach.WHOLE, 0.0, "nothing open changes what is minimised")
-            return concluded(design, design.evaluation, shown, {})
+def _decided(problem: Problem, reductions: Sequence[Reduction] | None = None) -> Result:
+    """Decide a problem by the first of some reductions that applies, or by the first method that suits it."""
+    left = REDUCTIONS if reductions is None else reductions
+    for k, reduction in enumerate(left):
+        if reduction.applies(problem):
+            return reduction.solve(problem, _decided, partial(_decided, reductions=left[k + 1 :]))
     method = _method(problem)
     # what is decided apart is asked once more, each part by itself
     tell(method.name)
-    conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and kinds <= {_U, _K, _M} else ()
-    if conflict:
-        return none_within(problem, evaluate_start(problem), conflict, {})
-    closing = _closing(problem, kinds, method)
+    return method.decided(problem)
+
+
+def _fixed_limits(problem: Problem) -> list[Limit]:
+    kinds = kinds_of(problem)
+    return [limit for limit in problem.limits if not depends(limit.measure.channel, kinds, problem)]
+
+
+def _without_fixed_limits(problem: Problem, decide: Decide, _: Decide) -> Result:
+    fixed = _fixed_limits(problem)
+    given = evaluate_start(problem)
+    # what cannot be evaluated is refused first
+    objective_value(problem, given)
+    problem, least = with_room(problem, fixed, given)
+    broken = surely_broken(fixed, least)
+    if broken:
+        return none_within(problem, given, broken, {})
+    moved = tuple(limit for limit in problem.limits if limit not in fixed)
+    return with_limits(decide(problem.changed(limits=moved)), problem.limits)
+
+
+def _is_settled(problem: Problem) -> bool:
+    """Return whether nothing open changes what is minimised."""
+    kinds = kinds_of(problem)
+    if not kinds or not problem.objective or problem.phasing is not None:
+        return False
+    return not any(depends(term.measure.channel, kinds, problem) for term in problem.objective)
+
+
+def _as_given(problem: Problem, _: Decide, rest: Decide) -> Result:
+    design = judged(problem, problem.start)
+    if design.excess > KEPT:
+        return rest(problem)
+    shown = Shown(design.value, Reach.WHOLE, 0.0, "nothing open changes what is minimised")
+    return concluded(design, design.evaluation, shown, {})
+
+
+def _is_of_mounts(problem: Problem) -> bool:
+    return kinds_of(problem) <= {_U, _K, _M} and Kind.MOUNT in _method(problem).decides
+
+
+def _within_mounts(problem: Problem, _: Decide, rest: Decide) -> Result:
+    conflict = beyond_mounts(problem)
+    return none_within(problem, evaluate_start(problem), conflict, {}) if conflict else rest(problem)
+
+
+def _relaxed(problem: Problem, _: Decide, rest: Decide) -> Result:
+    closing = _closing(problem)
     if closing is None:
-        return method.decided(problem)
+        return rest(problem)
     other, fewer = closing
-    return solve_relaxed(problem, fewer, other.decided, method.decided)
+    return solve_relaxed(problem, fewer, other.decided, rest)
 
 
-def _closing(problem: Problem, kinds: frozenset[Kind], method: Method) -> tuple[Method, Problem] | None:
+@dataclass(frozen=True)
+class Reduction:
+    """A kind of problem that is decided by deciding simpler ones.
+
+    Attributes
+    ----------
+    name
+        In words.
+    applies
+        Return whether it decides a problem.
+    solve
+        Decide it; the first callable decides a simpler problem by all reductions, the second by those that follow.
+    """
+
+    name: str
+    applies: Callable[[Problem], bool]
+    solve: Callable[[Problem, Decide, Decide], Result]
+
+
+REDUCTIONS: tuple[Reduction, ...] = (
+    Reduction("more angles where few read otherwise", lambda _: True, lambda p, _, rest: solve_told(p, rest)),
+    Reduction("ranks, one after another", lambda p: bool(p.ranks), lambda p, decide, _: solve_in_order(p, decide)),
+    Reduction("assembly", lambda p: p.assembly is not None,
+              lambda p, *_: _by("tolerances.assembly:solve_assembly", p)),
+    Reduction("star by star, with tolerances", lambda p: p.over is not None and p.phasing is not None,
+              lambda p, decide, _: _by("general:solve_star_by_star", p, decide)),
+    Reduction("tolerances", lambda p: p.over is not None,
+              lambda p, decide, _: _by("tolerances.robust:solve_robust", p, decide)),
+    Reduction("limits that nothing open moves", lambda p: bool(_fixed_limits(p)), _without_fixed_limits),
+    Reduction("run-ups", lambda p: asks_runs(p) and bool(kinds_of(p)) and Kind.NUMBER not in kinds_of(p),
+              lambda p, decide, _: _by("runs:solve_runs", p, kinds_of(p), decide)),
+    Reduction("an objective that nothing open moves", _is_settled, _as_given),
+    Reduction("a conflict that no mounts mend", _is_of_mounts, _within_mounts),
+    Reduction("a bound without what a method does not know", lambda p: p.search.proves, _relaxed),
+)  # fmt: skip
+"""What is decided by deciding simpler problems, in the order in which it is looked for."""
+
+
+def _closing(problem: Problem) -> tuple[Method, Problem] | None:
     """Return a method whose bound closes on what it knows of what is asked, and the problem of that alone."""
-    if method.reach is Reach.WHOLE or not problem.search.proves:
+    if _method(problem).reach is Reach.WHOLE:
         return None
+    kinds = kinds_of(problem)
     for other in METHODS:
         if other.reach is not Reach.WHOLE or not kinds <= other.decides:
             continue

@@ -3,6 +3,7 @@
 Cylinders are counted from the front (C3).
 """
 
+from laufruhe.extension import additions
 from laufruhe.machine.layouts.base import Asked, Key, LayoutKind, rod_of
 from laufruhe.machine.layouts.boxer import Boxer, boxer
 from laufruhe.machine.layouts.build import Mechanism, Throw, build, even_throws, firing_angles, throw_rotors
@@ -15,18 +16,9 @@ from laufruhe.machine.layouts.radial import Radial
 from laufruhe.machine.layouts.rotary import Rotary
 from laufruhe.machine.layouts.vee import Vee, vee
 
+_OWN = (Inline(), Vee(), Boxer(), OpposedPiston(), Delta(), Radial(), Rotary(), Parts())
 LAYOUTS: dict[str, LayoutKind] = {
-    kind.name: kind
-    for kind in (
-        Inline(),
-        Vee(),
-        Boxer(),
-        OpposedPiston(),
-        Delta(),
-        Radial(),
-        Rotary(),
-        Parts(),
-    )
+    kind.name: kind for kind in (*_OWN, *additions("layouts", LayoutKind, [kind.name for kind in _OWN]))
 }
 
 __all__ = [

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from laufruhe.extension import additions
 from laufruhe.numerics.norms.maximum import Maximum
 from laufruhe.numerics.norms.mean import Mean
 from laufruhe.numerics.norms.norm import Cones, Grid, Norm, SmoothProgram, lengths, only, softened_lengths
@@ -13,7 +14,8 @@ from laufruhe.numerics.norms.worst_mean import WorstMean
 
 __all__ = ["MEAN", "NORMS", "RMS", "Cones", "Grid", "Norm", "SmoothProgram", "lengths", "softened_lengths"]
 
+_OWN = (Mean, Maximum, RootMeanSquare, PeakToPeak, WorstMean)
 NORMS: Mapping[str, Norm] = {
-    norm.name: norm for norm in map(only, (Mean, Maximum, RootMeanSquare, PeakToPeak, WorstMean))
+    norm.name: norm for norm in map(only, (*_OWN, *additions("norms", Norm, [norm.name for norm in _OWN])))
 }
 MEAN, RMS = NORMS["mean"], NORMS["rms"]

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,10 +11,8 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.amplitudes import AmplitudeObjective, amplitude_objective
 from laufruhe.load_models.couple_norms import couple_norms, three_stars
 from laufruhe.load_models.pair_tables import PairObjective
-from laufruhe.load_models.star_model import StarModel
 from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.crank_stars import Stars
-from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.channels import ROCKING_COUPLE
 from laufruhe.problem.evaluation import Evaluation, evaluate, finely, objective_value
 from laufruhe.problem.measure import Measure, Term
@@ -29,17 +25,13 @@ from laufruhe.solvers.stars.cuts import CutsFound, search_designs
 from laufruhe.solvers.stars.exchange import improved
 from laufruhe.solvers.stars.families import Family, FiringFamily
 from laufruhe.solvers.stars.firing_search import MOST_SLOTS, enumerate_orders
-from laufruhe.solvers.stars.program import owners_of, solve_design, widened
+from laufruhe.solvers.stars.program import coarse_value, owners_of, solve_design
 from laufruhe.solvers.stars.ranking import RankedStar, ranked_star
 from laufruhe.solvers.stars.search import StarsFound, best_starts, enumerate_stars, search_stars
-
-if TYPE_CHECKING:
-    from laufruhe.solvers.stars.mixed_conic import ProgramFound
 
 MOST_LISTED = 1_000_000
 # looking at every star is as quick as a search up to here
 FEW_STARS = 60_000
-PROGRAM_SAMPLES = 24
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,8 +71,6 @@ def searched(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> 
     simple = [(family, own) for family in families if (own := _amplitudes(phasing, family)) is not None]
     if len(simple) < len(families) or any(family.fixed for family in families):
         return _by_designs(problem, phasing, families)
-    if phasing.method is Method.PROGRAM:
-        return _by_program(problem, phasing, families)
     answers = []
     for family, own in simple:
         space = replace(family.space, mirror=True, reflect=True)
@@ -99,7 +89,7 @@ def _by_orders(problem: Problem, phasing: Phasing, families: Sequence[Family]) -
     (family,) = families
     own = [measure for measure in problem.measures if not measure.channel.is_number]
     squares = all(measure.is_load and measure.norm.is_euclidean for measure in own)
-    if not squares or problem.decisions or phasing.shafts.optional or family.fixed or phasing.method is Method.PROGRAM:
+    if not squares or problem.decisions or phasing.shafts.optional or family.fixed:
         return _by_designs(problem, phasing, families)
     if phasing.cylinders > MOST_SLOTS:
         raise ModelError(f"firing orders of more than {MOST_SLOTS} cylinders are too many to examine; give throws")
@@ -133,10 +123,10 @@ def _stars_answer(phasing: Phasing, family: Family, found: StarsFound, method: s
 
 
 def _by_designs(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
-    """Everything else is decided by cone programs: cuts where the stars can be listed, else the program."""
-    if phasing.method is Method.PROGRAM or sum(family.size for family in families) > MOST_LISTED:
-        shared = None if phasing.method is Method.PROGRAM else _by_couples(problem, phasing, families)
-        return _by_program(problem, phasing, families) if shared is None else shared
+    """Return the answer of cone programs: cuts where the stars can be listed, else exchanges of throws."""
+    if sum(family.size for family in families) > MOST_LISTED:
+        shared = _by_couples(problem, phasing, families)
+        return _by_exchanges(problem, phasing, families) if shared is None else shared
     nothing = nothing_of(problem)
     count = 10**9 if phasing.method is Method.ENUMERATION else phasing.best
     answers = []
@@ -234,62 +224,34 @@ def _is_closed(found: CutsFound, tolerance: float, nothing: float) -> bool:
     return bool(found.solved) and gap_of(found.solved[0].value, found.lower_bound, nothing) <= tolerance
 
 
-def _programmed(
-    model: StarModel, samples: int, space: StarSpace, owners: Sequence[int], phasing: Phasing
-) -> ProgramFound:  # fmt: skip
-    """What SCIP finds; that it allows no star is taken from means averaged about its few angles alone (P7)."""
-    from laufruhe.solvers.stars.mixed_conic import solve_program
-
-    found = solve_program(model.at(samples), space, owners, phasing.shafts, phasing.time_limit)
-    if found.status != "infeasible":
-        return found
-    sound = widened(model.at(samples, averaged=True))
-    return solve_program(sound, space, owners, phasing.shafts, phasing.time_limit)
-
-
-def _by_program(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
-    """The mixed-integer program by SCIP, its design solved again and bounded by the exact model."""
+def _by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+    """Return the best star that exchanges of throws lead to, bounded by its own dual rows over all stars (S44, S14)."""
     nothing = nothing_of(problem)
     answers = []
     for family in families:
         simple = _amplitudes(phasing, family) is not None
         space = replace(family.space, mirror=simple, reflect=simple)
         model = family.model(phasing, space)
-        exact = all(term.measure.norm.is_euclidean for term in problem.objective) and not problem.limits
-        samples = model.samples if exact else PROGRAM_SAMPLES
         owners = owners_of(model)
-        # no program has unbalances that are counted from an open throw: exchanges alone look for a star then
-        known = None if model.at(samples).is_bilinear else _programmed(model, samples, space, owners, phasing)
-        if known is not None and known.status == "infeasible":
-            answers.append(Answer((), math.inf, True, 0, "SCIP"))
-            continue
-        floor = known.bound if known is not None else 0.0
-        built = known.built if known is not None else max(phasing.shafts.allowed, key=len)
-        # a program that has none yet leaves the first star, whose bound is worth as much
-        star = _first_of(phasing, family, known.star if known is not None else None)
-        # what few angles and the solver's own tolerance do not tell apart, exchanges do
-        star = improved(model, star, built, owners, floor * (1.0 + problem.tolerance))
+        first = _first_of(phasing, family)
+        built = min(phasing.shafts.allowed, key=lambda some: coarse_value(model, first, some, owners))
+        star = improved(model, first, built, owners)
         found, cut = solve_design(model, star, built, owners, problem.tolerance, nothing)
         if found is None or cut is None:
             answers.append(Answer((), 0.0, False, 1, "exchanges of throws"))
             continue
-        bound = max(floor if exact else 0.0, cut.least(space))
-        ended = known is not None and known.status == "optimal"
-        done = ended and gap_of(found.value, bound, nothing) <= 2.0 * problem.tolerance
-        how = "exchanges of throws" if known is None else f"mixed-integer cone program (SCIP: {known.status})"
-        method = f"{how} at {samples} angles, design solved again"
+        bound = cut.least(space)
+        done = gap_of(found.value, bound, nothing) <= 2.0 * problem.tolerance
+        method = f"exchanges of throws at {model.samples} angles"
         design = _decided(phasing, family, found.star, found.built, found.value, found.bound, done)
         answers.append(Answer((design,), bound, done, 1, method))
     return _joined(answers, phasing.best)
 
 
-def _first_of(phasing: Phasing, family: Family, told: tuple[int, ...] | None) -> tuple[int, ...]:
-    """The star of a program, or one with less couple where that is worth less; the first where there are none."""
-    known = [] if told is None else [told]
-    stars = [*known, *(tuple(map(int, star)) for star in _with_least_couples(phasing, family))]
-    if len(stars) < 2:
-        return stars[0] if stars else family.first
-    return min(stars, key=lambda star: _evaluated(phasing, family, star)[0])
+def _first_of(phasing: Phasing, family: Family) -> tuple[int, ...]:
+    """Return the star with least couple, or the first where there is none."""
+    stars = [tuple(map(int, star)) for star in _with_least_couples(phasing, family)]
+    return min(stars, key=lambda star: _evaluated(phasing, family, star)[0], default=family.first)
 
 
 def _joined(answers: Sequence[Answer], count: int) -> Answer:

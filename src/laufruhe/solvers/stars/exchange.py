@@ -13,18 +13,10 @@ from laufruhe.solvers.stars.program import coarse_value
 WORTH = 1e-6
 
 
-def improved(
-    model: StarModel, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int], enough: float
-) -> tuple[int, ...]:
-    """The best star that exchanges lead to, each star with everything else at its own optimum at few angles.
-
-    Parameters
-    ----------
-    enough
-        Objective at which no exchange is looked for [SI].
-    """
+def improved(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int]) -> tuple[int, ...]:
+    """Return the best star that exchanges lead to, everything else at its optimum at few angles."""
     value = coarse_value(model, star, built, owners)
-    while value > enough and not passed():
+    while not passed():
         found, best = min(
             ((coarse_value(model, other, built, owners), other) for other in in_time(exchanges(star))),
             default=(math.inf, star),

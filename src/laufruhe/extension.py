@@ -1,0 +1,97 @@
+"""Packages of users: what they add to the tables of norms, channels, layouts and study kinds.
+
+An installed package names an `Extension` as an entry point of the group `laufruhe.extensions`. Its objects are imported
+when the table that they belong to is made, so that each of their modules imports no more than the room of that table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from importlib.metadata import entry_points
+from typing import Any, Literal, TypeVar
+
+from laufruhe.errors import ModelError
+
+GROUP = "laufruhe.extensions"
+Tables = Literal["norms", "channels", "layouts", "study_kinds"]
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Extension:
+    """What a package adds, each object by the name `module:attribute`.
+
+    Attributes
+    ----------
+    name
+        Of the package, as messages say it.
+    norms
+        Subclasses of `laufruhe.numerics.norms.Norm`.
+    channels
+        Objects of `laufruhe.problem.channels.kinds.Channel`.
+    dependences
+        Lines of the table in `laufruhe.problem.dependence`, about these channels; a channel without one is unknown to
+        every bound, and decided locally.
+    layouts
+        Objects of `laufruhe.machine.layouts.LayoutKind`.
+    study_kinds
+        Subclasses of `laufruhe.studies.part.Part`.
+    """
+
+    name: str
+    norms: tuple[str, ...] = ()
+    channels: tuple[str, ...] = ()
+    dependences: tuple[str, ...] = ()
+    layouts: tuple[str, ...] = ()
+    study_kinds: tuple[str, ...] = ()
+
+
+@cache
+def extensions() -> tuple[Extension, ...]:
+    """Return the extensions of all installed packages, in the order of their names."""
+    found = []
+    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+        one = _imported(point.name, point.value)
+        if not isinstance(one, Extension):
+            raise ModelError(f"extension '{point.name}': {point.value} is no laufruhe.extension.Extension; mend it")
+        found.append(one)
+    return tuple(found)
+
+
+def additions(table: Tables, kind: type[T], known: Container[str]) -> list[Any]:
+    """Return the objects, or classes, of a kind that extensions add to a table.
+
+    Parameters
+    ----------
+    kind
+        Class of the objects, or base of the classes.
+    known
+        Names that the table has without them.
+
+    Raises
+    ------
+    ModelError
+        If one cannot be imported, is of another kind, or has the name of another one.
+    """
+    found: list[Any] = []
+    for extension in extensions():
+        for address in getattr(extension, table):
+            one = _imported(extension.name, address)
+            if not (issubclass(one, kind) if isinstance(one, type) else isinstance(one, kind)):
+                raise ModelError(f"extension '{extension.name}': {address} is no {kind.__name__}; mend it")
+            name = getattr(one, "name", None)
+            if isinstance(name, str) and (name in known or name in [other.name for other in found]):
+                raise ModelError(f"extension '{extension.name}': {table} have '{name}' already; give it another name")
+            found.append(one)
+    return found
+
+
+def _imported(name: str, address: str) -> Any:
+    module, _, attribute = address.partition(":")
+    try:
+        return getattr(import_module(module), attribute)
+    except (ImportError, AttributeError) as error:
+        raise ModelError(f"extension '{name}': {address} cannot be imported ({error}); mend or uninstall it") from error
