@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,6 @@ import pytest
 
 import laufruhe
 from laufruhe.numerics.norms import NORMS, Grid, Norm
-from laufruhe.numerics.norms.maximum import Maximum
 from laufruhe.numerics.norms.norm import lengths, only
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem import dependence, measure
@@ -39,15 +39,20 @@ def _resultant(loads: PointLoads) -> Spectrum:
 RESULTANT = LoadChannel("transmitted force", "N", ON_BLOCK, Needs.MOUNTS, signal=_resultant)
 
 
-class WorstTwentieth(Maximum):
+class WorstTwentieth(Norm):
     """The mean of the largest twentieth of the lengths; it claims nothing."""
 
     name = "worst twentieth"
-    is_largest = is_convex = of_row_lengths = is_pointwise = False
 
     def value(self, grid: Grid, rows: np.ndarray) -> float:
         size = np.sort(lengths(rows))
         return float(size[-max(len(size) // 20, 1) :].mean())
+
+    def above(self, signals: Sequence[Spectrum], shares: np.ndarray) -> float:
+        return NORMS["maximum"].above(signals, shares)
+
+    def sampling_bound(self, signals: Sequence[Spectrum], shares: np.ndarray, steps: int, finest: int) -> float:
+        return NORMS["maximum"].sampling_bound(signals, shares, steps, finest)
 
 
 @pytest.fixture

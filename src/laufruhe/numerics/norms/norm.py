@@ -124,7 +124,8 @@ def only(kind: type[Norm]) -> Norm:
 class Norm(ABC):
     """A norm of rows v_k, shape (k, d), on a grid.
 
-    A class claims what it is; a fact that it does not claim is used by no method and by no bound.
+    A class claims what it is; a fact that it does not claim is used by no method and by no bound. One that claims
+    nothing needs `value`, `above` and `sampling_bound` alone.
 
     Attributes
     ----------
@@ -180,20 +181,20 @@ class Norm(ABC):
         """Of many signals, shape (n, k, d)."""
         return np.array([self.value(grid, rows) for rows in many])
 
-    @abstractmethod
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """A Z with dual norm at most one and <Z, V> = norm(V); zero rows give zero (P2).
+        """Return a Z with dual norm at most one and <Z, V> = norm(V); zero rows give zero (P2).
 
         The inner product is sum_k z_k . v_k; weights are part of Z.
         """
+        raise self._unclaimed("subgradient")
 
     def across(self, grid: Grid, rows: Array) -> Array | None:
         """Second derivative across every row, shape (k,); None where the norm is no sum over its rows (P10)."""
         return None
 
-    @abstractmethod
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Smallest t with <Z, V> <= t norm(V) for every V (P3); infinite where there is none."""
+        """Return the smallest t with <Z, V> <= t norm(V) for every V (P3); infinite where there is none."""
+        raise self._unclaimed("dual norm")
 
     def dual_feasible(self, grid: Grid, z: Array) -> Array:
         """The nearest simple change of Z into the unit ball of the dual norm (P3)."""
@@ -208,9 +209,9 @@ class Norm(ABC):
         """The nearest dual rows whose dual norm is finite (P3)."""
         return z
 
-    @abstractmethod
     def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """Dual rows along the rows of a design where that is at least as good as a solver's Z (P6)."""
+        """Return dual rows along the rows of a design where that is at least as good as a solver's Z (P6)."""
+        raise self._unclaimed("dual norm")
 
     def spread(self, z: Array, steps: int, times: int) -> Array:
         """Dual rows at `steps` angles of each signal on a grid `times` as fine, straight from angle to angle (P6)."""
@@ -229,13 +230,13 @@ class Norm(ABC):
         """
         return None
 
-    @abstractmethod
     def cones(self, grid: Grid) -> Cones:
-        """As second-order cones."""
+        """Return the norm as second-order cones."""
+        raise self._unclaimed("cones")
 
-    @abstractmethod
     def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """A smooth expression to minimise, off by no more than the share of `unit` (N3, E22)."""
+        """Return a smooth expression to minimise, off by no more than the share of `unit` (N3, E22)."""
+        raise self._unclaimed("smooth form")
 
     def limited(
         self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
@@ -253,6 +254,9 @@ class Norm(ABC):
     @abstractmethod
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
         """How far the norm at `steps` samples a cycle can be off at the most (F7, F8)."""
+
+    def _unclaimed(self, what: str) -> TypeError:
+        return TypeError(f"norm '{self.name}' claims no {what}, and a method asks for it")
 
 
 def between(z: Array, steps: int, times: int) -> Array:

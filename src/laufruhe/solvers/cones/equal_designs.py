@@ -55,7 +55,7 @@ def equal_designs(found: Result, limit: Limit) -> tuple[DecisionRange, ...]:
     kinds = {decision.kind for decision in affine}
     moved = [bound for bound in (*problem.limits, limit) if depends(bound.measure.channel, kinds, problem)]
     problem = replace(problem, phasing=None, objective=(), limits=tuple(moved))
-    numbers = any(bound.measure.channel.is_number for bound in moved)
+    numbers = any(bound.measure.channel.is_number or not bound.measure.norm.is_convex for bound in moved)
     if not affine or len(affine) < len(problem.decisions) or len(affine) > MOST_OPEN or numbers or passed():
         return ()
     model = AffineModel(problem)
@@ -78,7 +78,7 @@ def free_decisions(found: Result) -> tuple[DecisionRange, ...] | None:
     objective and limits are convex. There may be designs beyond. None where it is not looked at.
     """
     problem = replace(found.problem, phasing=None)
-    of_numbers = any(measure.channel.is_number for measure in problem.measures)
+    of_numbers = any(measure.channel.is_number or not measure.norm.is_convex for measure in problem.measures)
     plain = problem.over is None and problem.assembly is None and not problem.ranks and not of_numbers
     affine = all(decision.is_affine for decision in problem.decisions)
     if not (plain and affine and 0 < len(problem.decisions) <= MOST_OPEN) or passed():

@@ -1,0 +1,11 @@
+"""What this package adds to laufruhe."""
+
+from laufruhe.extension import Extension
+
+EXTENSION = Extension(
+    "example",
+    norms=("laufruhe_example.worst_twentieth:WorstTwentieth",),
+    channels=("laufruhe_example.resultant:RESULTANT",),
+    layouts=("laufruhe_example.x_engine:X_ENGINE",),
+    study_kinds=("laufruhe_example.percentile:PercentilePart",),
+)

@@ -1,0 +1,95 @@
+"""A package from outside that is installed adds a norm, a channel, a layout and a study kind to every command."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+UNBALANCE = (2.0 * 0.8 + 0.6) * 0.045
+"""Of half the reciprocating mass of four pistons and the rotating mass of the throw [kg m]."""
+SHAKING = UNBALANCE * (3000.0 * math.pi / 30.0) ** 2
+"""Rotating force that it makes, the same all the cycle [N]."""
+PROBLEM, STUDY = HERE / "x-four.toml", HERE / "study.toml"
+
+
+def installed(folder: Path, points: str | None = None) -> dict[str, str]:
+    """Install the package into a folder as pip does, and return the environment of processes that see it."""
+    about = tomllib.loads((HERE / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    shutil.copytree(HERE / "laufruhe_example", folder / "laufruhe_example", dirs_exist_ok=True)
+    metadata = folder / f"laufruhe_example-{about['version']}.dist-info"
+    metadata.mkdir(parents=True)
+    named = f"Metadata-Version: 2.1\nName: {about['name']}\nVersion: {about['version']}\n"
+    (metadata / "METADATA").write_text(named, encoding="utf-8")
+    ((group, own),) = about["entry-points"].items()
+    lines = points or "\n".join(f"{name} = {value}" for name, value in own.items())
+    (metadata / "entry_points.txt").write_text(f"[{group}]\n{lines}\n", encoding="utf-8")
+    paths = [str(folder), os.environ.get("PYTHONPATH", "")]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in paths if path)}
+
+
+def laufruhe(environment: dict[str, str], *words: str | Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "laufruhe", *map(str, words)]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+@pytest.mark.slow
+def test_a_problem_of_a_package_is_checked_and_solved(tmp_path: Path) -> None:
+    """Pistons of an X on one throw shake with a vector of two reciprocating masses, which one weight balances."""
+    environment = installed(tmp_path / "site")
+    checked = laufruhe(environment, "check", PROBLEM)
+    assert checked.returncode == 0, checked.stderr
+    assert "4 cylinders" in checked.stdout
+    out, file = tmp_path / "out", tmp_path / "result.json"
+    solved = laufruhe(environment, "solve", PROBLEM, "--out", out, "--json", file)
+    assert solved.returncode == 0, solved.stderr
+    record = json.loads(file.read_text(encoding="utf-8"))
+    assert record["objective"]["name"] == "worst twentieth resultant mount force"
+    assert record["objective"]["initial"] == pytest.approx(SHAKING, rel=1e-9)
+    assert record["objective"]["value"] < 1e-6 * SHAKING
+    assert record["decisions"]["web.unbalance"]["value"] == pytest.approx(UNBALANCE, rel=1e-9)
+    # nothing is less than zero; no other bound is told of a norm that claims nothing
+    assert record["certificate"]["lower_bound"] == 0.0
+    assert "worst twentieth resultant mount force" in (out / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_a_study_of_a_package_runs(tmp_path: Path) -> None:
+    environment = installed(tmp_path / "site")
+    done = laufruhe(environment, "study", STUDY, "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / "percentiles.png").exists()
+    text = (tmp_path / "out" / "report.md").read_text(encoding="utf-8")
+    assert "what 90 % of the cycle does not exceed" in text
+    data = (tmp_path / "out" / "percentiles.csv").read_text(encoding="utf-8")
+    assert float(data.split(",")[-1]) == pytest.approx(SHAKING, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_without_the_package_its_words_are_refused() -> None:
+    refused = laufruhe(dict(os.environ), "check", PROBLEM)
+    assert refused.returncode == 2
+    assert "engine.layout" in refused.stderr + refused.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("points", "said"),
+    [
+        ("example = laufruhe_example:NOTHING", "laufruhe_example:NOTHING cannot be imported"),
+        ("example = json:dumps", "is no laufruhe.extension.Extension"),
+    ],
+)
+def test_a_broken_package_is_named_in_one_line(points: str, said: str, tmp_path: Path) -> None:
+    refused = laufruhe(installed(tmp_path / "site", points), "check", PROBLEM)
+    assert refused.returncode == 2
+    assert said in refused.stderr
+    assert "Traceback" not in refused.stderr
