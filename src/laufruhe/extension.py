@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal
 
 from laufruhe.errors import ModelError
 
 GROUP = "laufruhe.extensions"
 Tables = Literal["norms", "channels", "layouts", "study_kinds"]
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ def extensions() -> tuple[Extension, ...]:
     return tuple(found)
 
 
-def additions(table: Tables, kind: type[T], known: Container[str]) -> list[Any]:
+def additions(table: Tables, kind: Any, known: Container[str]) -> list[Any]:
     """Return the objects, or classes, of a kind that extensions add to a table.
 
     Parameters
