@@ -6,17 +6,21 @@ import tomllib
 from dataclasses import replace
 from pathlib import Path
 
+import casadi as ca
 import numpy as np
 import pytest
 from scipy.optimize import differential_evolution, minimize
 
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load
+from laufruhe.load_models.mount_symbols import symbolic_mounts
 from laufruhe.machine import Mount
 from laufruhe.machine.load_case import LoadCase
 from laufruhe.physics import mount_numbers
 from laufruhe.physics.elastic_mounts import elastic_mounting
+from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.static_cases import case_wrench, settled, stops_of
+from laufruhe.problem.channels import counted_cases, mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.box_cases import held_loads
@@ -24,6 +28,8 @@ from laufruhe.prove.mounts.box_numbers import UNDER
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
+from laufruhe.solvers.smooth.cases import StaticCases
+from laufruhe.solvers.smooth.gathered import Gathered
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 from mounts.powertrain import random_mounting
 from problem_files import PROBLEMS
@@ -178,6 +184,38 @@ def test_a_limit_beside_a_stop_is_met_and_proven() -> None:
     for limit in (bump, torque):
         assert limit.value == pytest.approx(limit.limit, rel=1e-5)
         assert limit.shadow_price > 1e3
+
+
+@pytest.mark.parametrize("gap", ["none", "narrow"])
+@pytest.mark.parametrize("name", ASKED)
+def test_the_program_settles_where_the_block_does(name: str, gap: str, tmp_path: Path) -> None:
+    """Its rows hold the length at each mount in each load case, with stops at a balance that its variables are in."""
+    problem = problem_of(tmp_path, ENGINE, AHEAD, GAPS[gap], CASES, ASKED[name])
+    measure, held, mounting = problem.objective[0].measure, Gathered(), mounting_in(problem.engine)
+    root, numbers = mass_root(mounting.block), ca.MX.sym("d", 2)
+    cases = StaticCases(symbolic_mounts(problem, mounting.block, numbers), mounting, root, held)
+    top = cases.largest(measure, problem.engine)
+    symbols = [symbol for symbol, _ in held.heads]
+    rows = ca.Function("rows", [numbers, *symbols], [top, *held.expressions])
+
+    stiffness = [3e5, 9e5]
+    engine = problem.design(stiffness)
+    asked = counted_cases(measure, engine)
+    found = [settled(elastic_mounting(engine.block, engine.mounts), case) for case in asked]
+    given = [settled(mounting, case).motion for case in asked]
+    motions = [np.linalg.solve(root.T, each.motion) for each in found]
+    sizes = [np.linalg.norm(np.linalg.solve(root.T, motion)) for motion in given]
+    balances = [motion / size for motion, size in zip(motions, sizes, strict=True)] if gap != "none" else []
+    unit, *unmet, squares = (np.asarray(v, dtype=float).ravel() for v in rows(stiffness, *balances, 1.0))
+
+    assert len(unmet) == len(balances)
+    for balance in unmet:
+        assert balance == pytest.approx(np.zeros(6), abs=1e-4)
+    signals = [each.force if name == "force" else each.travel for each in found]
+    counted = [signal[:1] if name == "of one" else signal for signal in signals]
+    weights = [0.0, 0.0, 1.0] if name == "along z" else [1.0, 1.0, 1.0]
+    lengths = np.linalg.norm(np.concatenate(counted) * weights, axis=1)
+    assert unit * np.sqrt(squares + 1.0) == pytest.approx(lengths, rel=1e-4)
 
 
 LIMIT = '[[constraints]]\nlimit = "static travel"\nmax = "9 mm"\n[search]\nstarts = 4\n'

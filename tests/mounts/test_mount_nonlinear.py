@@ -13,6 +13,7 @@ from scipy.optimize import check_grad
 from cli.scenes import SECOND_ORDER_SHAFTS
 from lanes import first_fast
 from laufruhe.files.reader import load
+from laufruhe.numerics.budget import limited
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
@@ -22,6 +23,8 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.mounts.nonlinear import mounts_bound, solve_joint, solve_mounts
+from laufruhe.solvers.mounts.search import MountSearch
+from laufruhe.solvers.mounts.starts import start_points
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.smooth.program import SmoothProgram
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, problem_of
@@ -95,6 +98,44 @@ def test_the_program_says_what_the_exact_model_says(measure, tmp_path):
         assert constraints[names == "kinetic-energy decoupling of bounce"][0] == pytest.approx(shares.max(), rel=1e-9)
         mass = exact.value(problem.load_limits[0].measure)
         assert constraints[names == "balancer mass"][0] * 0.5 == pytest.approx(mass, rel=1e-6)
+
+
+def test_unbalances_have_no_more_room_than_their_sets(tmp_path):
+    """A disc, a sector and a direction that is given: rows of the program are kept where size and angle are."""
+    shaft = """
+[[balancer_shafts]]
+name = "s{k}"
+ratio = 2
+position = ["100 mm", "-100 mm"]
+[[balancer_shafts.unbalances]]
+radius = "20 mm"
+unbalance = {{ between = ["0 kg m", "0.0{k} kg m"] }}
+angle = {angle}
+"""
+    angles = "{ between = [0, 360] }", "{ between = [-20, 70] }", "30"
+    shafts = [shaft.format(k=k + 1, angle=angle) for k, angle in enumerate(angles)]
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, *shafts, FORCE.format(measure="rms"))
+    joint = SmoothProgram(problem, 1.0)
+    program, names = joint.program, np.array(joint.program.constraint_names)
+    held = {d.name: names == d.name for d in problem.unbalances}
+    assert [int(rows.sum()) for rows in held.values()] == [1, 3, 0]
+    generator, inside = np.random.default_rng(3), []
+    mounts = [d.start for d in problem.mount_decisions]
+    told = ca.Function("g", [program.x, program.parameters], [program.constraints])
+    for _ in range(60):
+        size, angle = generator.uniform(0.0, 1.5, 2) * (0.01, 0.02), generator.uniform(-180.0, 180.0, 2)
+        u = size * np.exp(1j * np.radians(angle))
+        start = joint.start(mounts, np.array([u[0].real, u[0].imag, u[1].real, u[1].imag, 0.0]))
+        rows = np.asarray(told(start, 1e-3), dtype=float).ravel()
+        kept = (program.constraint_lower <= rows) & (rows <= program.constraint_upper)
+        disc, sector = (bool(kept[each].all()) for each in list(held.values())[:2])
+        assert disc == (size[0] <= 0.01)
+        assert sector == (size[1] <= 0.02 and -20.0 <= angle[1] <= 70.0)
+        inside.append((disc, sector))
+    assert {pair[1] for pair in inside} == {pair[0] for pair in inside} == {True, False}
+    # the size along a given direction is a variable between its own bounds
+    first = len(mounts) + 4
+    assert (program.lower[first], program.upper[first]) == pytest.approx((0.0, 0.03), abs=1e-15)
 
 
 def test_derivatives_agree_with_finite_differences(tmp_path):
@@ -288,6 +329,28 @@ def test_a_limit_that_is_left_out_at_first_comes_back_where_it_is_felt(tmp_path,
     assert wide.objective.value == pytest.approx(free.objective.value, rel=1e-6)
     assert wide.objective.value < 0.9 * felt.objective.value
     assert wide.limits[0].shadow_price == 0.0
+
+
+@pytest.mark.parametrize("starts", [1, 3])
+def test_a_search_has_as_many_starts_as_it_is_given(starts, tmp_path):
+    """The design as given first, every other one within its bounds; where time is over that design is what is told."""
+    objective = '[objective]\nminimise = "static sag"\n'
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, objective, f"[search]\nstarts = {starts}\n")
+    points, size = start_points(problem)
+    given = [d.start for d in problem.mount_decisions]
+    assert len(points) == starts
+    assert points[0][0] == given
+    drawn = np.array([mounts for mounts, _ in points])
+    assert len(np.unique(drawn, axis=0)) == starts
+    low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
+    assert np.all((low <= drawn) & (drawn <= high))
+    values = [objective_value(problem, evaluate(problem, problem.design(mounts))) for mounts, _ in points]
+    assert 0.0 < size <= min(values) * (1.0 + 1e-9)
+    search = MountSearch(problem, evaluate(problem))
+    with limited(0.0):
+        search.run()
+    assert list(search.best.design.values) == given
+    assert search.best.design.value == pytest.approx(values[0], rel=1e-12)
 
 
 def test_what_nothing_open_moves_is_a_number_of_the_program(tmp_path):

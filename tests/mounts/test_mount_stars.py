@@ -14,8 +14,11 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
+from laufruhe.solvers.conclusion import state
+from laufruhe.solvers.mounts.stars import _method
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.smooth.program import SmoothProgram
+from laufruhe.solvers.stars.design import StarDesign
 from mounts.files import BLOCK, MOUNTS, OPEN, SAG, changed, problem_of
 
 ENGINE = """
@@ -83,6 +86,17 @@ def test_stars_left_out_leave_no_bound(tmp_path):
     result = solve(problem_of(tmp_path, *parts(), "[phasing]\nbest = 1\n"))
     assert result.certificate.lower_bound == 0.0
     assert "the best of 3 on the mounts as given" in result.certificate.method
+
+
+def test_how_stars_were_decided_is_counted(tmp_path):
+    """Stars that stand, those of the ranking that were left out, and starts whose throws were moved."""
+    still = StarDesign(Candidate((0.0, math.pi)), state(problem_of(tmp_path, *parts(str(STARS[0])))))
+    moved = replace(still, moved=True)
+    each = "mounts and balance decided for each of"
+    assert _method([still], 1) == f"{each} 1 star"
+    assert _method([still] * 2, 7) == f"{each} 2 stars, the best of 7 on the mounts as given"
+    assert _method([still, moved, still, moved, moved], 2) == f"{each} 2 stars; throws moved from 3 starts"
+    assert _method([moved], 1) == "mounts, balance and throws decided; throws moved from 1 start"
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from laufruhe.numerics.norms import softened_lengths
 from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.workers import HERE, working_on
 from laufruhe.solvers.mounts.starts import spread_starts
+from laufruhe.solvers.smooth.ipopt import Task, _judged
 from laufruhe.solvers.smooth.local_optimum import Ending, distinct, ends_in_words, is_explored
 from laufruhe.solvers.smooth.nonlinear import NonlinearProgram, solve_nonlinear
 
@@ -83,6 +84,32 @@ def test_where_a_start_is_at_an_optimum_is_told_by_its_residual_not_by_the_solve
     assert cut.kkt_residual <= 1e-7
     assert cut.usable
     assert cut.x == pytest.approx(whole.x, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("gradient", "multiplier", "bounds", "constraint", "residual"),
+    [
+        # (-4 + 2 x 3, -2 + 3 - 1) = (2, 0) over the largest sum of sizes, 4 + 2 x 3
+        ((-4.0, -2.0), 3.0, (0.0, -1.0), 1.0, 0.2),
+        # a multiplier of 3 whose constraint is 0.8 away from its upper side
+        ((-6.0, -3.0), 3.0, (0.0, 0.0), 0.2, 3.0 * 0.8 / 12.0),
+        # a lower side, here none, can carry nothing
+        ((6.0, 3.0), -3.0, (0.0, 0.0), 0.2, 3.0 / 12.0),
+        # the second variable at 0.25 has a multiplier of its upper side, 0.75 away; sums under one count as one
+        ((0.0, -0.4), 0.0, (0.0, 0.4), 1.0, 0.4 * 0.75),
+        # what a limit is broken by counts as it is
+        ((-6.0, -3.0), 3.0, (0.0, 0.0), 1.7, 0.7),
+    ],
+)
+def test_the_residual_by_hand(gradient, multiplier, bounds, constraint, residual):
+    """Of f + 3 g at (0, 1/4), 0 <= y <= 1, whose one constraint has the slopes (2, 1) and no lower side (N2)."""
+    sides = np.array([0.0, 0.0]), np.array([1.0, 1.0]), np.array([-np.inf]), np.array([1.0])
+    task = Task("", *sides, np.ones(2), 1.0, ((),), 1, 1.0, False)
+    point, slopes = np.array([0.0, 0.25]), np.array([[2.0, 1.0]])
+    numbers = (np.array(v, ndmin=1) for v in (constraint, gradient))
+    told, violation = _judged(task, point, *numbers, slopes, np.array([multiplier]), np.array(bounds))
+    assert told == pytest.approx(residual, rel=1e-12)
+    assert violation == pytest.approx(max(constraint - 1.0, 0.0), rel=1e-12)
 
 
 def test_the_residual_is_not_small_away_from_an_optimum():

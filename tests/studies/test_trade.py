@@ -20,8 +20,8 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report.trade import INDEX, choices, index, trade_document
-from laufruhe.solvers.conclusion import values_of
-from laufruhe.solvers.nearby import first_of, next_to
+from laufruhe.solvers.conclusion import state, values_of
+from laufruhe.solvers.nearby import _is_like, first_of, next_to
 from laufruhe.solvers.result import Status
 from laufruhe.studies.trade import Row, Trade, trade
 from problem_files import PROBLEMS
@@ -64,6 +64,17 @@ def test_a_cheap_model_may_take_another_star() -> None:
     found = _worth(problem, next_to(problem.at(cheap), known))
     assert found == pytest.approx(_worth(problem, whole.final.engine), rel=1e-6)
     assert found > 1.1 * _worth(problem, known.final.engine)
+
+
+def test_a_design_known_is_trusted_where_it_is_worth_about_the_same() -> None:
+    """Its force goes with the square of the speed: 1.04 of it is 1.08 of the force, 1.1 of it 1.21."""
+    problem = scenes.problem_of(scenes.TIGHT)
+    known = state(replace(problem, decisions=()))
+    (point,) = problem.points
+    for factor, is_like in ((1.0, True), (1.04, True), (0.96, True), (1.1, False), (0.9, False)):
+        faster = replace(problem, points=(replace(point, speed=factor * point.speed),))
+        assert _is_like(faster, known) is is_like
+    assert not _is_like(problem, replace(known, objective=None))
 
 
 @pytest.mark.slow
