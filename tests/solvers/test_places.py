@@ -19,6 +19,8 @@ from laufruhe.numerics.workers import HERE, working_on
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
+from laufruhe.solvers.boxes.places import _Box, _Search
+from laufruhe.solvers.conclusion import judged
 from laufruhe.studies.trade import trade
 from problem_files import READY
 
@@ -273,6 +275,54 @@ def test_limits_on_distances_hold_and_are_proven(case: str, tmp_path: Path) -> N
     searched = _searched(problem, 5, 4 * bound.final.samples, 3, 1e4)
     assert bound.certificate.lower_bound <= searched * (1.0 + 1e-6)
     assert bound.objective.value <= searched * (1.0 + 2e-3)
+
+
+@pytest.mark.parametrize("side", [0, 1])
+def test_a_box_is_cut_where_its_program_leaves_most_out(side: int, tmp_path: Path) -> None:
+    """Its halves cover it, each with the best design in its middle, where one may be better than what is known."""
+    problem = _problem(tmp_path, _enveloped("", 1) + "[fidelity]\nsamples = 72\n")
+    search = _Search(problem)
+    lower, upper = search.bounds
+    middle = np.array([0.03, -0.02])
+    box = _Box(lower, upper, 0.0, middle, np.where(np.arange(2) == side, 0.02, 0.01))
+    halves = list(search.parts(box, np.inf))
+    (low, _), (high, _) = halves
+    assert isinstance(low, _Box)
+    assert isinstance(high, _Box)
+    cut = np.where(np.arange(2) == side, middle, upper)
+    assert np.array_equal((low.lower, low.upper), (lower, cut))
+    assert np.array_equal((high.lower, high.upper), (np.where(np.arange(2) == side, middle, lower), upper))
+    for half, found in halves:
+        assert isinstance(half, _Box)
+        assert found is not None
+        engine, samples = problem.design(half.middle.tolist()), found.design.evaluation.samples
+        assert found.value == pytest.approx(objective_value(problem, evaluate(problem, engine, samples)), rel=1e-12)
+        assert half.bound <= objective_value(problem, evaluate(problem, engine, 5760)) * (1.0 + 1e-9)
+    assert [found for _, found in search.parts(box, 0.0)] == [None, None]
+
+
+@pytest.mark.parametrize("low", [-150, -90], ids=["about the crank", "beside it"])
+@pytest.mark.parametrize(
+    "limit",
+    ['limit = "shaft distance"\nmax = "60 mm"', 'limit = "envelope radius"\nmax = "90 mm"'],
+    ids=["distance", "envelope"],
+)
+def test_a_limit_on_a_distance_costs_what_its_shaft_would_gain(limit: str, low: float, tmp_path: Path) -> None:
+    """On a shaft over the crank: the slope of the objective over its height, by the exact model."""
+    shaft = _shaft(ratio="-2", z=_between(low, 150), unbalance='"0.01 kg m"')
+    problem = _problem(tmp_path, _engine([0, 180, 180, 0], load="roll moment") + shaft + f"[[constraints]]\n{limit}\n")
+
+    def value(z: float) -> float:
+        return objective_value(problem, evaluate(problem, problem.design([z])))
+
+    slope = {z: (value(z + 1e-5) - value(z - 1e-5)) / 2e-5 for z in (0.06, -0.06)}
+    z = min(slope, key=lambda z: slope[z] * z)
+    assert slope[z] * z < 0.0
+    prices = _Search(problem).prices(judged(problem, [z]))
+    assert list(prices) == [(problem.limits[0], "at most")]
+    (price,) = prices.values()
+    assert price.relaxed == pytest.approx(abs(slope[z]), rel=1e-3)
+    assert price.tightened == pytest.approx(price.relaxed, rel=1e-9)
 
 
 def test_distances_by_hand(tmp_path: Path) -> None:
