@@ -170,6 +170,17 @@ def solved(tmp_path_factory):
     return problem, solve(problem)
 
 
+def test_what_is_convex_in_a_sum_is_bounded_by_its_own_optimum(tmp_path):
+    """The sag is least on the stiffest springs, whatever the force beside it is; the force alone has no such bound."""
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE.format(measure="rms"), "[fidelity]\nsamples = 72\n")
+    sag = Term(Measure(channels.SAG), 200.0)
+    stiffest = problem.design([d.upper for d in problem.decisions])
+    least = 200.0 * evaluate(problem, stiffest).value(sag.measure)
+    bound = mounts_bound(replace(problem, objective=(*problem.objective, sag)))
+    assert least * (1.0 - 1e-4) <= bound <= least * (1.0 + 1e-12)
+    assert mounts_bound(problem) == 0.0
+
+
 @pytest.mark.slow
 def test_forces_beside_other_terms_are_bounded_by_themselves(tmp_path):
     """A sum of forces of mounts, of the block and of stiffness is not under what each of them is at least."""

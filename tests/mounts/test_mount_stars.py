@@ -12,10 +12,10 @@ import pytest
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
-from laufruhe.prove.certificate import Proof
+from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import state
-from laufruhe.solvers.mounts.stars import _method
+from laufruhe.solvers.mounts.stars import _bounded, _method
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.smooth.program import SmoothProgram
 from laufruhe.solvers.stars.design import StarDesign
@@ -97,6 +97,30 @@ def test_how_stars_were_decided_is_counted(tmp_path):
     assert _method([still] * 2, 7) == f"{each} 2 stars, the best of 7 on the mounts as given"
     assert _method([still, moved, still, moved, moved], 2) == f"{each} 2 stars; throws moved from 3 starts"
     assert _method([moved], 1) == "mounts, balance and throws decided; throws moved from 1 start"
+
+
+def test_every_star_keeps_its_own_design_when_it_is_bounded(tmp_path, monkeypatch):
+    """The first with what is worth proving of all, the others no further than it; none where one was left out."""
+    asked = []
+
+    def bounded(result, value, enough=math.inf, of_many=False):
+        asked.append((value, enough, of_many))
+        bound = 0.9 * result.objective.value
+        return replace(result, certificate=Certificate(Proof.GLOBAL, bound, 0.1, 0.0, "a bound"))
+
+    monkeypatch.setattr("laufruhe.solvers.mounts.stars.bounded_under", bounded)
+    phasing = problem_of(tmp_path, *parts()).phasing
+    found = [
+        StarDesign(Candidate(tuple(map(math.radians, star))), state(problem_of(tmp_path, *parts(str(star)))))
+        for star in STARS
+    ]
+    found.sort(key=lambda star: star.value)
+    out = _bounded(found, phasing, len(found))
+    assert [star.candidate for star in out] == [star.candidate for star in found]
+    assert [star.bound for star in out] == pytest.approx([0.9 * star.value for star in found])
+    least = found[0].value
+    assert asked == [(least, math.inf, True), *[(least, 0.9 * least, False)] * 2]
+    assert _bounded(found, phasing, len(found) + 1) is found
 
 
 @pytest.mark.slow

@@ -14,9 +14,11 @@ from laufruhe.errors import InputError, ModelError
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.machine import Flywheel, Rim
 from laufruhe.physics.irregularity import irregularity
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Status
+from laufruhe.solvers.boxes.flywheel import _Coordinates
 from problem_files import PROBLEMS, changed, loaded
 
 SINGLE = """
@@ -115,6 +117,36 @@ def test_a_rim_is_the_best_of_a_grid(tmp_path: Path) -> None:
     assert result.certificate.lower_bound <= best
     assert result.objective.value <= best
     assert best <= 1.02 * result.objective.value
+
+
+def test_boxes_of_a_rim_are_of_its_mass_in_place_of_its_width(tmp_path: Path) -> None:
+    """A rim of mean diameter D, width w and height h weighs pi rho D w h; every point is one flywheel, and back."""
+    limits = '[[constraints]]\nlimit = "rim stress"\nmax = "18 N/mm^2"\n'
+    least = changed(LEAST, "flywheel inertia", "flywheel mass")
+    problem = loaded(tmp_path, changed(SINGLE, "samples = 360", "samples = 72") + RIM + least + limits)
+    initial = evaluate(problem)
+    boxes, whole = (_Coordinates.of(problem, weighs) for weighs in (True, False))
+    by_mass, by_width = (each.asked(initial, problem.limits) for each in (boxes, whole))
+    assert problem.engine.flywheel is not None
+    rho = problem.engine.flywheel.ring.density
+    names = [decision.name.removeprefix("flywheel.") for decision in problem.decisions]
+    lower, upper = boxes.bounds
+    ends = [np.pi * rho * np.prod(sides) for sides in (lower, upper)]
+    assert (by_mass.lower[-1], by_mass.upper[-1]) == pytest.approx(ends)
+    # both sides of the width are limits then
+    assert len(by_mass.limits) == len(by_width.limits) + 2
+    for share in np.random.default_rng(2).random((3, 3)):
+        values = lower + share * (upper - lower)
+        point = boxes.place(values.tolist())
+        assert point[-1] == pytest.approx(np.pi * rho * np.prod(values), rel=1e-12)
+        assert point[:-1] == pytest.approx([x for x, name in zip(values, names, strict=True) if name != "width"])
+        assert boxes.decided(point) == pytest.approx(values, rel=1e-12)
+        assert by_mass.value(point) == pytest.approx(by_width.value(values), rel=1e-12)
+        (width,) = (x for x, name in zip(values, names, strict=True) if name == "width")
+        told = [number.value(point) for _, number in by_mass.limits]
+        assert told == pytest.approx([*(number.value(values) for _, number in by_width.limits), width, -width])
+    alone = loaded(tmp_path, SINGLE + INERTIA + LEAST)
+    assert _Coordinates.of(alone, True).width is None
 
 
 @pytest.mark.slow
