@@ -1,4 +1,4 @@
-"""Packages of users: what they add to the tables of norms, channels, layouts and study kinds.
+"""Packages of users: what they add to the tables of norms, channels, layouts, quantities and study kinds.
 
 An installed package names an `Extension` as an entry point of the group `laufruhe.extensions`. Its objects are imported
 when the table that they belong to is made, so that each of their modules imports no more than the room of that table.
@@ -16,7 +16,7 @@ from typing import Any, Literal
 from laufruhe.errors import ModelError
 
 GROUP = "laufruhe.extensions"
-Tables = Literal["norms", "channels", "layouts", "study_kinds"]
+Tables = Literal["norms", "channels", "layouts", "quantities", "study_kinds"]
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,8 @@ class Extension:
         every bound, and decided locally.
     layouts
         Objects of `laufruhe.machine.layouts.LayoutKind`.
+    quantities
+        Objects of `laufruhe.files.quantities.Quantity`: decisions that several numbers of the file follow.
     study_kinds
         Subclasses of `laufruhe.studies.part.Part`.
     """
@@ -45,6 +47,7 @@ class Extension:
     channels: tuple[str, ...] = ()
     dependences: tuple[str, ...] = ()
     layouts: tuple[str, ...] = ()
+    quantities: tuple[str, ...] = ()
     study_kinds: tuple[str, ...] = ()
 
 

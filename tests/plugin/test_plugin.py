@@ -1,4 +1,4 @@
-"""A package from outside that is installed adds a norm, a channel, a layout and a study kind to every command."""
+"""An installed package adds a norm, a channel, a layout, a decision and a study kind to every command."""
 
 from __future__ import annotations
 
@@ -59,6 +59,22 @@ def test_a_problem_of_a_package_is_checked_and_solved(tmp_path: Path) -> None:
     # nothing is less than zero; no other bound is told of a norm that claims nothing
     assert record["certificate"]["lower_bound"] == 0.0
     assert "worst twentieth resultant mount force" in (out / "report.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_a_decision_of_a_package_is_decided(tmp_path: Path) -> None:
+    """The weight given balances a crank radius of 45 mm."""
+    text = PROBLEM.read_text(encoding="utf-8").replace('{ between = ["0 kg m", "0.3 kg m"] }', f'"{UNBALANCE} kg m"')
+    text += '\n[quantities]\ncrank_radius = { between = ["40 mm", "50 mm"], start = "41 mm" }\n'
+    (tmp_path / "radius.toml").write_text(text, encoding="utf-8")
+    file = tmp_path / "result.json"
+    solved = laufruhe(
+        installed(tmp_path / "site"), "solve", tmp_path / "radius.toml", "--no-plots", "--out", tmp_path / "out",
+        "--json", file,
+    )  # fmt: skip
+    assert solved.returncode == 0, solved.stderr
+    record = json.loads(file.read_text(encoding="utf-8"))
+    assert record["decisions"]["quantities.crank_radius"]["value"] == pytest.approx(0.045, rel=1e-4)
 
 
 @pytest.mark.slow

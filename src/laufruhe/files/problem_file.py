@@ -21,6 +21,7 @@ from laufruhe.files.load_cases import LoadCaseTable
 from laufruhe.files.mounts import BlockTable, MountsTable
 from laufruhe.files.operating_points import OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
+from laufruhe.files.quantities import QuantitiesTable
 from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
 from laufruhe.files.run_up import RunUpTable
 from laufruhe.files.running_gear import RunningGearTable
@@ -53,6 +54,7 @@ class ProblemFile(Table):
     assumptions: list[str] = Field(default_factory=list)
     tolerance: f.Tolerance = f.told("Relative gap at which an optimum counts as proven.", 1e-4)
     engine: EngineTable
+    quantities: QuantitiesTable | None = None
     phasing: PhasingTable | None = None
     operating_points: list[OperatingPointTable] = Field(min_length=1)
     gas: GasTable | None = None

@@ -36,6 +36,7 @@ from laufruhe.files.open_parts import check_factors, leads_of, piston_masses
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
 from laufruhe.files.problem_file import ProblemFile
+from laufruhe.files.quantities import followed
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.run_up import run_of
 from laufruhe.files.running_gear import size_decisions, weighed
@@ -97,7 +98,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
         with in_file(path):
             plain, written = parted(tables)
             closed, numbers = without_open(plain)
-            file = ProblemFile.model_validate(closed)
+            file = ProblemFile.model_validate(followed(closed))
             problem = _of_file(file, path)
 
             def finished(own: Problem, candidate: Candidate | None) -> Problem:
@@ -200,7 +201,7 @@ class _Rebuilt:
     def __call__(self, changes: Mapping[Place, str | float]) -> Drawing:
         """As built."""
         try:
-            found = _of_file(ProblemFile.model_validate(with_numbers(self._plainly, changes)), self.path)
+            found = _of_file(ProblemFile.model_validate(followed(with_numbers(self._plainly, changes))), self.path)
             if self.candidate is not None and found.phasing is not None:
                 found = found.phasing.realise(self.candidate)
         except (ValidationError, Refused, ModelError) as error:
