@@ -60,7 +60,7 @@ study: $(STAMP)
 
 # A process for every core, one thread in each. Compiled modules are kept: every process, and every command that a test
 # starts, would compile all of them again.
-test test-fast test-long test-lowest lanes: export OMP_NUM_THREADS = 1
+docs test test-fast test-long test-lowest lanes: export OMP_NUM_THREADS = 1
 test test-fast test-long test-lowest lanes: export PYTHONDONTWRITEBYTECODE =
 
 test: $(STAMP)
