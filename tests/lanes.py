@@ -1,4 +1,4 @@
-"""What the lanes take of many: the fast one the first few, the usual one what is quick, `make test-long` the rest."""
+"""What the lanes take of many: the fast one the first few, the usual one some more, `make test-long` the rest."""
 
 from __future__ import annotations
 
@@ -9,17 +9,20 @@ from typing import Any
 import pytest
 
 
-def first_fast(values: Iterable[Any], fast: int, long: Collection[Any] = ()) -> list[Any]:
-    """Parameters of a test, of which all but the first few are slow; a tuple is several of one case.
+def first_fast(values: Iterable[Any], fast: int, usual: int | None = None, long: Collection[Any] = ()) -> list[Any]:
+    """Return parameters of a test, of which all but the first few are slow; a tuple is several of one case.
 
-    Of random families those named `long` take seconds each and guard no defect that is known;
-    `make test-long` runs them.
+    Of a random family the first `usual` alone run in `make test`, as do all that `long` does not name where each stands
+    for something of its own; `make test-long` runs the rest.
     """
     cases = [(value, value if isinstance(value, tuple) else (value,)) for value in values]
     left_out = [marked for marked in long if marked not in [value for value, _ in cases]]
     assert not left_out, f"no such case: {left_out}"
+    last = len(cases) if usual is None else usual
     return [
-        pytest.param(*case, marks=pytest.mark.long if value in long else pytest.mark.slow if k >= fast else ())
+        pytest.param(
+            *case, marks=pytest.mark.long if k >= last or value in long else pytest.mark.slow if k >= fast else ()
+        )
         for k, (value, case) in enumerate(cases)
     ]
 

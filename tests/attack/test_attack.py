@@ -35,7 +35,8 @@ SEEDS = {
 MORE = {
     ("inline", 4), ("points", 3), ("stars", 4), ("open-vees", 9), ("open-vees", 11), ("elastic-balance", 2),
     ("uneven", 2), ("leads", 25), ("bank angle", 3), ("gas", 0), ("crankcase", 0), ("boxer", 0), ("rotary", 8),
-    ("open-vees", 1), ("sizes", 100013), ("uneven crankcase", 1101),
+    ("open-vees", 1), ("sizes", 100013), ("uneven crankcase", 1101), ("vee", 3), ("radial", 5), ("parts", 5),
+    ("yokes", 4), ("chambers", 5), ("worst means", 2), ("convex-mounts", 1),
 }  # fmt: skip
 """Costly ones, of families that keep another."""
 DRAWN = [(family, seed) for family, seeds in SEEDS.items() for seed in seeds]

@@ -103,6 +103,7 @@ minimise = "rms mount force"
 [fidelity]
 samples = 48
 [robust]
+engines = 200
 """
     + MOUNTS
     + shaft("left", 2, "60 mm", 'unbalance = { between = ["0 kg m", "0.05 kg m"] }\nradius = "20 mm"\nangle = 180')

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import laufruhe
+from lanes import first_fast
 from laufruhe.machine import Absorber, Disc, Section, Torsion
 from laufruhe.physics.torsion import critical_modes, natural_modes
 from laufruhe.problem.evaluation import evaluate
@@ -67,8 +68,7 @@ def crankshaft(rng: np.random.Generator) -> Torsion:
     return Torsion(discs, sections, tuple(hung))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", first_fast(range(6), 0, 2))
 def test_an_order_meets_modes_where_the_determinant_vanishes(seed: int) -> None:
     """Below, above and far from the orders that pendulums are tuned to."""
     chain = crankshaft(np.random.default_rng(seed))

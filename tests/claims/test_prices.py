@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import laufruhe
+from lanes import first_fast
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.json_result import as_dict
 from laufruhe.solvers.prices import Price, Slopes, prices_of
@@ -136,8 +137,7 @@ def random_problem(rng: np.random.Generator) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [*range(12), 134, 140, 145])
+@pytest.mark.parametrize("seed", first_fast([134, 140, 145, *range(12)], 0, 7))
 def test_prices_are_the_slopes_of_problems_solved_again(seed: int) -> None:
     """Every bound and limit that holds an optimum, moved by a little both ways."""
     table = random_problem(np.random.default_rng(seed))

@@ -38,7 +38,7 @@ def _errors(seed: int, gas: bool | None = None, truth_samples: int = 5760) -> tu
     return abs(value - truth) / value if value else 0.0, error_bound(own, found, reference(own)), own.fidelity
 
 
-@pytest.mark.parametrize("seed", first_fast(range(QUICK), 30, long=range(40, QUICK)))
+@pytest.mark.parametrize("seed", first_fast(range(QUICK), 30, 34))
 def test_estimate_is_not_below_the_error(seed: int) -> None:
     # steps that are no multiple of the reference's, so that both can be wrong in their own way
     true, stated, fidelity = _errors(seed, truth_samples=7001)
@@ -53,7 +53,7 @@ def test_estimate_is_not_idle() -> None:
 
 
 @pytest.mark.validation
-@pytest.mark.parametrize(("first", "count"), first_fast(SHARES, 0, long=SHARES[1:]))
+@pytest.mark.parametrize(("first", "count"), first_fast(SHARES, 0, 1))
 def test_estimate_on_ten_thousand_engines(first: int, count: int) -> None:
     """Nothing is below without gas; with it one in a thousand: where its bends fall between steps is chance."""
     found = {seed: _excess(seed) for seed in range(first, first + count)}
@@ -73,7 +73,7 @@ def _excess(seed: int) -> tuple[float, bool]:
     return (abs(value - truth) / value if value else 0.0) - error_bound(own, found, best), has_gas
 
 
-@pytest.mark.parametrize("seed", first_fast(range(AUTOMATIC), 6, long=range(12, AUTOMATIC)))
+@pytest.mark.parametrize("seed", first_fast(range(AUTOMATIC), 6, 8))
 def test_automatic_choice_keeps_its_word(seed: int) -> None:
     problem = random_problem(random.Random(5000 + seed))
     choice = choose(problem, 1e-2)

@@ -35,7 +35,7 @@ def _scene(make, seed: int) -> Problem:
 
 
 @pytest.mark.parametrize("make", [random_problem, random_elastic_problem])
-@pytest.mark.parametrize("seed", first_fast(range(30), 6, long=range(8, 30)))
+@pytest.mark.parametrize("seed", first_fast(range(30), 6, 7))
 def test_estimate_is_not_below_the_error(make, seed: int) -> None:
     rng, problem = random.Random(seed), _scene(make, seed)
     fidelity = Fidelity(samples=rng.choice([96, 360, 720]), gas_orders=rng.choice([1, 2, 4, 8, 12, 24]))
@@ -49,7 +49,7 @@ def test_estimate_is_not_below_the_error(make, seed: int) -> None:
 
 
 @pytest.mark.parametrize("make", [random_problem, random_elastic_problem])
-@pytest.mark.parametrize("seed", first_fast(range(8), 3))
+@pytest.mark.parametrize("seed", first_fast(range(8), 3, 4))
 @pytest.mark.parametrize("crank_inertia", [math.inf, 50.0])
 def test_many_orders_are_every_order(make, seed: int, crank_inertia: float) -> None:
     whole = replace(_scene(make, seed), fidelity=Fidelity(samples=360, crank_inertia=crank_inertia))
@@ -57,7 +57,7 @@ def test_many_orders_are_every_order(make, seed: int, crank_inertia: float) -> N
     assert objective_value(cut, evaluate(cut)) == objective_value(whole, evaluate(whole))
 
 
-@pytest.mark.parametrize("seed", first_fast(range(8), 3))
+@pytest.mark.parametrize("seed", first_fast(range(8), 3, 4))
 @pytest.mark.parametrize("last", [1, 3, 12])
 def test_gas_alone_is_cut(seed: int, last: int) -> None:
     problem = _scene(random_problem, seed)

@@ -16,7 +16,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.accuracy import error_of
 
-SEEDS = first_fast(range(60), 8, long=range(24, 60))
+SEEDS = first_fast(range(60), 8, 13)
 POWERS = {channels.MOUNT_FORCE: 1, channels.SHAKING_FORCE: 1, channels.ROLL_MOMENT: 2, channels.ROCKING_COUPLE: 2}
 """Of length beside mass over time squared, in what a channel measures."""
 
@@ -85,7 +85,7 @@ def test_direction_of_time(seed: int) -> None:
     _same(_changed(problem, parts, rotors, mounts), problem)
 
 
-@pytest.mark.parametrize("seed", first_fast(range(60), 8, long=range(8, 60)))
+@pytest.mark.parametrize("seed", first_fast(range(60), 8, 8))
 @pytest.mark.parametrize(
     ("mass", "length", "time"),
     [(1e6, 1.0, 1.0), (1e-6, 1.0, 1.0), (1.0, 1e6, 1.0), (1.0, 1e-6, 1.0), (1.0, 1.0, 1e6), (1.0, 1.0, 1e-6),

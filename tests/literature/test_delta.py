@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -12,25 +11,19 @@ import pytest
 
 import moving_masses as mm
 from laufruhe.errors import InputError
-from laufruhe.files.reader import load
 from laufruhe.machine import Engine
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.prove.certificate import Proof
-from laufruhe.solvers import solve
-from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.result import Status
 from problem_files import PROBLEMS, changed, loaded
+from ready import solved
 
 ROW = (PROBLEMS / "deltic-row.toml").read_text(encoding="utf-8")
 RADIUS, ROD, PISTON, SIDE, SPEED = 0.092, 0.368, 6.0, 1.1, 2000.0 * np.pi / 30.0
 ONE = PISTON * RADIUS * SPEED**2
 HEIGHT = math.sqrt(0.75) * SIDE
 CORNERS = {"crankshaft": 0j, "left crankshaft": HEIGHT + 0.5j * SIDE, "right crankshaft": HEIGHT - 0.5j * SIDE}
-
-
-@cache
-def solved(name: str) -> Result:
-    return solve(load(PROBLEMS / f"{name}.toml"))
 
 
 def masses_of(engine: Engine) -> list[mm.Mass]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -15,15 +14,9 @@ from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.result import Result
 from one_cylinder import cylinder_pressure
 from problem_files import PROBLEMS, changed, loaded
-
-
-@cache
-def solved(name: str) -> Result:
-    return solve(load(PROBLEMS / f"{name}.toml"))
-
+from ready import solved
 
 TWIN = (PROBLEMS / "geared-twin.toml").read_text(encoding="utf-8")
 RADIUS, ROD, PISTON, PIN, SPEED = 0.04, 0.04 / 0.2857, 0.6, 0.8, 100.0 * np.pi

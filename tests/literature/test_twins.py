@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import tomllib
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -26,9 +25,8 @@ ComplexArray = NDArray[np.complex128]
 TWINS = ["parallel-360", "parallel-180", "parallel-270", "vee-open", "vee-offset-pins", "boxer"]
 
 
-@cache
 def _solved(name: str) -> Result:
-    return solve(load(PROBLEMS / f"twin-{name}.toml"))
+    return solved(f"twin-{name}")
 
 
 def _shares(result: Result, order: int, columns: tuple[int, int]) -> tuple[float, float]:

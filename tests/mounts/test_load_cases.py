@@ -34,6 +34,7 @@ from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 from mounts.powertrain import random_mounting
 from problem_files import PROBLEMS
 from prove.test_subdivision import boxes
+from ready import solved
 
 TORQUE = LoadCase("torque", moment=(180.0, 0.0, 0.0), force=(0.0, 300.0, -50.0), place=(0.3, -0.1, 0.2))
 BUMP = LoadCase("bump", times_weight=(0.2, -0.5, -3.0))
@@ -178,7 +179,7 @@ def test_joined_and_hydraulic_mounts_with_stops_are_bounded_too(name: str, asked
 @pytest.mark.slow
 def test_a_limit_beside_a_stop_is_met_and_proven() -> None:
     """The bump of the powertrain meets its stops, full torque a limit of its own: prices of both close the boxes."""
-    result = solve(load(PROBLEMS / "powertrain-load-cases.toml"))
+    result = solved("powertrain-load-cases")
     assert result.certificate.kind is Proof.GLOBAL
     bump, torque = (next(limit for limit in result.limits if name in limit.name) for name in ("bump", "full torque"))
     for limit in (bump, torque):

@@ -8,8 +8,8 @@ from laufruhe.files.reader import load
 from laufruhe.plots.results import campbell, modes
 from laufruhe.present.mounting import at_which_stiffness, facts_of
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.solvers import solve
 from problem_files import PROBLEMS
+from ready import solved
 
 
 @pytest.mark.parametrize(("name", "depends"), [("powertrain-hydraulic", True), ("powertrain-decoupling", False)])
@@ -20,7 +20,7 @@ def test_a_sentence_is_said_of_mounts_that_depend_on_frequency_alone(name: str, 
 
 @pytest.mark.slow
 def test_both_pictures_of_modes_say_it_and_block_and_fluid_are_drawn() -> None:
-    result = solve(load(PROBLEMS / "powertrain-hydraulic.toml"))
+    result = solved("powertrain-hydraulic")
     for module in (campbell, modes):
         drawn = module.figure(result)
         words = " ".join(" ".join(text.get_text().split()) for text in drawn.texts)

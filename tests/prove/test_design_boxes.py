@@ -194,7 +194,7 @@ def test_the_least_over_unbalances_is_that_of_their_sets() -> None:
         assert boxes.least(slopes, near) == pytest.approx(least, rel=0.02, abs=0.02)
 
 
-@pytest.mark.parametrize("seed", first_fast(SEEDS[:6], 2))
+@pytest.mark.parametrize("seed", first_fast(SEEDS[:6], 0, 2))
 def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
     problem, generator = joint(seed), np.random.default_rng(seed)
     boxes, told = DesignBoxes(problem, math.inf, best_at, lambda *_: math.inf), 0
@@ -225,9 +225,9 @@ CROSSED = {
 }
 
 
-@pytest.mark.parametrize(("kind", "seed"), first_fast([(kind, seed) for kind in CROSSED for seed in SEEDS[1:2]], 1))
-def test_what_is_asked_may_be_crossed(kind: str, seed: int) -> None:
-    table, rng = random_problem("joint", seed)
+@pytest.mark.parametrize("kind", first_fast(CROSSED, 0))
+def test_what_is_asked_may_be_crossed(kind: str) -> None:
+    table, rng = random_problem("joint", 780004)
     terms, limits = CROSSED[kind]
     table["objective"] = objective([{"quantity": name, "weight": weight} for name, weight in terms])
     table["constraints"] = [{"limit": name, "max": most} for name, most in limits]
@@ -236,7 +236,7 @@ def test_what_is_asked_may_be_crossed(kind: str, seed: int) -> None:
     problem = laufruhe.load(table)
     assert mixes_corners(problem)
     boxes, told = DesignBoxes(problem, math.inf, best_at, lambda *_: math.inf), 0
-    for lower, upper in boxes_of(problem, rng, 3, 0.05):
+    for lower, upper in boxes_of(problem, rng, 1, 0.05):
         bound = float(boxes.bounds(lower[None], upper[None])[0][0])
         for mounts in rng.uniform(lower, upper, (4, len(lower))):
             at = boxes.loads.at(mounts)
@@ -251,7 +251,7 @@ def test_what_is_asked_may_be_crossed(kind: str, seed: int) -> None:
     assert told
 
 
-@pytest.mark.parametrize("seed", first_fast((780000, 780002, 780021, 780054), 2))
+@pytest.mark.parametrize("seed", first_fast((780000, 780002, 780021, 780054), 2, 3))
 def test_limits_at_rest_are_over_zero_only_where_they_break(seed: int) -> None:
     problem, generator = joint(seed), np.random.default_rng(seed)
     rest, near = RestLimits(problem), 0
@@ -274,7 +274,7 @@ def test_a_price_lifts_the_least_as_far_as_a_limit_allows() -> None:
     assert priced(values, [-np.abs(over)]).min() == 1.0
 
 
-@pytest.mark.parametrize("seed", first_fast((780003, 780018, 780014, 780004, 780017), 3))
+@pytest.mark.parametrize("seed", first_fast((780003, 780018, 780014, 780004, 780017), 0, 3))
 def test_boxes_close_on_the_best_design(seed: int) -> None:
     problem = joint(seed)
     assert mixes_corners(problem)

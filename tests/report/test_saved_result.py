@@ -15,7 +15,6 @@ from cli import scenes
 from laufruhe.present.measures import limits_of
 from laufruhe.report.json_result import as_json
 from laufruhe.solvers import Result
-from problem_files import PROBLEMS
 from ready import solved
 from report.test_json_result import RESULTS
 
@@ -63,7 +62,7 @@ def test_a_ready_problem_is_read_back(name: str, tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_what_was_decided_goes_into_the_problem_again(tmp_path: Path) -> None:
-    result = laufruhe.solve(PROBLEMS / "tractor-single.toml")
+    result = solved("tractor-single")
     again = result.problem.with_values(saved(result, tmp_path).values)
     assert result.objective is not None
     assert laufruhe.evaluate(again).objective.value == pytest.approx(result.objective.value, rel=1e-5)  # type: ignore[union-attr]

@@ -18,6 +18,7 @@ from laufruhe.server.answers import Source
 from laufruhe.server.asked import Asked, Edit
 from laufruhe.solvers.result import Status
 from problem_files import PROBLEMS
+from ready import solved
 
 LANCHESTER, VEE = PROBLEMS / "tractor-four-lanchester.toml", PROBLEMS / "vee-eight-open.toml"
 TIGHT = Edit("set", "constraints.1.max", "0.5 kg")
@@ -88,7 +89,7 @@ def test_what_is_left_out_while_sliders_move_is_said(name: str, kind: str, words
 
 
 def test_a_design_that_breaks_a_limit_is_no_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
-    result = laufruhe.solve(PROBLEMS / "tractor-single.toml")
+    result = solved("tractor-single")
     broken = replace(result, status=Status.FAILED, message="the best design found breaks 'sag'")
     monkeypatch.setattr(answers, "solve", lambda *_, **__: broken)
     found = settle(PROBLEMS / "tractor-single.toml")

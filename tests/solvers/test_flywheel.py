@@ -20,6 +20,7 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Status
 from laufruhe.solvers.boxes.flywheel import _Coordinates
 from problem_files import PROBLEMS, changed, loaded
+from ready import solved
 
 SINGLE = """
 title = "Single"
@@ -67,7 +68,7 @@ operating_points = ["rated"]
 
 @pytest.fixture(scope="module")
 def diesel() -> laufruhe.solvers.Result:
-    return laufruhe.solve(laufruhe.load(PROBLEMS / "diesel-70-hp-flywheel.toml"))
+    return solved("diesel-70-hp-flywheel")
 
 
 def proven(problem: Problem) -> laufruhe.solvers.Result:

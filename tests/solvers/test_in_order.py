@@ -6,7 +6,6 @@ counter shaft that share the first order between them.
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +19,10 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.sections import tables_of
 from laufruhe.solvers import solve
-from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.result import Status
 from laufruhe.studies.trade import trade
-from problem_files import PROBLEMS, changed, loaded
+from problem_files import changed, loaded
+from ready import solved
 
 RADIUS, ROD, PISTON, TURNING, AT = 0.1, 0.4, 8.0, 6.0, 0.1
 SPEED = 600.0 * np.pi / 30.0
@@ -36,11 +36,6 @@ MACHINES = {
 }
 PLACES = {"single-road-roller": (-0.1 + 0.4j), "single-bob-weights": (-0.29 + 0.16j), "single-counter-shaft": -0.38,
           "single-three-balances": (-0.34 + 0.18j)}  # fmt: skip
-
-
-@cache
-def solved(name: str) -> Result:
-    return solve(load(PROBLEMS / f"{name}.toml"))
 
 
 def masses_of(name: str) -> list[mm.Mass]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lanes import first_fast
 from laufruhe import solve
 from laufruhe.numerics.norms import NORMS
 from laufruhe.prove.certificate import Proof
@@ -81,12 +82,12 @@ def _never_worse(found: list[Result]) -> None:
         assert more.objective.value <= value * (1.0 + gap) + room
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", first_fast((1, 2, 0, 4, 3), 2, 4))
 def test_more_freedom_is_never_worse(seed: int, tmp_path: Path) -> None:
     _never_worse([solve(loaded(tmp_path, _text(seed, weights))) for weights in FREEDOM])
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", first_fast((1, 2, 0, 4, 3), 1, 3))
 def test_fewer_limits_are_never_worse(seed: int, tmp_path: Path) -> None:
     tight, loose, other = (
         f'[[constraints]]\nlimit = "{limit}"\nmax = "{most}"\n'

@@ -133,6 +133,7 @@ def test_what_follows_in_the_file_follows_an_open_number(tmp_path: Path) -> None
     assert (held.points[0].speed, held.engine.mounts[0].position[1]) == pytest.approx((300.0, 0.08))
 
 
+@pytest.mark.slow
 def test_limits_are_kept_by_what_is_searched() -> None:
     """The ready single: both limits hold it, and no design of a coarse grid within them is better."""
     problem = laufruhe.load(PROBLEMS / "single-stroke-offset.toml")
@@ -176,6 +177,7 @@ def test_the_limit_of_time_keeps_the_best_so_far(tmp_path: Path) -> None:
     assert "time limit" in result.certificate.method
 
 
+@pytest.mark.slow
 def test_an_engine_that_cannot_turn_is_left_out_and_not_built(tmp_path: Path) -> None:
     """Short rods of long strokes do not let the crank turn: such values are no designs, and the rest is searched."""
     text = changed(ASIDE, '"150 mm"', '{ between = ["40 mm", "150 mm"], start = "150 mm" }')

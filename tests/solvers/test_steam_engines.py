@@ -19,7 +19,6 @@ from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Result
-from problem_files import PROBLEMS
 from ready import solved
 
 pytestmark = pytest.mark.slow
@@ -27,7 +26,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def two_crank() -> Result:
-    return laufruhe.solve(PROBLEMS / "steam-two-crank.toml")
+    return solved("steam-two-crank")
 
 
 def test_angle_between_the_cranks_is_the_best_of_all(two_crank: Result) -> None:
@@ -57,7 +56,7 @@ def test_flywheel_of_the_waterworks_engine() -> None:
 
 def test_flywheel_of_the_scotch_yoke_pump() -> None:
     """Speed over a turn from the energy of flywheel and yoke and the work of the chambers, in plain steps."""
-    result = laufruhe.solve(PROBLEMS / "scotch-yoke-steam-pump.toml")
+    result = solved("scotch-yoke-steam-pump")
     assert result.certificate.kind == "global"
     point = result.problem.points[0]
     gas = gas_loads(result.final.engine, point.gas)
@@ -75,7 +74,7 @@ def test_flywheel_of_the_scotch_yoke_pump() -> None:
 
 def test_weight_of_kleins_drive() -> None:
     """No weight tried one by one on a grid about the best is better."""
-    result = laufruhe.solve(PROBLEMS / "klein-steam-pump.toml")
+    result = solved("klein-steam-pump")
     assert result.certificate.kind == "global"
     point, mass, radius, rod, pin = result.problem.points[0], 70.0, 0.1, 0.3, 5.0
     alpha = math.tau * np.arange(2880) / 2880

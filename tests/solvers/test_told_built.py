@@ -21,7 +21,7 @@ ENGINE: dict[str, Any] = {
 }  # fmt: skip
 SINGLE: dict[str, Any] = {
     "title": "single", "engine": ENGINE, "operating_points": [{"speed": "3000 rpm"}], "fidelity": {"samples": 48},
-    "robust": {"over": "worst case"},
+    "robust": {"over": "worst case", "engines": 100},
 }  # fmt: skip
 SECOND = {"minimise": "mean shaking force", "orders": [2]}
 WEIGHT = {"name": "w", "x": "0 mm", "angle": 180, "radius": "1 m", "unbalance": {"between": ["0 kg m", "0.1 kg m"]}}

@@ -175,7 +175,7 @@ def test_time_that_is_over_leaves_no_design_that_few_angles_alone_allow() -> Non
 def test_time_that_is_over_leaves_no_proof_that_few_angles_alone_have(throw: float) -> None:
     """Of the heaviest piston, nothing open: 48 angles have 0.6 % too little, or a quarter of a percent too much."""
     engine = {**ENGINE, "reciprocating_mass": "1 kg ± 5 %", "throws": [throw]}
-    asked = problem({"engine": engine, "robust": {"over": "worst case"}}, objective=SECOND)
+    asked = problem({"engine": engine, "robust": {"over": "worst case", "engines": 100}}, objective=SECOND)
     heaviest = evaluate(asked.built(np.ones(1)), samples=5760).value(asked.objective[0].measure)
     with limited(1e-9):
         result = solve(asked)
@@ -194,7 +194,7 @@ def test_limits_of_built_engines_are_what_the_cycle_has_in_the_worst_of_them(
     weight = {"name": "w", "x": "0 mm", "angle": 180, "radius": "1 m", "unbalance": {"between": ["0 kg m", "0.1 kg m"]}}
     limit = {"limit": "mean shaking force", "orders": [2], "name": "second"}
     asked = {
-        "engine": engine, "counterweights": [weight], "robust": {"over": "worst case"},
+        "engine": engine, "counterweights": [weight], "robust": {"over": "worst case", "engines": 100},
         "objective": {"minimise": "rms shaking force"},
     }  # fmt: skip
     free = problem(asked, constraints=[{**limit, "max": "1e6 N"}])
