@@ -183,6 +183,30 @@ def test_modal_route_agrees_with_the_plain_system():
         assert mounting.motion(load, speed).coefficients[h] == pytest.approx(np.linalg.solve(system, w), rel=1e-9)
 
 
+def test_free_modes_that_damping_couples_follow_the_plain_system():
+    """The mounts hold upwards alone, so the block may slide and turn; no steady load asks it to."""
+    places = [(x, y, 0.05) for x in (0.3, -0.3) for y in (0.2, -0.2)]
+    loss = (0.3, 0.0, 0.0, 0.0)
+    mounts = [Mount(f"m{k}", p, (0.0, 0.0, 2e5), loss_factor=loss[k]) for k, p in enumerate(places)]
+    mounting, speed = elastic_mounting(CUBE, mounts), 60.0
+    assert mounting.modes.free.sum() == 3
+    values = wrench(5).coefficients
+    values[0] = [0.0, 0.0, 400.0, 0.0, 0.0, 0.0]
+    found = mounting.motion(Spectrum(Fraction(1), values), speed).coefficients
+    assert np.linalg.lstsq(mounting.stiffness, values[0].real)[0] == pytest.approx(found[0], abs=1e-15)
+    for h in range(1, 5):
+        system = mounting.stiffness + 1j * mounting.total(mounting.losses) - (h * speed) ** 2 * CUBE.mass_matrix
+        assert found[h] == pytest.approx(np.linalg.solve(system, values[h]), rel=1e-9)
+
+
+def test_ever_smaller_loads_move_in_proportion():
+    mounting, speeds = random_mounting(4), np.array([60.0, 150.0])
+    whole = speed_map(mounting, wrench(4), wrench(5), speeds)
+    loads = [replace(load, coefficients=1e-20 * load.coefficients) for load in (wrench(4), wrench(5))]
+    little = speed_map(mounting, *loads, speeds)
+    assert 1e20 * little.forces == pytest.approx(whole.forces, rel=1e-9)
+
+
 # what a scene excites
 
 

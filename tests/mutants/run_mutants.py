@@ -1,17 +1,23 @@
 """Run the tests that reach a changed line, for a random sample of one-line mutants, and tell which survive.
 
-    python tests/mutants/run_mutants.py map                     # which test calls which function; minutes
-    python tests/mutants/run_mutants.py run --number 300        # the sample; writes results/mutants/README.md
+    python tests/mutants/run_mutants.py map                     # which test calls which function; an hour
+    python tests/mutants/run_mutants.py map --tests prove/test_dual.py      # of new tests alone
+    python tests/mutants/run_mutants.py run --page              # the sample; writes results/mutants/README.md
 
 `make mutants` does both. A mutant is killed if one of the tests that call its function fails, stops or takes far too
 long. Tests run in the order of their cost until `--seconds` of a core are used. A survivor is either equal to the
 source in all that it returns, or shows a test that is missing.
+
+A log keeps what became of each mutant. While its file stays as it is, what is killed is not run again, and a survivor
+meets only tests that it has not met yet. Every test that kills has to pass without any change.
 """
 
 from __future__ import annotations
 
 import argparse
+import compileall
 import contextlib
+import hashlib
 import json
 import os
 import shutil
@@ -22,7 +28,6 @@ import time
 from collections import defaultdict
 from collections.abc import Generator, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
@@ -37,8 +42,10 @@ PAGE = ROOT / "results" / "mutants" / "README.md"
 MAP = ROOT / ".pytest_cache" / "functions-of-tests.json"
 TESTS = (*ROOMS, "numerics", "problem", "mounts", "phasing", "fidelity", "literature", "claims", "validation", "attack")
 OPTIONS = ("-q", "-p", "no:xdist", "-p", "no:cacheprovider", "--import-mode=importlib")
-CONTROLS = 3
-"""Mutants that are run without their change first: a run in which these fail tells nothing."""
+LOG = MAP.with_name("mutants.jsonl")
+"""What became of each mutant, one a line; a run goes on where the last one ended."""
+FEW = 10
+Key = tuple[str, int, str, str]
 KILLED, SURVIVED, UNREACHED = "killed", "survived", "not called by any test"
 
 
@@ -68,33 +75,56 @@ class Calls:
             self.seconds[item.nodeid] = time.process_time() - begun
             for code in self.codes:
                 if code.co_filename.startswith(str(SOURCE)):
-                    name = f"{os.path.relpath(code.co_filename, SOURCE)}:{code.co_firstlineno}"
+                    name = f"{os.path.relpath(code.co_filename, SOURCE)}:{code.co_qualname}"
                     self.functions[name].add(item.nodeid)
 
 
+class Failures:
+    """Write the tests that fail to a file."""
+
+    def __init__(self, file: Path) -> None:
+        self.file = file
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.failed:
+            with self.file.open("a", encoding="utf-8") as file:
+                file.write(f"{report.nodeid}\n")
+
+
 def write_map(arguments: argparse.Namespace) -> None:
-    """Run the tests of the rooms once and keep which functions each of them calls."""
+    """Run tests once and note in the map which functions each of them calls."""
     calls = Calls()
-    folders = [str(ROOT / "tests" / name) for name in arguments.tests if (ROOT / "tests" / name).exists()]
-    pytest.main(
-        ["-q", "-p", "no:xdist", "-p", "no:cacheprovider", "--import-mode=importlib", *folders], plugins=[calls]
-    )
+    chosen = [str(ROOT / "tests" / name) for name in arguments.tests if (ROOT / "tests" / name).exists()]
+    pytest.main([*OPTIONS, *chosen], plugins=[calls])
+    seconds: dict[str, float] = {}
+    functions: dict[str, set[str]] = defaultdict(set)
+    if MAP.exists():
+        table = json.loads(MAP.read_text(encoding="utf-8"))
+        anew = {name.partition("::")[0] for name in calls.seconds}
+        kept = [name if (file := name.partition("::")[0]) not in anew and (ROOT / file).exists() else None
+                for name, _ in table["tests"]]  # fmt: skip
+        seconds.update((name, own) for name, (_, own) in zip(kept, table["tests"], strict=True) if name)
+        for key, own in table["functions"].items():
+            functions[key].update(name for k in own if (name := kept[k]))
+    seconds.update(calls.seconds)
+    for key, names in calls.functions.items():
+        functions[key] |= names
     # a test is known by its number: names are long
-    names = list(calls.seconds)
-    number = {name: k for k, name in enumerate(names)}
-    table = {
-        "tests": [[name, round(calls.seconds[name], 3)] for name in names],
-        "functions": {key: sorted(number[n] for n in own) for key, own in calls.functions.items()},
+    number = {name: k for k, name in enumerate(seconds)}
+    written = {
+        "tests": [[name, round(own, 3)] for name, own in seconds.items()],
+        "functions": {key: sorted(number[n] for n in own) for key, own in functions.items() if own},
     }
     MAP.parent.mkdir(exist_ok=True)
-    MAP.write_text(json.dumps(table), encoding="utf-8")
+    MAP.write_text(json.dumps(written), encoding="utf-8")
 
 
-def tests_of(mutant: Mutant, table: dict[str, Any], seconds: float) -> list[str]:
+def tests_of(mutant: Mutant, table: dict[str, Any], seconds: float, passed: Iterable[str]) -> list[str]:
     """Return the tests that call the function of a mutant, the cheapest first, up to a sum of core-seconds."""
-    known = table["functions"].get(f"{mutant.file}:{mutant.function[1]}", [])
+    known = table["functions"].get(f"{mutant.file}:{mutant.function}", [])
+    pairs = [table["tests"][k] for k in known]
     chosen, total = [], 0.0
-    for name, taken in sorted((table["tests"][k] for k in known), key=lambda pair: pair[1]):
+    for name, taken in sorted((pair for pair in pairs if pair[0] not in passed), key=lambda pair: pair[1]):
         total += taken
         if chosen and total > seconds:
             break
@@ -102,23 +132,29 @@ def tests_of(mutant: Mutant, table: dict[str, Any], seconds: float) -> list[str]
     return chosen
 
 
-def outcome(mutant: Mutant, tests: list[str], source: Path, seconds: float) -> str:
-    """Run tests on a copy of the source that holds one mutant."""
-    if not tests:
-        return UNREACHED
+def outcome(mutant: Mutant, tests: list[str], source: Path, seconds: float) -> tuple[str, list[str]]:
+    """Run tests on a copy of the source that holds one mutant; return what became of it and the tests that fail."""
     file = source / mutant.file
     before = file.read_text(encoding="utf-8")
     lines = before.splitlines(keepends=True)
     lines[mutant.line - 1] = mutant.after + "\n"
     file.write_text("".join(lines), encoding="utf-8")
     try:
-        return KILLED if _forked(tests, source, seconds) else SURVIVED
+        # most fall to the first few
+        for part in (tests[:FEW], tests[FEW:]):
+            passed, failed = _forked(["-x", *part], source, seconds) if part else (True, [])
+            if not passed:
+                # what ends before any test names all of them
+                return KILLED, failed or part
+        return SURVIVED, []
     finally:
         file.write_text(before, encoding="utf-8")
 
 
-def _forked(tests: list[str], source: Path, seconds: float) -> bool:
-    """Return whether a test fails in a copy of this process, which has the libraries imported already."""
+def _forked(tests: list[str], source: Path, seconds: float) -> tuple[bool, list[str]]:
+    """Run tests in a copy of this process, which has the libraries imported already; return what fails."""
+    log = source / "failed"
+    log.write_text("", encoding="utf-8")
     child = os.fork()
     if not child:
         os.setpgid(0, 0)
@@ -132,48 +168,72 @@ def _forked(tests: list[str], source: Path, seconds: float) -> bool:
         code = 1
         with contextlib.suppress(BaseException):
             # libraries that are imported already are not rewritten by pytest
-            quiet_options = ["-W", "ignore::pytest.PytestAssertRewriteWarning", "-x", *OPTIONS]
-            code = int(pytest.main([*quiet_options, *(str(ROOT / name) for name in tests)]))
+            quiet_options = ["-W", "ignore::pytest.PytestAssertRewriteWarning", *OPTIONS]
+            asked = [name if name.startswith("-") else str(ROOT / name) for name in tests]
+            code = int(pytest.main([*quiet_options, *asked], plugins=[Failures(log)]))
         os._exit(code)
     until = time.monotonic() + 120.0 + 6.0 * seconds
     while time.monotonic() < until:
         done, status = os.waitpid(child, os.WNOHANG)
         if done:
-            return status != 0
+            return status == 0, log.read_text(encoding="utf-8").splitlines()
         time.sleep(0.05)
     os.killpg(child, signal.SIGKILL)
     os.waitpid(child, 0)
-    return True
+    return False, []
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Run the sample, print survivors as they come, and write the page."""
+    """Run what the log has not killed, print survivors as they come, and write the page."""
     table = json.loads(MAP.read_text(encoding="utf-8"))
     sample = drawn(arguments.number, arguments.seed)
     if arguments.files:
         sample = [mutant for mutant in sample if any(part in mutant.file for part in arguments.files)]
+    digests = {m.file: hashlib.sha256((SOURCE / m.file).read_bytes()).hexdigest() for m in sample}
+    killers: dict[Key, list[str]] = {}
+    passed: dict[Key, set[str]] = defaultdict(set)
+    for line in LOG.read_text(encoding="utf-8").splitlines() if LOG.exists() else ():
+        entry = json.loads(line)
+        key = entry["file"], entry["line"], entry["after"], entry["digest"]
+        if entry["outcome"] == KILLED:
+            killers[key] = entry["failed"]
+        passed[key].update(entry["passed"])
     _import_libraries()
     found: list[tuple[Mutant, str]] = []
-    with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
+    with tempfile.TemporaryDirectory(prefix="mutants-") as folder, LOG.open("a", encoding="utf-8") as log:
         copies: SimpleQueue[Path] = SimpleQueue()
         for k in range(arguments.workers):
             copies.put(Path(shutil.copytree(SOURCE, Path(folder) / str(k))))
+            compileall.compile_dir(Path(folder) / str(k), quiet=2)
 
-        def tried(mutant: Mutant) -> str:
+        def tried(mutant: Mutant) -> tuple[str, list[str]]:
+            key = mutant.file, mutant.line, mutant.after, digests[mutant.file]
+            if (failed := killers.get(key)) is not None:
+                return KILLED, failed
+            tests = tests_of(mutant, table, arguments.seconds, passed[key])
+            if not tests:
+                return SURVIVED if passed[key] else UNREACHED, []
             source = copies.get()
             try:
-                return outcome(mutant, tests_of(mutant, table, arguments.seconds), source, arguments.seconds)
+                said, failed = outcome(mutant, tests, source, arguments.seconds)
             finally:
                 copies.put(source)
+            entry = {"file": mutant.file, "line": mutant.line, "after": mutant.after, "digest": digests[mutant.file],
+                     "outcome": said, "failed": failed, "passed": tests if said == SURVIVED else []}  # fmt: skip
+            log.write(f"{json.dumps(entry)}\n")
+            log.flush()
+            return said, failed
 
-        for mutant in sample[:CONTROLS]:
-            if tried(replace(mutant, after=mutant.before)) == KILLED:
-                sys.exit(f"tests of {mutant.file}:{mutant.line} fail without any change")
+        unproven: set[str] = set()
         with ThreadPoolExecutor(arguments.workers) as pool:
-            for mutant, said in zip(sample, pool.map(tried, sample), strict=True):
+            for mutant, (said, failed) in zip(sample, pool.map(tried, sample), strict=True):
                 found.append((mutant, said))
+                unproven.update(failed)
                 if said != KILLED:
                     print(f"{said}: {mutant}", flush=True)
+        fine, failed = _forked(sorted(unproven), copies.get(), 10.0 * arguments.seconds)
+    if unproven and not fine:
+        sys.exit(f"these fail without any change: {failed or 'the run itself'}; nothing is written")
     killed = sum(said == KILLED for _, said in found)
     print(f"{killed} of {len(found)} mutants killed")
     if arguments.page:
@@ -189,7 +249,8 @@ def page(found: Iterable[tuple[Mutant, str]], arguments: argparse.Namespace) -> 
         "",
         f"Made by `make mutants`: {len(found)} mutants drawn with seed {arguments.seed} from all single-line changes",
         "of operators, numbers, signs and extremes in the rooms below. Each runs the tests that call its function, for",
-        f"{arguments.seconds:g} s of a core at most. A survivor is a change that no test sees.",
+        f"{arguments.seconds:g} s of a core at most. What is killed is not run again while its file stays as it is.",
+        "All tests that kill pass without any change. A survivor is a change that no test sees.",
         "",
         "| room | mutants | killed | share |",
         "| --- | ---: | ---: | ---: |",
@@ -219,7 +280,7 @@ def main() -> None:
     commands = parser.add_subparsers(dest="command", required=True)
     mapping = commands.add_parser("map")
     mapping.set_defaults(call=write_map)
-    mapping.add_argument("--tests", nargs="*", default=TESTS, help="folders below tests")
+    mapping.add_argument("--tests", nargs="*", default=TESTS, help="files or folders below tests")
     running = commands.add_parser("run")
     running.set_defaults(call=run)
     running.add_argument("--number", type=int, default=300, help="mutants in the sample")

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import ast
+import hashlib
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-
-import numpy as np
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 ROOMS = ("physics", "load_models", "prove", "solvers", "machine")
@@ -33,7 +33,7 @@ class Mutant:
     file
         Path relative to `src`.
     function
-        Name and first line of the innermost function that holds the line.
+        Qualified name of the innermost function that holds the line.
     line
         Number of the line, from 1.
     before, after
@@ -41,10 +41,15 @@ class Mutant:
     """
 
     file: str
-    function: tuple[str, int]
+    function: str
     line: int
     before: str
     after: str
+
+    @property
+    def change(self) -> str:
+        """Return what is changed where; lines above it that come or go leave it as it is."""
+        return f"{self.file}:{self.function}: {self.before.strip()}  ->  {self.after.strip()}"
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line}: {self.before.strip()}  ->  {self.after.strip()}"
@@ -54,8 +59,11 @@ def mutants_of(path: Path) -> list[Mutant]:
     """Return every mutant of a file."""
     text = path.read_text(encoding="utf-8")
     lines = text.splitlines()
-    found = []
-    for function, node in _nodes(ast.parse(text)):
+    found, tree = [], ast.parse(text)
+    placeholders = {id(node) for parent in ast.walk(tree) for node in _placeholders(parent)}
+    for function, node in _nodes(tree):
+        if id(node) in placeholders:
+            continue
         for line, start, end, new in _changes(node, lines):
             old = lines[line - 1]
             found.append(Mutant(str(path.relative_to(SOURCE)), function, line, old, f"{old[:start]}{new}{old[end:]}"))
@@ -70,13 +78,20 @@ def all_mutants() -> tuple[Mutant, ...]:
 
 
 def drawn(number: int, seed: int) -> list[Mutant]:
-    """Return a random sample of all mutants, the same for the same seed and source."""
-    everything = all_mutants()
-    rng = np.random.default_rng(seed)
-    return [everything[k] for k in rng.permutation(len(everything))[:number]]
+    """Return a random sample of all mutants, the same for the same seed and source.
+
+    Each mutant draws its own place from a hash of its change, so an edit of the source leaves all others in the sample.
+    """
+    seen: Counter[str] = Counter()
+    places = []
+    for mutant in all_mutants():
+        text = f"{seed} {mutant.change} {seen[mutant.change]}"
+        seen[mutant.change] += 1
+        places.append((hashlib.sha256(text.encode()).digest(), mutant))
+    return [mutant for _, mutant in sorted(places, key=lambda pair: pair[0])[:number]]
 
 
-def _nodes(tree: ast.AST, function: tuple[str, int] | None = None) -> Iterator[tuple[tuple[str, int], ast.AST]]:
+def _nodes(tree: ast.AST, scope: str = "", function: str | None = None) -> Iterator[tuple[str, ast.AST]]:
     """Yield expressions inside functions that are no annotation, message or docstring."""
     for field, value in ast.iter_fields(tree):
         if field in ("annotation", "returns", "decorator_list") or isinstance(tree, ast.Raise | ast.JoinedStr):
@@ -84,12 +99,29 @@ def _nodes(tree: ast.AST, function: tuple[str, int] | None = None) -> Iterator[t
         for child in value if isinstance(value, list) else [value]:
             if not isinstance(child, ast.AST) or isinstance(child, ast.Raise | ast.JoinedStr):
                 continue
-            inner = function
+            inner, inside = function, scope
             if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef):
-                inner = (child.name, min([child.lineno, *(d.lineno for d in child.decorator_list)]))
+                inner = f"{scope}{child.name}"
+                inside = f"{inner}.<locals>."
+            elif isinstance(child, ast.ClassDef):
+                inside = f"{scope}{child.name}."
             if inner is not None:
                 yield inner, child
-            yield from _nodes(child, inner)
+            yield from _nodes(child, inside, inner)
+
+
+def _placeholders(node: ast.AST) -> Iterator[ast.AST]:
+    """Yield numbers that change nothing: in place of a size of zero, and as the length that reshaping works out."""
+    match node:
+        case ast.BoolOp(op=ast.Or(), values=[*_, ast.Constant(value=float(1.0)) as last]):
+            yield last
+        case ast.BinOp(
+            op=ast.Div(), right=ast.Call(func=ast.Attribute(attr="where"), args=[_, _, ast.Constant() as last])
+        ):
+            yield last
+        case ast.Call(func=ast.Attribute(attr="reshape"), args=args):
+            sizes = [size for arg in args for size in ast.walk(arg)]
+            yield from (s.operand for s in sizes if isinstance(s, ast.UnaryOp) and isinstance(s.op, ast.USub))
 
 
 def _changes(node: ast.AST, lines: Sequence[str]) -> Iterator[tuple[int, int, int, str]]:

@@ -5,7 +5,7 @@ import difflib
 
 import pytest
 
-from mutants.single_lines import ROOMS, SOURCE, drawn, mutants_of
+from mutants.single_lines import ROOMS, SOURCE, all_mutants, drawn, mutants_of
 
 
 def test_a_mutant_is_one_other_line_that_python_reads() -> None:
@@ -48,6 +48,39 @@ def test_messages_annotations_and_texts_are_left_alone(tmp_path, monkeypatch) ->
     (tmp_path / "one.py").write_text(text)
     monkeypatch.setattr("mutants.single_lines.SOURCE", tmp_path)
     assert [m.after.strip() for m in mutants_of(tmp_path / "one.py")] == ['def f(a: int = 1) -> "1 + 1":']
+
+
+def test_numbers_that_change_nothing_are_left_alone(tmp_path, monkeypatch) -> None:
+    text = """def f(a, b):
+    size = b.max() or 1.0
+    return (a / np.where(b > 0.0, b, 1.0)).reshape(-1, 3) / size
+"""
+    (tmp_path / "one.py").write_text(text)
+    monkeypatch.setattr("mutants.single_lines.SOURCE", tmp_path)
+    assert [m.after.strip() for m in mutants_of(tmp_path / "one.py")] == [
+        "size = b.max() and 1.0",
+        "size = b.min() or 1.0",
+        "return (a / np.where(b > 0.0, b, 1.0)).reshape(-1, 3) * size",
+        "return (a * np.where(b > 0.0, b, 1.0)).reshape(-1, 3) / size",
+        "return (a / np.where(b < 0.0, b, 1.0)).reshape(-1, 3) / size",
+        "return (a / np.where(b > 1.0, b, 1.0)).reshape(-1, 3) / size",
+        "return (a / np.where(b > 0.0, b, 1.0)).reshape(-1, 4) / size",
+    ]
+
+
+def test_an_edit_leaves_all_other_mutants_in_the_sample(tmp_path, monkeypatch) -> None:
+    (tmp_path / "laufruhe" / "prove").mkdir(parents=True)
+    file = tmp_path / "laufruhe" / "prove" / "one.py"
+    monkeypatch.setattr("mutants.single_lines.SOURCE", tmp_path)
+    samples = []
+    for head in ("", "def more(a):\n    return a + 2\n\n\n"):
+        file.write_text(head + "class One:\n    def value(self, a, b):\n        return min(a, b) + 3 * a - b\n")
+        all_mutants.cache_clear()
+        samples.append(drawn(100, 1))
+    all_mutants.cache_clear()
+    assert {m.function for m in samples[0]} == {"One.value"}
+    assert [m.change for m in samples[1] if m.function != "more"] == [m.change for m in samples[0]]
+    assert len(samples[1]) == len(samples[0]) + 2
 
 
 @pytest.mark.slow

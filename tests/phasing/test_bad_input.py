@@ -26,6 +26,9 @@ OPEN = 'throws = "open"\nfiring_order = "open"'
         (6, "four-stroke", f"bank_angle = 90\n{OPEN}", "", "vee", "multiple of 120 deg, and they make 90 deg"),
         (6, "four-stroke", f"bank_angle = 90\nsplit_pin_angle = {{ between = [0, 20] }}\n{OPEN}", "", "vee",
          "no bank angle and split pin within the bounds let the firing be even"),
+        (6, "four-stroke", f"bank_angle = {{ between = [80, 95] }}\n{OPEN}",
+         'intervals = { largest_deviation = "10 deg" }', "vee",
+         "the most even crank has intervals from 95 to 145 deg with bank angle plus split pins of 95 deg"),
     ],
 )  # fmt: skip
 def test_infeasible_says_what_conflicts(tmp_path, cylinders, cycle, engine, phasing, layout, said):

@@ -149,6 +149,21 @@ def test_multipliers_of_a_corner_say_the_same_of_other_mounts_as_rows_do(seed: i
     assert by_orders == pytest.approx(rows, rel=1e-9)
 
 
+@pytest.mark.parametrize("seed", first_fast((780017, 780003), 1))
+def test_multipliers_of_a_corner_that_keeps_no_limits_call_it_bad(seed: int) -> None:
+    """Its bound is over the value of the unbalances told, and those are the best where the limits are kept."""
+    problem, generator = joint(seed), np.random.default_rng(1)
+    ((_, mounts),) = boxes_of(problem, generator, 1, 0.5)
+    given = MountedLoads(problem).at(mounts)
+    x, multipliers = best_at(given)
+    assert all(norm.value(x) <= most * (1.0 + 1e-6) for most, norm in given.limits)
+    assert lower_bound(given, multipliers).value == pytest.approx(given.objective(x), rel=1e-3)
+    tight = replace(given, limits=tuple((0.3 * most, norm) for most, norm in given.limits))
+    x, multipliers = best_at(tight)
+    assert any(norm.value(x) > most * 1.01 for most, norm in tight.limits)
+    assert lower_bound(tight, multipliers).value > 1.3 * tight.objective(x) > 0.0
+
+
 @pytest.mark.parametrize("seed", first_fast((780004, 780001, 780000), 2))
 def test_what_multipliers_say_in_a_box_is_a_polynomial_and_a_rest(seed: int) -> None:
     problem, generator = joint(seed), np.random.default_rng(seed)

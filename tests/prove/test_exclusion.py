@@ -19,7 +19,7 @@ from laufruhe.prove.mounts.box_lines import BoxLines
 from laufruhe.prove.mounts.box_norms import Under
 from laufruhe.prove.mounts.box_runs import RunBoxes
 from laufruhe.prove.mounts.exclusion import LimitBoxes, excluded
-from laufruhe.solvers.mounts.limits_kept import ruled_out
+from laufruhe.solvers.mounts.limits_kept import LimitsKept, ruled_out
 from prove.test_run_boxes import OF_RUNS, READY, random_problem
 
 
@@ -132,3 +132,11 @@ def test_a_conflict_is_named_in_few_boxes(monkeypatch: pytest.MonkeyPatch) -> No
     monkeypatch.setattr(RunBoxes, "under", counted)
     assert ruled_out(problem) == ("static sag", "run-up travel", "run-up force")
     assert seen[0] < 2000
+
+
+@pytest.mark.slow
+def test_no_more_boxes_are_looked_at_than_are_asked_for() -> None:
+    asked = {**tables_of(READY), "search": {"boxes": 1}}
+    force = {"limit": "run-up force", "max": "300 N"}
+    problem = load_tables({**asked, "constraints": [*asked["constraints"], force]}, Path("single.toml"))
+    assert LimitsKept(problem).together(problem.limits).boxes == 1

@@ -24,7 +24,7 @@ from laufruhe.prove.springs import box
 from laufruhe.prove.springs import orders as orders_
 from laufruhe.prove.springs.bound import Multipliers, Program, Proposed
 from laufruhe.prove.springs.conditions import conditions, of_stiffness
-from laufruhe.prove.springs.high_orders import HighOrder
+from laufruhe.prove.springs.high_orders import HighOrder, _linear, _seen
 from laufruhe.prove.springs.lines import Felt
 from laufruhe.prove.springs.mirrored import mirrored_halves, mirrored_parts
 from laufruhe.prove.springs.open_mounts import OpenMounts, is_lifted, open_mounts
@@ -569,3 +569,46 @@ def test_no_local_search_finds_less_than_the_bound_of_six_springs() -> None:
     few, value = replace(problem, search=replace(problem.search, boxes=4)), result.objective.value
     asked = spring_bound(few, 1.1 * value, 1e-3 * value, [decision.value for decision in result.decisions])
     assert 0.999 * value < asked.bound <= min(value, least) * (1.0 + 1e-9)
+
+
+@pytest.mark.slow
+def test_sums_over_samples_are_those_of_the_cycle_with_more_than_two_of_every_order(tmp_path: Path) -> None:
+    boxes = asked_of(asked_for(tmp_path, MEANS))
+    ((weight, own),) = boxes._terms
+    places = {order.place for order in own.orders}
+    assert len(places) == 2
+    fine, coarse = replace(own, samples=2 * max(places) + 1), replace(own, samples=2 * max(places))
+    assert fine.is_sampled_fully
+    assert not coarse.is_sampled_fully
+    for second in (fine, coarse):
+        boxes._terms = [(weight, fine), (weight, second)]
+        assert boxes.is_sampled_fully is (second is fine)
+
+
+PLACES = changed(MOUNTS, ('["300 mm", "200 mm", "0 mm"]', '[{ between = ["270 mm", "350 mm"] }, "200 mm", "0 mm"]'))
+
+
+@pytest.mark.parametrize("mounts", [MOUNTS, PLACES], ids=["stiffness", "places too"])
+def test_forces_of_a_motion_are_linear_in_stiffness_and_not_over_what_places_allow(tmp_path: Path, mounts: str) -> None:
+    problem, generator = asked_for(tmp_path, ASKED["rms"], mounts=mounts), np.random.default_rng(5)
+    model = StiffnessBoxes(problem, 1.0).model if mounts is MOUNTS else None
+    lower, upper = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
+    whole = open_mounts(problem, lower, upper)
+    weights = generator.normal(size=(len(whole.motions), 3, 3))
+    weights = weights + weights.transpose(0, 2, 1)
+    near = np.zeros(whole.numbers)
+    for x in generator.uniform(lower, upper, (12, len(lower))):
+        mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
+        if model is not None:
+            near = numbers_of(whole, mounting)
+            told = _linear(whole, weights, near)
+            true = float(np.sum(weights * mounting.springs))
+            assert told.constant + told.slopes @ near == pytest.approx(true, rel=1e-9)
+            assert told.near == pytest.approx(true, rel=1e-9)
+        load = generator.normal(size=(6, 2)) @ [1.0, 1.0j]
+        for m, (motion, spring) in enumerate(zip(mounting.motions, mounting.springs, strict=True)):
+            travel = motion @ whole.root.T @ load
+            true, over = float((travel.conj() @ spring @ travel).real), float(np.sum(_seen(whole, m, load) * spring))
+            assert true <= over * (1.0 + 1e-9)
+            assert over <= true * 1.0001 or mounts is PLACES
+            assert over < 60.0 * true

@@ -91,6 +91,19 @@ def test_no_errors_leave_the_drawing() -> None:
     assert found.value == found.bound == pytest.approx(2.0 * norm.norm.value(norm.grid, norm.constant))
 
 
+@pytest.mark.parametrize("name", NORMS)
+def test_intervals_alone_end_at_their_worst_corner(name: str) -> None:
+    """No part of them is left to divide, and two terms of any weights add up."""
+    random = np.random.default_rng(9)
+    constant, slope, grid = random.normal(size=(24, 2)), random.normal(size=(24, 2, 4)), Grid(np.full(24, 1 / 24), 12)
+    norms = [AffineNorm(NORMS[own], constant[::step], slope[::step], grid) for own, step in ((name, 1), ("mean", -1))]
+    terms = list(zip((3.0, 0.2), norms, strict=True))
+    found = worst_case(terms, tuple(slice(k, k + 1) for k in range(4)), 0.0)
+    worst = max(value_at(terms, np.array(z)) for z in itertools.product((-1.0, 1.0), repeat=4))
+    assert found.value == pytest.approx(worst, rel=1e-9)
+    assert worst * (1.0 - 1e-12) <= found.bound <= worst * (1.0 + 1e-9)
+
+
 def test_wider_errors_are_never_better() -> None:
     norm, last = random_norm("mean", 8), 0.0
     for share in (0.0, 0.5, 1.0, 2.0):

@@ -18,7 +18,7 @@ from laufruhe.machine.facing import with_shared_chambers
 from laufruhe.physics.gas_loads import chamber_torque
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.boxes.shared_gas import CELLS, torque_change
+from laufruhe.prove.boxes.shared_gas import CELLS, SharedGasBoxes, torque_change
 from problem_files import PROBLEMS
 from searched import searched
 
@@ -75,6 +75,52 @@ def test_torque_changes_by_no_more_than_is_told(seed: int) -> None:
         assert (found <= most * (1.0 + 1e-9) + 1e-9 * np.abs(here).max()).all()
         if half < 0.01:
             assert np.sqrt(np.mean(most**2)) < 3.0 * np.sqrt(np.mean(found**2))
+
+
+SPEEDS = [{"name": "loud", "speed": "2400 rpm", "weight": 3}, {"name": "calm", "speed": "900 rpm"}]
+
+
+def two_speeds(quantity: str) -> Problem:
+    """Each with gas of its own."""
+    own = problem(quantity, between(5, 40), operating_points=SPEEDS)
+    loud, calm = own.points
+    return replace(own, points=(loud, replace(calm, gas=replace(calm.gas, peak_pressure=60e5, imep=3e5))))
+
+
+@pytest.mark.parametrize("norm", ["rms", "mean", "maximum", "peak to peak"])
+def test_a_torque_at_either_point_changes_a_norm_by_no_more_than_is_told(norm: str) -> None:
+    """A torque that only works at one point, or at both, with no load beside it: its norm is its change."""
+    own = two_speeds(f"{norm} roll moment")
+    (measure,), random = own.measures, np.random.default_rng(4)
+    boxes, weights = SharedGasBoxes(own), (0.75, 0.25)
+    assert measure.shares(own.points) == pytest.approx(weights)
+    for times in ((1.0, 0.0), (0.0, 1.0), (0.3, 2.0)):
+        changes = [time * np.abs(random.normal(size=CELLS)) for time in times]
+        torques = [np.where(random.random(CELLS) < 0.5, -each, each) for each in changes]
+        sizes = np.abs(torques)
+        true = {
+            "rms": math.sqrt(weights @ np.mean(sizes**2, axis=1)),
+            "mean": weights @ np.mean(sizes, axis=1),
+            "maximum": sizes.max(),
+            "peak to peak": np.ptp(torques, axis=1).max(),
+        }[norm]
+        told = boxes._by_gas(measure, changes)
+        assert true * (1.0 - 1e-12) <= told <= 3.0 * true
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("quantity", ["rms mount force", "maximum roll moment", "peak to peak mount force"])
+def test_no_lead_of_a_box_is_under_its_bound(quantity: str) -> None:
+    """And of narrow boxes the bound is near the value."""
+    own = two_speeds(quantity)
+    boxes = SharedGasBoxes(own)
+    for middle, half in ((10.0, 1.0), (25.0, 8.0), (30.0, 0.01)):
+        low, high = math.radians(middle - half), math.radians(middle + half)
+        bound = float(boxes.bounds(np.array([[low]]), np.array([[high]]))[0][0])
+        values = [objective_value(own, evaluate(own, own.design([x]))) for x in np.linspace(low, high, 5)]
+        assert bound <= min(values) * (1.0 + 1e-9)
+        if half < 0.1:
+            assert bound > 0.97 * min(values)
 
 
 CASES = {

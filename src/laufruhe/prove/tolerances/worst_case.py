@@ -126,11 +126,6 @@ class _Errors(Division[_Part]):
         """The worse of the worst errors so far and others."""
         self.best = max(self.best, found, key=lambda each: each[0])
 
-    @property
-    def enough(self) -> float:
-        """Bound from which no errors of a part are worse than the worst known."""
-        return -self.best[0] * (1.0 + ROUNDING)
-
     def is_done(self, one: Waiting[_Part]) -> bool:
         """Whether no errors are worse by the tolerance."""
         return -one.bound <= self.best[0] * (1.0 + self._tolerance)

@@ -1,0 +1,125 @@
+"""Steps of a run-up against integrals, steady states and the periods that they resolve."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from laufruhe.errors import ModelError, UncarriedLoadError
+from laufruhe.machine import Block, Mount, Shaft
+from laufruhe.machine.bearing import Bearing
+from laufruhe.machine.dynamic import FluidTrack
+from laufruhe.machine.run import Run
+from laufruhe.physics.elastic_mounts import elastic_mounting
+from laufruhe.physics.linear_run import NODES, LinearRun, Sweep
+from laufruhe.physics.modes import static_motion
+from laufruhe.physics.run_up import run_through
+from laufruhe.physics.runs import missed_share, sweep_of
+from laufruhe.physics.stopped_run import _side_by_side
+from laufruhe.physics.time_model import time_model
+from mounts.powertrain import random_mounting, wrench
+
+CUBE = Block(100.0, ((4.0, 0.0, 0.0), (0.0, 5.0, 0.0), (0.0, 0.0, 6.0)))
+
+
+def test_wrenches_of_steps_have_the_integral_of_the_load() -> None:
+    """An order of inertia, which grows with the square of speed, through every step by itself."""
+    sweep = Sweep(20.0, 15.0, 0.01, 12)
+    load = np.array([[1.0 + 2.0j, 0.0, -0.5j, 0.0, 0.0, 0.3]])
+    found = sweep.wrenches([(np.array([2.0]), load)]).reshape(NODES, 6, -1)
+    _, weights = np.polynomial.legendre.leggauss(NODES)
+    by_steps = 0.5 * sweep.step * np.einsum("a,ait->it", weights, found)
+
+    def exact(t: float, component: int) -> float:
+        angle = 20.0 * t + 7.5 * t * t
+        return float((20.0 + 15.0 * t) ** 2 * (load[0, component] * np.exp(2j * angle)).real)
+
+    for component in (0, 2, 5):
+        for step in (0, 5, 11):
+            whole = quad(exact, step * sweep.step, (step + 1) * sweep.step, args=(component,))[0]
+            assert by_steps[component, step] == pytest.approx(whole, rel=1e-9)
+
+
+def test_steps_are_a_24th_of_the_shortest_period() -> None:
+    """Of order 12 at the fastest speed; fewer where there would be more than 4000 in a sixtieth of a run."""
+    for first, last in ((0.0, 100.0), (100.0, 0.0), (30.0, 60.0)):
+        sweep = sweep_of(first, last, 6.0)
+        assert sweep is not None
+        period = math.tau / (12.0 * max(first, last))
+        assert 24.0 <= period / sweep.step <= 24.3
+        assert sweep.count * sweep.step == pytest.approx(6.0)
+        assert sweep.first + sweep.gain * 6.0 == pytest.approx(last)
+    assert sweep_of(0.0, 100.0, 3000.0) is None
+    few = 1.0 / math.cos(math.pi / 24.0) - 1.0
+    assert missed_share(Run(100.0, 6.0, 6.0)) == pytest.approx(few)
+    # 4000 steps in a sixtieth of 100 s: as many to a period of order 12
+    longer = Run(100.0, 6.0, 100.0)
+    steps = 4000.0 * math.tau / (12.0 * 100.0) / (100.0 / 60.0)
+    assert missed_share(longer) == pytest.approx(1.0 / math.cos(math.pi / steps) - 1.0)
+
+
+@pytest.mark.slow
+def test_a_run_at_one_speed_ends_in_its_steady_state() -> None:
+    mounting, load, speed = random_mounting(2, loss=0.0, damping=4000.0), wrench(2, orders=2), 60.0
+    run = run_through(mounting, load, None, speed, speed * (1.0 + 1e-9), 3.0, stretches=6)
+    steady = mounting.forces(load, speed).coefficients * speed**2
+    turns = np.exp(1j * np.outer(np.linspace(0.0, math.tau, 721), load.orders))
+    forces = np.einsum("th,hmi->tmi", turns, steady).real
+    assert run.force[-1] == pytest.approx(np.linalg.norm(forces, axis=2).max(), rel=1e-3)
+    travels = np.einsum("th,hmi->tmi", turns, mounting.travel(load, speed).coefficients * speed**2).real
+    assert run.travel[-1] == pytest.approx(np.linalg.norm(travels, axis=2).max(), rel=1e-3)
+    with pytest.raises(ModelError, match="not negative"):
+        run_through(mounting, load, None, -1.0, 10.0, 3.0)
+
+
+def test_forces_of_stops_that_grow_within_a_step_are_integrated_exactly() -> None:
+    """z' = rate z + f0 + (f1 - f0) t / h over a step, of modes as they are, whatever their rates."""
+    mounting = random_mounting(7, loss=0.0, damping=500.0)
+    first, *rest = mounting.mounts
+    stopped = Mount("stopped", first.position, first.stiffness, first.orientation, damping=first.damping,
+                    stop_gap=1e-3, stop_stiffness=2e6)  # fmt: skip
+    model, step = time_model(elastic_mounting(mounting.block, [stopped, *rest])), 0.004
+    run = LinearRun(model, Sweep(0.0, 1.0, step, 4))
+    side = _side_by_side([run], step)
+    rates, _, inverse = run.kept
+    met = np.flatnonzero(model.stops)
+    into = inverse @ model.travels[met].T
+    for k, rate in enumerate(rates):
+        told = [side.first[0][2 * k : 2 * k + 2], side.second[0][2 * k : 2 * k + 2]]
+        for found, weight in zip(told, (lambda _: 1.0, lambda t: t / step), strict=True):
+            real, imaginary = (
+                quad(
+                    lambda t, part=part, rate=rate, weight=weight: part(np.exp(rate * (step - t))) * weight(t), 0, step
+                )[0]
+                for part in (np.real, np.imag)
+            )
+            own = into[k] * complex(real, imaginary)
+            assert found[0] + 1j * found[1] == pytest.approx(own, rel=1e-9)
+
+
+def test_a_steady_load_is_refused_by_what_no_mount_resists_alone() -> None:
+    mounting = elastic_mounting(CUBE, [Mount("only", (0.0, 0.0, 0.0), (1e5, 2e5, 4e5))])
+    assert static_motion(mounting.modes, np.array([0.0, 50.0, 80.0, 0.0, 0.0, 0.0])) == pytest.approx(
+        [0.0, 50.0 / 2e5, 80.0 / 4e5, 0.0, 0.0, 0.0]
+    )
+    with pytest.raises(UncarriedLoadError, match="roll"):
+        static_motion(mounting.modes, np.array([0.0, 50.0, 0.0, 3.0, 0.0, 0.0]))
+
+
+def test_a_journal_drags_at_its_radius_and_the_speed_of_its_shaft() -> None:
+    assert Bearing("b", 0.0, diameter=0.06, friction=0.004).drag == pytest.approx(0.004 * 0.03)
+    half = Shaft("slow", -0.5, 0.0, 0.1)
+    assert Bearing("b", 0.0, diameter=0.06, friction=0.004, shaft=half).drag == pytest.approx(0.002 * 0.03)
+    with pytest.raises(ModelError, match="no friction"):
+        _ = Bearing("b", 0.0, diameter=0.06).drag
+
+
+@pytest.mark.parametrize(
+    "numbers", [(0.0, 1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (1.0, 1.0, -1.0, 0.0), (1.0, 1.0, 0.0, -1.0)]
+)
+def test_a_fluid_track_that_cannot_be_is_refused(numbers: tuple[float, float, float, float]) -> None:
+    with pytest.raises(ModelError, match="a fluid track"):
+        FluidTrack(0, *numbers)

@@ -1,0 +1,30 @@
+"""The least of affine functions of masses and unbalances on a box of sizes, against its corners."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from laufruhe.load_models.sized_model import MASSES
+from laufruhe.problem.decision import Decision, Domain
+from laufruhe.problem.sets import Interval, Sector
+from laufruhe.prove.boxes.size_bundles import Reach
+
+
+def test_the_least_is_that_of_a_corner() -> None:
+    random = np.random.default_rng(2)
+    sets = [Interval(0.2, 0.5), Sector(0.3, (0.0, math.tau))]
+    domains = (Domain(Decision("a", "kg m", sets[0], 0j, ()), 0), Domain(Decision("b", "kg m", sets[1], 0j, ()), 1))
+    low = random.uniform(-1.0, 1.0, MASSES)
+    high = low + random.uniform(0.0, 1.0, MASSES)
+    reach = Reach(low, high, (0.1, 0.2), domains)
+    turns = np.linspace(0.0, math.tau, 721)
+    disc = 0.3 * np.array([np.cos(turns), np.sin(turns)])
+    for function in random.normal(size=(20, 1 + MASSES + 3)):
+        masses = min(function[1 : 1 + MASSES] @ corner for corner in itertools.product(*zip(low, high, strict=True)))
+        weights = min(function[1 + MASSES] * x for x in (0.2, 0.5)) + float((function[-2:] @ disc).min())
+        brute = function[0] + masses + weights
+        assert brute - 1e-4 <= float(reach.least(function[None])[0]) <= brute + 1e-12
+    assert reach.most.tolist() == [1.0, *np.maximum(np.abs(low), np.abs(high)), 0.5, 0.3, 0.3]
