@@ -116,6 +116,7 @@ ASKED = {
     "travel": '[objective]\nminimise = "static travel"\n',
     "of one": '[objective]\nminimise = "static travel"\nload_cases = ["torque"]\nmounts = ["front left"]\n',
     "along z": '[objective]\nminimise = "static travel"\ndirection_weights = [0, 0, 1]\n',
+    "weighted": '[objective]\nminimise = "static travel"\ndirection_weights = [3, 1, 0.3]\n',
     "force": '[objective]\nminimise = "static mount force"\n',
 }
 TILTED = BLOCK + 'inertia_products = ["2 kg m^2", "-3 kg m^2", "1 kg m^2"]\n'
@@ -214,7 +215,7 @@ def test_the_program_settles_where_the_block_does(name: str, gap: str, tmp_path:
         assert balance == pytest.approx(np.zeros(6), abs=1e-4)
     signals = [each.force if name == "force" else each.travel for each in found]
     counted = [signal[:1] if name == "of one" else signal for signal in signals]
-    weights = [0.0, 0.0, 1.0] if name == "along z" else [1.0, 1.0, 1.0]
+    weights = {"along z": [0.0, 0.0, 1.0], "weighted": [3.0, 1.0, 0.3]}.get(name, [1.0, 1.0, 1.0])
     lengths = np.linalg.norm(np.concatenate(counted) * weights, axis=1)
     assert unit * np.sqrt(squares + 1.0) == pytest.approx(lengths, rel=1e-4)
 

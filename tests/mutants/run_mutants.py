@@ -55,8 +55,13 @@ class Calls:
     def __init__(self) -> None:
         self.functions: dict[str, set[str]] = defaultdict(set)
         self.seconds: dict[str, float] = {}
+        self.collected: set[str] = set()
         self.codes: set[Any] = set()
         self.file = ""
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        self.collected.update(item.nodeid for item in items)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
@@ -100,9 +105,14 @@ def write_map(arguments: argparse.Namespace) -> None:
     functions: dict[str, set[str]] = defaultdict(set)
     if MAP.exists():
         table = json.loads(MAP.read_text(encoding="utf-8"))
-        anew = {name.partition("::")[0] for name in calls.seconds}
-        kept = [name if (file := name.partition("::")[0]) not in anew and (ROOT / file).exists() else None
-                for name, _ in table["tests"]]  # fmt: skip
+        files = {name.partition("::")[0] for name in calls.collected}
+        kept = [
+            name
+            if name not in calls.seconds
+            and (name in calls.collected if (file := name.partition("::")[0]) in files else (ROOT / file).exists())
+            else None
+            for name, _ in table["tests"]
+        ]
         seconds.update((name, own) for name, (_, own) in zip(kept, table["tests"], strict=True) if name)
         for key, own in table["functions"].items():
             functions[key].update(name for k in own if (name := kept[k]))

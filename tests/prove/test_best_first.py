@@ -69,6 +69,24 @@ def test_what_is_left_bounds_all_that_was_not_looked_at(most: int) -> None:
     assert [one.bound for one in search.coming(3)] == sorted(one.bound for one in search.waiting)[:3]
 
 
+def test_places_told_are_the_middles_of_the_least_boxes_left() -> None:
+    """Of the square of the distance from a place, bounded on each box by its nearest point."""
+    place = np.array([2.3, 7.1])
+
+    class Distance:
+        what, at_once = "boxes", 1
+
+        def bounds(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            nearest = np.clip(place, lower, upper)
+            return 1.0 + np.square(nearest - place).sum(axis=1), np.argmax(upper - lower, axis=1)
+
+    found = divide(Distance(), np.array([1.0, 5.0]), np.array([4.0, 9.0]), 1.05, 0.0, 60)
+    assert found.bound == 1.0
+    assert found.places
+    for told in found.places:
+        assert np.abs(told - place).max() < 1.5
+
+
 def test_nothing_allowed_leaves_nothing_and_no_time_leaves_the_whole() -> None:
     search = Least(np.arange(8.0))
     assert search.divide(EMPTY, 10) == math.inf

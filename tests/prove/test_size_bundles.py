@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import itertools
 import math
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 
 from laufruhe.load_models.sized_model import MASSES
 from laufruhe.problem.decision import Decision, Domain
 from laufruhe.problem.sets import Interval, Sector
 from laufruhe.prove.boxes.size_bundles import Reach
+from laufruhe.prove.boxes.sizes import SizeBoxes
 
 
 def test_the_least_is_that_of_a_corner() -> None:
@@ -28,3 +31,16 @@ def test_the_least_is_that_of_a_corner() -> None:
         brute = function[0] + masses + weights
         assert brute - 1e-4 <= float(reach.least(function[None])[0]) <= brute + 1e-12
     assert reach.most.tolist() == [1.0, *np.maximum(np.abs(low), np.abs(high)), 0.5, 0.3, 0.3]
+
+
+def test_each_size_takes_numbers_one_way_or_is_refused() -> None:
+    names = [SimpleNamespace(name=name) for name in ("bore", "stroke")]
+    model = SimpleNamespace(lower=np.zeros(2), upper=np.ones(2), problem=SimpleNamespace(decisions=names))
+    boxes = SimpleNamespace(model=model)
+    assert SizeBoxes._ways(boxes, lambda x: np.array([x[0] + x[1], x[1]])).tolist() == [1.0, 1.0]
+    assert SizeBoxes._ways(boxes, lambda x: np.array([-2.0 * x[1], 3.0])).tolist() == [0.0, -1.0]
+    with pytest.raises(ValueError, match="one way with bore"):
+        SizeBoxes._ways(boxes, lambda x: np.array([x[0], -x[0]]))
+    # it rises where the other is least, and falls where that is most
+    with pytest.raises(ValueError, match="one way with bore"):
+        SizeBoxes._ways(boxes, lambda x: np.array([x[0] * (0.5 - x[1])]))
