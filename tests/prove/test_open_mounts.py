@@ -14,6 +14,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Sector
 from laufruhe.prove.mounts.rest_limits import RestLimits
 from laufruhe.prove.springs.columns import columns_of
+from laufruhe.prove.springs.mirrored import mirrored_parts
 from laufruhe.prove.springs.open_mounts import OpenMounts, open_mounts
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 
@@ -55,6 +56,16 @@ def test_no_stiffness_of_a_box_is_outside_of_what_is_known(tmp_path: Path, place
         size = float(np.linalg.norm(own))
         assert least(mounts.most - own) >= -1e-9 * size
         assert least(own - mounts.least) >= -1e-9 * size
+
+
+def test_mounts_that_mirror_each_other_move_in_two_halves(tmp_path: Path) -> None:
+    """Fore and aft, up and pitch; aside, roll and yaw: their stiffness has the same principal values together."""
+    whole = known(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, RMS))
+    parts = mirrored_parts(whole)
+    assert [part.size for part in parts] == [3, 3]
+    for side in ("least", "most"):
+        values = np.concatenate([np.linalg.eigvalsh(getattr(part, side)) for part in parts])
+        assert np.sort(values) == pytest.approx(np.linalg.eigvalsh(getattr(whole, side)), rel=1e-9)
 
 
 def test_limits_on_frequencies_are_those_of_the_stiffness(tmp_path: Path) -> None:

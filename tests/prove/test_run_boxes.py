@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -31,7 +32,7 @@ from laufruhe.prove.mounts.box_norms import Under
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.prove.mounts.box_runs import RunBoxes, bounds_runs
 from laufruhe.prove.mounts.run_matrices import RunMatrices
-from laufruhe.prove.mounts.run_motion import Steps, equations
+from laufruhe.prove.mounts.run_motion import Steps, _force, equations
 from laufruhe.prove.mounts.subdivision import divided_bound
 from laufruhe.solvers import Status
 from problem_files import PROBLEMS
@@ -231,6 +232,58 @@ def test_losses_drive_no_more_than_is_told(seed: int) -> None:
         for x in boxes.designs(box, 20):
             damping = time_model(boxes.model.mounting(x)).damping
             assert np.linalg.eigvalsh(0.5 * (damping + damping.T))[0] >= -of.drives[box] - 1e-9 * np.abs(damping).max()
+
+
+@pytest.mark.parametrize("seed", first_fast((2, 5, 0), 2))
+def test_what_moves_a_design_is_as_near_to_its_orders_as_they_say(seed: int) -> None:
+    """z' = A z of every design in a box: A to the second order, and no entry of the rest over what is told."""
+    boxes, scale = of_seed(seed), 80.0
+    of = equations(boxes.model, RunMatrices(boxes.model), scale, boxes.lower, boxes.upper)
+    n, pairs = of.turn.shape[1], pairs_of(of.halves.shape[1])
+    bent = 0.0
+    for box, turn in enumerate(of.turn):
+        middle, half = 0.5 * (boxes.lower + boxes.upper)[box], of.halves[box]
+        for x in boxes.designs(box, 12):
+            model, s = time_model(boxes.model.mounting(x)), (x - middle) / half
+            told = of.matrix[box] + np.tensordot(s, of.first[box], axes=1)
+            second = sum(s[j] * s[k] * own for own, (j, k) in zip(of.second[box], pairs, strict=True))
+            exact = turn.T @ model.stiffness @ turn, turn.T @ model.damping @ turn
+            size = np.abs(exact[1]).max() + 1e-12
+            assert -scale * told[n:, :n] == pytest.approx(exact[0], rel=1e-9, abs=1e-9 * np.abs(exact[0]).max())
+            off = np.abs(exact[1] + (told + second)[n:, n:])
+            assert np.all(off <= of.maps.rest[box] * (1.0 + 1e-9) + 1e-9 * size)
+            bent = max(bent, float((np.abs(exact[1] + told[n:, n:]) - of.maps.rest[box]).max()) / size)
+    # the second order is needed
+    assert bent > 1e-6 or not of.maps.bends.any()
+
+
+def test_what_orders_leave_of_forces_is_no_more_than_is_told() -> None:
+    """Second orders of motion by first ones of forces, bends by both, and a rest that any motion meets."""
+    r = np.random.default_rng(8)
+    boxes, sides, n, times = 2, 3, 4, 5
+    pairs = pairs_of(sides)
+    first, bends = r.normal(size=(boxes, sides, 2 * n, 2 * n)), r.normal(size=(boxes, len(pairs), n, n))
+    rest = np.abs(r.normal(size=(boxes, n, n)))
+    middle, by, bent = (r.normal(size=(boxes, *more, 2 * n, times)) for more in ((), (sides,), (len(pairs),)))
+    for shares in ((1.0, 1.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
+        own, curved, left = (share * each for share, each in zip(shares, (first, bends, rest), strict=True))
+        of = SimpleNamespace(count=boxes, first=own, maps=SimpleNamespace(bends=curved, rest=left))
+        told, most = _force(of, middle, by, bent), np.zeros((boxes, times))
+        for s in np.vstack([r.uniform(-1.0, 1.0, (20, sides)), r.choice([-1.0, 1.0], (20, sides))]):
+            products = np.array([s[j] * s[k] for j, k in pairs])
+            once, twice = np.einsum("j,bjmt->bmt", s, by), np.einsum("p,bpmt->bmt", products, bent)
+            force = np.einsum("j,bjnm,bmt->bnt", s, own[:, :, n:], twice)
+            force += np.einsum("p,bpnm,bmt->bnt", products, curved, (once + twice)[:, n:])
+            unknown = r.choice([-1.0, 1.0], left.shape) * left
+            force += unknown @ (middle + once + twice)[:, n:]
+            most = np.maximum(most, np.linalg.norm(force, axis=1))
+        assert np.all(most <= told * (1.0 + 1e-12))
+        assert np.all(told <= 30.0 * most)
+    # where nothing has a sign of its own the corner has all of what bends tell
+    curved, by, bent = (np.abs(each) for each in (bends, by, bent))
+    of = SimpleNamespace(count=boxes, first=0.0 * first, maps=SimpleNamespace(bends=curved, rest=0.0 * rest))
+    force = curved.sum(axis=1) @ (by.sum(axis=1) + bent.sum(axis=1))[:, n:]
+    assert _force(of, middle, by, bent) == pytest.approx(np.linalg.norm(force, axis=1), rel=1e-12)
 
 
 @pytest.mark.slow
