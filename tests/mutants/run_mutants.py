@@ -8,8 +8,8 @@
 long. Tests run in the order of their cost until `--seconds` of a core are used. A survivor is either equal to the
 source in all that it returns, or shows a test that is missing.
 
-A log keeps what became of each mutant. While its file stays as it is, what is killed is not run again, and a survivor
-meets only tests that it has not met yet. Every test that kills has to pass without any change.
+A log keeps what became of each mutant. While the code of its file stays as it is, what is killed is not run again, and
+a survivor meets only tests that it has not met yet. Every test that kills has to pass without any change.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from __future__ import annotations
 import argparse
 import compileall
 import contextlib
-import hashlib
 import json
 import os
 import shutil
@@ -36,7 +35,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from mutants.single_lines import ROOMS, SOURCE, Mutant, drawn  # noqa: E402
+from mutants.single_lines import ROOMS, SOURCE, Mutant, code_of, drawn  # noqa: E402
 
 PAGE = ROOT / "results" / "mutants" / "README.md"
 MAP = ROOT / ".pytest_cache" / "functions-of-tests.json"
@@ -45,7 +44,7 @@ OPTIONS = ("-q", "-p", "no:xdist", "-p", "no:cacheprovider", "--import-mode=impo
 LOG = MAP.with_name("mutants.jsonl")
 """What became of each mutant, one a line; a run goes on where the last one ended."""
 FEW = 10
-Key = tuple[str, int, str, str]
+Key = tuple[str, str]
 KILLED, SURVIVED, UNREACHED = "killed", "survived", "not called by any test"
 
 
@@ -199,12 +198,11 @@ def run(arguments: argparse.Namespace) -> None:
     sample = drawn(arguments.number, arguments.seed)
     if arguments.files:
         sample = [mutant for mutant in sample if any(part in mutant.file for part in arguments.files)]
-    digests = {m.file: hashlib.sha256((SOURCE / m.file).read_bytes()).hexdigest() for m in sample}
     killers: dict[Key, list[str]] = {}
     passed: dict[Key, set[str]] = defaultdict(set)
     for line in LOG.read_text(encoding="utf-8").splitlines() if LOG.exists() else ():
         entry = json.loads(line)
-        key = entry["file"], entry["line"], entry["after"], entry["digest"]
+        key = entry["change"], entry["code"]
         if entry["outcome"] == KILLED:
             killers[key] = entry["failed"]
         passed[key].update(entry["passed"])
@@ -217,7 +215,7 @@ def run(arguments: argparse.Namespace) -> None:
             compileall.compile_dir(Path(folder) / str(k), quiet=2)
 
         def tried(mutant: Mutant) -> tuple[str, list[str]]:
-            key = mutant.file, mutant.line, mutant.after, digests[mutant.file]
+            key = mutant.change, code_of(mutant.file)
             if (failed := killers.get(key)) is not None:
                 return KILLED, failed
             tests = tests_of(mutant, table, arguments.seconds, passed[key])
@@ -228,8 +226,8 @@ def run(arguments: argparse.Namespace) -> None:
                 said, failed = outcome(mutant, tests, source, arguments.seconds)
             finally:
                 copies.put(source)
-            entry = {"file": mutant.file, "line": mutant.line, "after": mutant.after, "digest": digests[mutant.file],
-                     "outcome": said, "failed": failed, "passed": tests if said == SURVIVED else []}  # fmt: skip
+            entry = {"change": key[0], "code": key[1], "outcome": said, "failed": failed,
+                     "passed": tests if said == SURVIVED else []}  # fmt: skip
             log.write(f"{json.dumps(entry)}\n")
             log.flush()
             return said, failed
@@ -259,7 +257,7 @@ def page(found: Iterable[tuple[Mutant, str]], arguments: argparse.Namespace) -> 
         "",
         f"Made by `make mutants`: {len(found)} mutants drawn with seed {arguments.seed} from all single-line changes",
         "of operators, numbers, signs and extremes in the rooms below. Each runs the tests that call its function, for",
-        f"{arguments.seconds:g} s of a core at most. What is killed is not run again while its file stays as it is.",
+        f"{arguments.seconds:g} s of a core at most. What is killed is not run again while the code of its file stays.",
         "All tests that kill pass without any change. A survivor is a change that no test sees.",
         "",
         "| room | mutants | killed | share |",

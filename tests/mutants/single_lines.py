@@ -6,7 +6,7 @@ import ast
 import hashlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -38,6 +38,8 @@ class Mutant:
         Number of the line, from 1.
     before, after
         The line without and with the change.
+    repeat
+        How many equal changes its function has above it.
     """
 
     file: str
@@ -45,11 +47,12 @@ class Mutant:
     line: int
     before: str
     after: str
+    repeat: int = 0
 
     @property
     def change(self) -> str:
         """Return what is changed where; lines above it that come or go leave it as it is."""
-        return f"{self.file}:{self.function}: {self.before.strip()}  ->  {self.after.strip()}"
+        return f"{self.file}:{self.function}: {self.before.strip()}  ->  {self.after.strip()} {self.repeat}"
 
     def __str__(self) -> str:
         return f"{self.file}:{self.line}: {self.before.strip()}  ->  {self.after.strip()}"
@@ -67,7 +70,26 @@ def mutants_of(path: Path) -> list[Mutant]:
         for line, start, end, new in _changes(node, lines):
             old = lines[line - 1]
             found.append(Mutant(str(path.relative_to(SOURCE)), function, line, old, f"{old[:start]}{new}{old[end:]}"))
-    return list(dict.fromkeys(found))
+    seen: Counter[str] = Counter()
+    numbered = []
+    for mutant in dict.fromkeys(found):
+        numbered.append(replace(mutant, repeat=seen[mutant.change]))
+        seen[mutant.change] += 1
+    return numbered
+
+
+@cache
+def code_of(file: str) -> str:
+    """Return a hash of what Python runs of a file: comments, docstrings and places of lines do not count."""
+    tree = ast.parse((SOURCE / file).read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            node.body = [each for each in node.body if not _is_text(each)]
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+
+
+def _is_text(node: ast.stmt) -> bool:
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
 
 
 @cache
@@ -82,12 +104,7 @@ def drawn(number: int, seed: int) -> list[Mutant]:
 
     Each mutant draws its own place from a hash of its change, so an edit of the source leaves all others in the sample.
     """
-    seen: Counter[str] = Counter()
-    places = []
-    for mutant in all_mutants():
-        text = f"{seed} {mutant.change} {seen[mutant.change]}"
-        seen[mutant.change] += 1
-        places.append((hashlib.sha256(text.encode()).digest(), mutant))
+    places = [(hashlib.sha256(f"{seed} {mutant.change}".encode()).digest(), mutant) for mutant in all_mutants()]
     return [mutant for _, mutant in sorted(places, key=lambda pair: pair[0])[:number]]
 
 
