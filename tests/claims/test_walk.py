@@ -13,6 +13,7 @@ import pytest
 
 from laufruhe.errors import ModelError
 from laufruhe.files.reader import load
+from laufruhe.machine.firing import lap_orders
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, lengths
 from laufruhe.numerics.norms.maximum import Maximum
@@ -22,15 +23,16 @@ from laufruhe.problem.channels import CHANNELS, ON_BLOCK, LoadChannel, Needs
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import MEASURES, Measure
+from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Over
 from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve, walk
-from laufruhe.solvers.conclusion import decision_values
+from laufruhe.solvers.conclusion import decision_values, state
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.conclusion import with_star
-from laufruhe.solvers.stars.ranking import candidates_of
+from laufruhe.solvers.stars.ranking import candidates_of, ranked_star, ranking_result
 from laufruhe.solvers.tolerances import assembly
 from problem_files import PROBLEMS
 from ready import solved
@@ -136,6 +138,33 @@ def test_a_star_that_was_pruned_is_found_out(rank: int) -> None:
     assert found.phasing is not None
     assert found.phasing.ranking[0].value == pytest.approx(result.objective.value, rel=1e-9)
     assert not any(star.proven for star in found.phasing.ranking)
+
+
+def test_throws_are_walked_from_the_star_that_is_told_and_from_no_other() -> None:
+    """Every throw and angle of the best star may move, and its cranks change places; of no star there is nothing."""
+    problem = load(PROBLEMS / "inline-seven-uneven.toml")
+    assert problem.phasing is not None
+    phasing, throws = problem.phasing, tuple(math.tau * k / 7 for k in range(7))
+    layout = phasing.layout_of(Candidate(throws))
+    candidate = Candidate(throws, next(lap_orders(phasing.cycle, layout, throws)))
+    star = state(replace(phasing.realise(candidate), phasing=None))
+    assert star.objective is not None
+    ranked = ranked_star(phasing, candidate, None, star.objective.value, 0.0, False)
+    details = ranking_result(phasing, candidate, [ranked], 1, 1, "one star")
+    result = with_star(problem, phasing, star, candidate, star.certificate, details)
+    start = walk._start(result)
+    assert start.candidate is not None
+    assert start.candidate.throws == pytest.approx(throws)
+    assert start.candidate.firing_order == ranked.firing_orders[0].order
+    own = walk._Walk(result, start)
+    assert len(own._angles()) == 7 + 2
+    # 21 pairs, alone; two of three pairs of ends in two ways, with their mirror images; and other firing orders
+    assert len(own._stars()) == 21 + 3 * 2 + walk.ORDERS
+    unlisted = replace(details, ranking=(replace(ranked, firing_orders=()),))
+    for without in (replace(result, phasing=None), replace(result, phasing=unlisted)):
+        start = walk._start(without)
+        assert start.candidate is None
+        assert walk._Walk(without, start)._angles() == walk._Walk(without, start)._stars() == []
 
 
 @pytest.fixture
