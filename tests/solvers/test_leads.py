@@ -14,6 +14,8 @@ from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
+from laufruhe.solvers.boxes.leads import _Box, _Search
+from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.result import Status
 from problem_files import PROBLEMS, changed, loaded
 
@@ -208,6 +210,28 @@ def test_weights_and_the_angle_are_proven_together(tmp_path: Path) -> None:
     assert set(values) == {150, 165, 170, 175, 177, 178, 180}
     free = solve(loaded(tmp_path, COUPLED.split("[[constraints]]")[0] + "[fidelity]\nsamples = 120\n"))
     assert objective_value(free.problem, free.final) <= value * (1.0 + 1e-4)
+
+
+def test_a_box_near_the_best_design_is_bounded_at_all_angles(tmp_path: Path) -> None:
+    """A quarter of the angles is enough far from it; near it a peak between them counts, and no design is under it."""
+    text = changed(COUPLED.split("[[constraints]]")[0], '"rms mount force"', '"maximum mount force"')
+    search = _Search(loaded(tmp_path, text + "[fidelity]\nsamples = 96\n"))
+    for low, high in np.radians([[176.0, 177.0], [150.0, 150.1]]):
+        ends = np.array([low]), np.array([high])
+        far = search.box(*ends)
+        assert isinstance(far, _Box)
+        values = [far.bound * factor for factor in (1.0 + search.problem.tolerance, 2.0, 0.5)]
+        near, above, under = (search.box(*ends, 0.0, value) for value in values)
+        assert isinstance(near, _Box)
+        assert isinstance(above, _Box)
+        assert isinstance(under, _Box)
+        assert near.bound > 1.002 * far.bound
+        for lead in np.linspace(low, high, 3):
+            program, _ = search.model.at(np.array([lead]), search.samples)
+            weights = solve_cones(program).x
+            assert weights is not None
+            assert near.bound <= program.objective(weights) * (1.0 + 1e-9)
+        assert above.bound == under.bound == far.bound
 
 
 def test_limits_that_no_angle_keeps_are_named(tmp_path: Path) -> None:
