@@ -29,6 +29,7 @@ from laufruhe.solvers.mounts.nonlinear import mounts_bound, solve_joint, solve_m
 from laufruhe.solvers.mounts.search import Found, MountSearch
 from laufruhe.solvers.mounts.starts import start_points
 from laufruhe.solvers.result import Status
+from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 from laufruhe.solvers.smooth.program import SmoothProgram
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, problem_of
 from problem_files import PROBLEMS
@@ -439,6 +440,44 @@ def test_a_search_has_as_many_starts_as_it_is_given(starts, tmp_path):
         search.run()
     assert list(search.best.design.values) == given
     assert search.best.design.value == pytest.approx(values[0], rel=1e-12)
+
+
+def test_limits_with_room_at_every_start_are_no_rows(tmp_path):
+    """Limits on loads of which every start leaves more than half; a search has hundreds of rows less."""
+    limit = '[[constraints]]\nlimit = "rms mount force"\nmax = "1 N"\n'
+    own = "[search]\nstarts = 3\n[fidelity]\nsamples = 72\n"
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], limit, own)
+    (held,) = problem.limits
+    designs = [problem.design(mounts) for mounts, _ in start_points(problem)[0]]
+    most = max(evaluate(problem, engine).value(held.measure) for engine in designs)
+    sides = {"wide": 2.1, "near": 1.9, "broken": 0.5}
+    limits = tuple(replace(held, name=name, maximum=share * most) for name, share in sides.items())
+    search = MountSearch(replace(problem, limits=limits), evaluate(problem))
+    assert [each.name for each in search._left_out] == ["wide"]
+    assert set(search.joint.program.constraint_names) == {"near", "broken"}
+
+
+@pytest.mark.parametrize(
+    ("ends", "chosen"), [([(2.0, 0.0), (1.0, 1e-8)], 1), ([(2.0, 0.3), (1.0, 0.5)], 0)], ids=["ends", "none"]
+)
+def test_a_search_is_refined_from_its_best_end(ends, chosen, tmp_path, monkeypatch):
+    """Where no start ended within the limits, from the one that misses them least."""
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], SEARCH)
+    search, begun = MountSearch(problem, evaluate(problem)), []
+    places = np.array([[2e5, 3e5], [4e5, 5e5]])
+    search.optima = tuple(
+        LocalOptimum(search.joint.start(place, np.zeros(0)), value, none, none, 0.0, over, 1, 0.0, Ending.CONVERGED, 0)
+        for place, (value, over) in zip(places, ends, strict=True)
+        for none in [np.zeros(0)]
+    )
+
+    def ended(starts):
+        begun.extend(starts)
+        return ()
+
+    monkeypatch.setattr(search, "_ends", ended)
+    search.refined()
+    assert [search.joint.split(start)[0] for start in begun] == [pytest.approx(places[chosen])]
 
 
 def test_what_nothing_open_moves_is_a_number_of_the_program(tmp_path):
