@@ -20,8 +20,8 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report.trade import INDEX, choices, index, trade_document
-from laufruhe.solvers.conclusion import state, values_of
-from laufruhe.solvers.nearby import _is_like, first_of, next_to
+from laufruhe.solvers.conclusion import decision_values, state, values_of
+from laufruhe.solvers.nearby import NEAR_BOXES, _begun, _is_like, first_of, next_to
 from laufruhe.solvers.result import Status
 from laufruhe.studies.trade import Row, Trade, trade
 from problem_files import PROBLEMS
@@ -75,6 +75,24 @@ def test_a_design_known_is_trusted_where_it_is_worth_about_the_same() -> None:
         faster = replace(problem, points=(replace(point, speed=factor * point.speed),))
         assert _is_like(faster, known) is is_like
     assert not _is_like(problem, replace(known, objective=None))
+
+
+def test_a_search_begins_at_the_design_known_and_nowhere_else() -> None:
+    """Its numbers are the start and stand in the engine; nothing is proven of it, by few boxes or none."""
+    problem = load(PROBLEMS / "tractor-four-shaft-heights.toml")
+    sides = [(d.set.lower + 0.25 * (d.set.upper - d.set.lower)) * d.set.directions[0] for d in problem.decisions]
+    values = [v.real if d.place_drives else v for d, v in zip(problem.decisions, sides, strict=True)]
+    moved = problem.held(values)
+    known = state(replace(moved, decisions=()))
+    entries = tuple(e for d, v in zip(problem.decisions, values, strict=True) for e in decision_values(d, v))
+    begun = _begun(problem, replace(known, problem=problem, decisions=entries))
+    assert [d.start for d in begun.decisions] == pytest.approx(values)
+    assert begun.engine == moved.engine
+    assert (begun.search.starts, begun.search.boxes, begun.search.proves) == (1, NEAR_BOXES, False)
+    rigid = scenes.problem_of(scenes.TIGHT)
+    held = replace(state(replace(rigid, decisions=())), problem=rigid, decisions=())
+    told = tuple(e for d in rigid.decisions for e in decision_values(d, d.start))
+    assert _begun(rigid, replace(held, decisions=told)).search.boxes == 0
 
 
 @pytest.mark.slow
