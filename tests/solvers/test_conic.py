@@ -14,6 +14,7 @@ import pytest
 from scipy.sparse import coo_array, csc_array
 
 import laufruhe
+from cli import scenes
 from laufruhe import load
 from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineNorm, AffineProblem
 from laufruhe.numerics.norms import NORMS, Norm
@@ -103,6 +104,23 @@ def test_limits_and_their_prices() -> None:
     assert affine.objective(solution.x) == pytest.approx(stated(affine), rel=1e-6)
     less, more = (stated(AffineModel(limited(at)).at(96)) for at in (0.499, 0.501))
     assert solution.multipliers.shadow_prices(affine)[0] == pytest.approx((less - more) / 0.002, rel=1e-3)
+
+
+@pytest.mark.parametrize("factor", [1e-6, 1e-3, 1e6])
+def test_the_size_of_the_weights_changes_nothing(factor: float, tmp_path: Path) -> None:
+    """Under a limit that holds: the same design, its bound and the price of the limit in the unit of the sum."""
+    problem = loaded(tmp_path, scenes.TIGHT)
+    program = AffineModel(problem).at(72)
+    weighted = replace(program, terms=tuple((factor * weight, norm) for weight, norm in program.terms))
+    one, other = solve_cones(program), solve_cones(weighted)
+    assert one.x is not None
+    assert other.x == pytest.approx(one.x, rel=1e-12)
+    bounds = [lower_bound(own, found.multipliers) for own, found in ((program, one), (weighted, other))]
+    assert bounds[1].value == pytest.approx(factor * bounds[0].value, rel=1e-12)
+    assert bounds[0].value == pytest.approx(program.objective(one.x), rel=1e-6)
+    prices = [bound.multipliers.shadow_prices(own) for bound, own in zip(bounds, (program, weighted), strict=True)]
+    assert prices[0][0] > 0.0
+    assert prices[1] == pytest.approx([factor * price for price in prices[0]], rel=1e-12)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.7, 1.0])

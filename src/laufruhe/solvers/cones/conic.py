@@ -53,21 +53,23 @@ def solve_cones(problem: AffineProblem, held: tuple[Array, Array] | None = None)
     if equations is not None:
         binding = [k for k in binding if k not in equal]
         held = equations.beside(held)
-    fewer = replace(
-        problem, terms=tuple(problem.terms[k] for k in acting), limits=tuple(problem.limits[k] for k in binding)
-    )
-    found = _by_few_rows(fewer, held)
+    # weights in units of the largest, for the tolerances of the solver are absolute
+    size = max((problem.terms[k][0] for k in acting), default=0.0) or 1.0
+    terms = tuple((weight / size, norm) for weight, norm in (problem.terms[k] for k in acting))
+    found = _by_few_rows(replace(problem, terms=terms, limits=tuple(problem.limits[k] for k in binding)), held)
+    found = replace(found, prices=size * found.prices)
     # of a term that nothing acts on its own rows tell all
-    terms = [norm.subgradient(np.zeros(problem.size)) for _, norm in problem.terms]
+    rows = [norm.subgradient(np.zeros(problem.size)) for _, norm in problem.terms]
     limits = [np.zeros_like(norm.constant) for _, norm in problem.limits]
-    for kept, rows, own in ((acting, terms, found.multipliers.terms), (binding, limits, found.multipliers.limits)):
-        for k, z in zip(kept, own, strict=False):
-            rows[k] = z
+    for k, z in zip(acting, found.multipliers.terms, strict=False):
+        rows[k] = z
+    for k, z in zip(binding, found.multipliers.limits, strict=False):
+        limits[k] = size * z
     if equations is not None and found.x is not None:
         found = replace(found, x=equations.kept(problem, found.x))
         for k, z in zip(equal, equations.rows(found.prices), strict=True):
             limits[k] = z
-    return replace(found, multipliers=Multipliers(tuple(terms), tuple(limits)))
+    return replace(found, multipliers=Multipliers(tuple(rows), tuple(limits)))
 
 
 def _by_few_rows(problem: AffineProblem, held: tuple[Array, Array] | None) -> ConicSolution:
