@@ -202,3 +202,32 @@ def test_multipliers_of_edges_that_hang_together() -> None:
     (only,) = prices_of(peak, [], np.array([[1.0, 0.0]])) or ()
     assert (only.relaxed, only.tightened) == pytest.approx((0.0, 1.0), abs=1e-5)
     assert prices_of([Slopes.smooth(np.array([1.0, 0.0]))], [], np.array([[0.0, 1.0]])) is None
+
+
+def test_two_limits_that_say_the_same_share_their_price() -> None:
+    """x at most 1, twice, and 2 x wanted: to relax one of them gains nothing, to tighten one costs all."""
+    limit = Slopes.smooth(np.array([1.0, 0.0]))
+    found = prices_of([Slopes.smooth(np.array([-2.0, 0.0]))], [limit, limit], np.zeros((0, 2)))
+    assert found is not None
+    for price in found:
+        assert (price.relaxed, price.tightened) == pytest.approx((0.0, 2.0), abs=1e-4)
+
+
+def test_a_limit_at_its_kink_beside_a_bound() -> None:
+    """x + y wanted, max(x, y) and x at most 1: relaxed by e the limit gains e of y, tightened it costs both."""
+    kinked = Slopes(np.array([[1.0, 0.0], [0.0, 1.0]]), np.zeros((0, 2)))
+    found = prices_of([Slopes.smooth(np.array([-1.0, -1.0]))], [kinked], np.array([[1.0, 0.0]]))
+    assert found is not None
+    limit, bound = found
+    assert (limit.relaxed, limit.tightened) == pytest.approx((1.0, 2.0), abs=1e-4)
+    assert (bound.relaxed, bound.tightened) == pytest.approx((0.0, 1.0), abs=1e-4)
+    assert not limit.is_one
+    assert limit.other == limit.tightened
+
+
+def test_sides_within_two_percent_are_one_price() -> None:
+    assert Price.both(3.0).is_one
+    assert Price(3.0, 3.05).other is None
+    assert Price(3.0, 3.1).other == 3.1
+    assert (Price(1.0, 2.0) + Price.both(3.0)) == Price(4.0, 5.0)
+    assert Price(1e-9, 2.0).felt(1e-6) == Price(0.0, 2.0)

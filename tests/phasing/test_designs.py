@@ -85,6 +85,23 @@ def _turn(decision):
     return (gain / abs(gain)).conjugate()
 
 
+@pytest.mark.parametrize("built", [(), (0,), (1,), (0, 1)])
+def test_a_set_of_shafts_is_worth_what_an_engine_with_these_alone_is(tmp_path, built):
+    """One star, the shafts that are not built taken out of the file's engine, and a weight that is always there."""
+    weight = engines.WEIGHTS.partition('[[counterweights]]\nname = "rear"')[0]
+    problem = engines.problem(tmp_path, 3, rest=engines.MOUNTS + weight + TWO_SHAFTS + engines.MOUNT_FORCE)
+    model, stars = model_of(problem)
+    star, owners = tuple(map(int, stars[0])), owners_of(model)
+    found, _ = solve_design(model, star, built, owners, 1e-4, nothing_of(problem))
+    candidate = replace(
+        model.phasing.star(star, model.space.phases, model.geometry), left_out=model.phasing.without(built)
+    )
+    alone = solve(replace(model.phasing.realise(candidate), phasing=None))
+    assert alone.certificate.kind is Proof.GLOBAL
+    assert found.value == pytest.approx(alone.objective.value, rel=2e-4)
+    assert coarse_value(model, star, built, owners) == pytest.approx(found.value, rel=0.02)
+
+
 @pytest.mark.parametrize("name", ["mean", "maximum", "balance factor", "limited"])
 def test_a_cut_is_the_certificate_of_every_star(tmp_path, name):
     problem = engines.problem(tmp_path, 4, rest=CASES[name])

@@ -109,9 +109,9 @@ class Slopes:
         return np.asarray(self.hull[np.unique(np.argmax(self.hull @ ways.T, axis=0))])
 
     @property
-    def rows(self) -> Array:
-        """One slope, the others less it, and the segments."""
-        return np.concatenate([self.hull[:1], self.hull[1:] - self.hull[:1], self.segments])
+    def is_smooth(self) -> bool:
+        """Tell if there is one slope alone."""
+        return len(self.hull) + len(self.segments) == 1
 
 
 def prices_of(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array) -> list[Price] | None:
@@ -133,14 +133,13 @@ def prices_of(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Arra
     count = len(limits) + len(edges)
     if not count:
         return []
-    kinks = [own.rows[1:] for own in objective]
-    held = [*(own.rows for own in limits), *(edge[None] for edge in edges)]
     slope = np.sum([own.hull[0] for own in objective], axis=0)
-    size = max(float(np.abs(slope).max()), *(float(np.abs(own).max(initial=0.0)) for own in kinks), 0.0)
+    turns = [rows for own in objective for rows in (np.ptp(own.hull, axis=0), own.segments)]
+    size = max(float(np.abs(rows).max(initial=0.0)) for rows in (slope, *turns))
     if not size:
         return None
-    if all(not len(own) for own in kinks) and all(len(own) == 1 for own in held):
-        unique = _unique(np.concatenate(held), slope)
+    if all(own.is_smooth for own in (*objective, *limits)):
+        unique = _unique(np.concatenate([*(own.hull for own in limits), edges]), slope)
         if unique is not None:
             return [Price.both(price) for price in unique]
     return _ranges(objective, limits, edges, size)
@@ -163,7 +162,8 @@ def _unique(rows: Array, slope: Array) -> list[float] | None:
 def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array, size: float) -> list[Price] | None:
     """Return least and largest multiplier of each by linear programs over all that balance."""
     shares, count = [*objective, *limits, *(Slopes.smooth(edge) for edge in edges)], len(objective)
-    scales = [size] * count + [float(np.abs(own.rows).max()) or 1.0 for own in shares[count:]]
+    sizes = [max(float(np.abs(rows).max(initial=0.0)) for rows in (own.hull, own.segments)) for own in shares]
+    scales = [size] * count + [own or 1.0 for own in sizes[count:]]
     parts = [part / scale for own, scale in zip(shares, scales, strict=True) for part in (own.corners, own.segments)]
     columns = np.concatenate(parts)
     numbers = np.split(np.arange(len(columns)), np.cumsum([len(part) for part in parts])[:-1])

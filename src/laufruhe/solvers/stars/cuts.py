@@ -154,7 +154,6 @@ class _Search:
         self._open[row, column] = False
         if cut is not None:
             self._prove(cut, found is None)
-        self.bounds[row, column] = np.inf if found is None else max(found.bound, self.bounds[row, column])
         self._open &= np.isfinite(self.bounds)
         if found is None:
             self.infeasible += 1

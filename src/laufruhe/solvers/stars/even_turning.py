@@ -133,9 +133,11 @@ def _firings(phasing: Phasing, designs: Sequence[Candidate]) -> Array:
 def _degrees(problem: Problem, measure: Measure, fires: Array) -> Array:
     """What one order says, the most of all operating points that count."""
     inertia, least = turning_inertia(problem.engine, problem.fidelity), np.zeros(len(fires))
-    for point in problem.points if inertia is not None and math.isfinite(inertia) else ():
+    if inertia is None or not math.isfinite(inertia):
+        return least
+    for point in problem.points:
         if measure.points is None or point.name in measure.points:
-            bound = SwingBound.of(problem.engine, point, problem.fidelity, inertia or 0.0)
+            bound = SwingBound.of(problem.engine, point, problem.fidelity, inertia)
             if bound is not None and bound.work.shape[0] == fires.shape[1]:
                 parts = [bound.least(fires[k : k + _AT_ONCE]) for k in range(0, len(fires), _AT_ONCE)]
                 least = np.maximum(least, np.concatenate(parts))

@@ -70,7 +70,7 @@ def solve_design(
     full, proves = model.samples, model.problem.search.proves
     # what bounds means that are averaged bounds the whole cycle (P7)
     fine, sound = model.at(full), model.at(full, averaged=True)
-    kept = tuple(own < 0 or own in built for own in owners)
+    kept = _kept(owners, built)
     whole, averaged = _only(fine.at(star), kept), _only(sound.at(star), kept)
     idle = [not norm.slope.any() for _, norm in whole.limits]
     if _broken(model, star, whole, idle):
@@ -106,7 +106,7 @@ def solve_design(
 
 def coarse_value(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int]) -> float:
     """The least objective of one star with one set of shafts at few angles; infinite where it keeps no limit."""
-    kept = tuple(own < 0 or own in built for own in owners)
+    kept = _kept(owners, built)
     affine = _only(model.at(_grids(model.samples)[0]).at(star), kept)
     if not any(kept):
         return affine.objective(np.zeros(affine.size))
@@ -162,8 +162,7 @@ def _by_averages(
     cut = cut_of(wide, Multipliers(none, _with_idle(found.multipliers, wide, idle).limits))
     if cut.excludes(np.array([star]), [built], owners).all():
         return found, cut
-    kept = tuple(own < 0 or own in built for own in owners)
-    found = solve_cones(_acting(_only(wide.at(star), kept), idle))
+    found = solve_cones(_acting(_only(wide.at(star), _kept(owners, built)), idle))
     return found, cut_of(wide, Multipliers(none, _with_idle(found.multipliers, wide, idle).limits))
 
 
@@ -187,6 +186,11 @@ def _grids(full: int) -> list[int]:
         if n >= 3 * chosen[-1] and n % chosen[-1] == 0:
             chosen.append(n)
     return chosen
+
+
+def _kept(owners: Sequence[int], built: tuple[int, ...]) -> tuple[bool, ...]:
+    """Return for every decision if its shaft is built."""
+    return tuple(own < 0 or own in built for own in owners)
 
 
 def _only(affine: AffineProblem, kept: Sequence[bool]) -> AffineProblem:

@@ -286,9 +286,10 @@ def _small(norm: WaveNorm) -> WaveNorm:
     """The same root mean square in as few rows as there are columns (S12); others without what does not act."""
     fixed = norm.fixed
     if not fixed.norm.is_euclidean:
-        sizes = np.abs(fixed.constant).sum(axis=0) + np.abs(fixed.slope).sum(axis=(0, 2))
-        sizes = sizes + np.abs(norm.waves).sum(axis=(0, 1, 2))
-        acts = np.flatnonzero(sizes) if sizes.any() else np.arange(1)
+        acts = np.flatnonzero(
+            fixed.constant.any(axis=0) | fixed.slope.any(axis=(0, 2)) | norm.waves.any(axis=(0, 1, 2))
+        )
+        acts = acts if len(acts) else np.arange(1)
         own = replace(fixed, constant=fixed.constant[:, acts], slope=fixed.slope[:, acts])
         return WaveNorm(own, norm.waves[..., acts], norm.left_out)
     scaled = np.sqrt(fixed.grid.weights)[:, None]

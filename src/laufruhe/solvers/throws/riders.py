@@ -227,7 +227,7 @@ def _riding(decision: Decision, rides: dict[str, int]) -> list[RotorDrive]:
 def _base(own: Set) -> Value:
     """The value that the rest of an interval is counted from, so that none of it is negative."""
     if isinstance(own, Interval):
-        return (own.lower if own.lower < 0.0 < own.upper else min(max(own.lower, 0.0), own.upper)) * own.directions[0]
+        return (own.upper if own.upper <= 0.0 else own.lower) * own.directions[0]
     return 0.0j
 
 
