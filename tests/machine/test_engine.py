@@ -10,7 +10,8 @@ from fractions import Fraction
 import pytest
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import CRANKSHAFT, Cycle, Engine, Mount, Rotor, Shaft, SliderCrank
+from laufruhe.machine import CRANKSHAFT, Bearing, Cycle, Engine, Mount, Rotor, Shaft, SliderCrank
+from laufruhe.machine.dynamic import FluidTrack
 
 PART = SliderCrank("cylinder 1", 0.0, 0.06, 0.2, 1.0)
 OTHER = replace(PART, name="cylinder 2", x=0.1)
@@ -64,8 +65,11 @@ class TestRefusals:
                 r"cylinder 1 fires at 5\.7\d* deg, 5\.7\d* deg from its dead centre",
             ),
             (lambda: Shaft("still", 0.0), r"shaft 'still' has ratio 0"),
+            (lambda: FluidTrack(2, 0.0, 2e5), r"a fluid track needs a mass and a bulge stiffness above zero"),
+            (lambda: FluidTrack(2, 30.0, 0.0), r"a fluid track needs a mass and a bulge stiffness above zero"),
+            (lambda: FluidTrack(2, 30.0, 2e5, damping=-1.0), r"a fluid track has no negative stiffness or damping"),
         ],
-        ids=range(9),
+        ids=range(12),
     )
     def test_message(self, make: Callable[[], object], message: str) -> None:
         with pytest.raises(ModelError, match=message):
@@ -126,3 +130,11 @@ class TestRotor:
     def test_mass_needs_a_radius(self) -> None:
         with pytest.raises(ModelError, match="rotor 'w' has no radius, so its mass is not known"):
             _ = Rotor("w", 0.0, 0.05).mass
+
+
+@pytest.mark.parametrize("ratio", [1.0, -2.0])
+def test_a_bearing_rubs_by_friction_times_the_speed_of_its_journal(ratio: float) -> None:
+    """mu F v by hand, v of a journal of 70 mm, whichever way it turns (B7)."""
+    bearing = Bearing("1", 0.0, diameter=0.07, width=0.03, friction=0.012, shaft=Shaft("s", ratio))
+    speed, force = 300.0, 5000.0
+    assert bearing.drag * force * speed == pytest.approx(0.012 * force * 0.035 * abs(ratio) * speed)

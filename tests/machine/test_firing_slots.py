@@ -69,3 +69,13 @@ def test_cylinders_in_line_fire_evenly():
     assert complete
     assert np.degrees(pattern.intervals(Cycle.FOUR_STROKE)) == pytest.approx([144.0] * 5)
     assert len(inline(5, 0.1).throw_positions) == len(pattern.members)
+
+
+def test_no_crank_by_hand_is_less_broken():
+    """Six throws under 100 degrees that fire 50 or 70 degrees apart: where 60 is asked, nothing found is 15 off."""
+    moments = [0.0, 50.0, 100.0, 170.0, 220.0, 290.0, 360.0, 430.0, 480.0, 550.0, 620.0, 670.0]
+    pairs = [(0, 10), (1, 11), (2, 6), (3, 7), (4, 8), (5, 9)]
+    assert all((moments[left] - moments[right] - 100.0) % 360.0 == 0.0 for left, right in pairs)
+    by_hand = np.abs(np.diff([*moments, 720.0]) - 60.0).max()
+    patterns, _ = slots(Cycle.FOUR_STROKE, 6, 100.0, 0.0).patterns()
+    assert math.degrees(patterns[0].broken) <= by_hand + 1e-6

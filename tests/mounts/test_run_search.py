@@ -186,6 +186,23 @@ def test_a_peak_at_the_end_of_a_run_counts(stop: dict[str, str] | None) -> None:
 
 
 @pytest.mark.slow
+def test_a_design_of_which_one_run_is_not_followed_has_no_peaks() -> None:
+    """Stops of 30 kN/mm are quicker than the steps of the longer run alone: no peak of either is told."""
+    given = mounts({**STOP, "stiffness": "30000 N/mm"})
+    given["places"][0] |= {"damping_per_stiffness": {"between": ["0 ms", "5 ms"], "start": "1 ms"}}
+    run = {"up_to": "300 rpm", "time": "0.05 s", "shut_down_time": "1.5 s"}
+    peaks = RunPeaks(limited(mounts=given, run_up=run), OF_RUNS)
+    values, slopes = peaks.values(np.array([1e-3])), peaks.slopes(np.array([1e-3]))
+    assert values.shape == (sum(peaks.counts),)
+    assert slopes.shape == (sum(peaks.counts), 1)
+    assert np.isnan(values).all()
+    assert np.isnan(slopes).all()
+    # the shorter run alone is followed
+    shorter = RunPeaks(limited(mounts=given, run_up={**run, "shut_down_time": "0.05 s"}), OF_RUNS)
+    assert np.isfinite(shorter.values(np.array([1e-3]))).all()
+
+
+@pytest.mark.slow
 def test_runs_on_bump_stops_are_those_of_scipy() -> None:
     problem = limited(mounts=mounts(STOP))
     told = runs_of(problem.engine, problem.points[0], problem.fidelity, problem.engine.run)

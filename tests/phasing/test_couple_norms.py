@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from laufruhe.load_models.couple_norms import CoupleNorms, couple_norms, three_stars
+from laufruhe.load_models.couple_norms import CoupleNorms, CoupleTerm, couple_norms, three_stars
+from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.physics.crank_stars import Stars, star_sums
 from laufruhe.problem.evaluation import evaluate, finely, objective_value
 from laufruhe.problem.problem import Problem
@@ -149,3 +150,23 @@ def test_starts_are_stars_of_the_space(tmp_path):
     starts = good_starts(family.space, norms_of(problem, family))
     assert (np.sort(starts, axis=1) == np.arange(9)).all()
     assert (starts[:, 0] == 0).all()
+
+
+@pytest.mark.parametrize("norm", ["mean", "maximum", "rms"])
+def test_a_plane_meets_its_term_and_is_nowhere_over_it(norm):
+    """w N(V0 + C) of random couples by its definition, a weight far from one."""
+    r, weight, rows, orders = np.random.default_rng(8), 0.2, 12, 2
+    constant, couples = r.normal(size=(rows, 3)), r.normal(size=(2 * orders, rows, 3))
+    grid = Grid(np.full(rows, 1.0 / rows), rows)
+    term = CoupleTerm(weight, NORMS[norm], grid, constant, couples, np.ones(orders))
+
+    def by_hand(c):
+        sizes = np.linalg.norm(constant + np.einsum("o,okd->kd", c, couples), axis=1)
+        return weight * {"mean": sizes.mean(), "maximum": sizes.max(), "rms": np.sqrt((sizes**2).mean())}[norm]
+
+    drawn = r.normal(size=(40, 2 * orders))
+    assert term.values(drawn) == pytest.approx([by_hand(c) for c in drawn])
+    for at in drawn[:4]:
+        least, slope = term.plane(at)
+        assert least + slope @ at == pytest.approx(by_hand(at))
+        assert all(least + slope @ c <= by_hand(c) * (1.0 + 1e-12) for c in drawn)

@@ -187,3 +187,17 @@ def test_a_piece_may_be_left_without_stars(monkeypatch):
     found = search_stars(space, objective, 1)
     assert found.complete
     assert found.values == pytest.approx(enumerate_stars(space, objective, 1).values, abs=1e-12)
+
+
+def test_a_piece_without_an_answer_leaves_the_search_open(monkeypatch):
+    """What nobody looked at may hold a better star: nothing is proven but what holds of every star."""
+    given, objective, space = star_search.each, OBJECTIVES["rms of four"], whole(6)
+
+    def all_but_one(work, pieces, *more, **keys):
+        yield from list(given(work, pieces, *more, **keys))[1:]
+
+    assert search_stars(space, objective).complete
+    monkeypatch.setattr(star_search, "each", all_but_one)
+    found = search_stars(space, objective)
+    assert not found.complete
+    assert found.lower_bound == objective.least(space)

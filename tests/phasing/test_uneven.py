@@ -106,6 +106,20 @@ def test_no_optimum_lies_above_its_start(tmp_path, seed):
     assert still.value == pytest.approx(given, rel=1e-12)
 
 
+def test_a_start_that_fires_too_unevenly_leads_to_a_crank_that_does_not(tmp_path):
+    """With an open weight, and no design to begin from: as good as the even star with the best weight."""
+    weight = engines.WEIGHTS.partition('[[counterweights]]\nname = "rear"')[0]
+    allowed = 'intervals = { largest_deviation = "5 deg" }'
+    phasing = engines.problem(tmp_path, 3, "two-stroke", phasing=allowed, rest=weight + engines.COUPLE).phasing
+    even, bent = (
+        Candidate(tuple(math.radians(a) for a in throws), (1, 3, 2)) for throws in ((0, 120, 240), (0, 100, 220))
+    )
+    assert not phasing.intervals.holds(phasing.realise(bent).engine.firing_intervals)
+    found = local_optimum(phasing, bent, phasing.intervals, beside=False)
+    assert phasing.intervals.holds(found.result.final.engine.firing_intervals, 1e-7)
+    assert found.value <= solve(replace(phasing.realise(even), phasing=None)).objective.value * (1.0 + 1e-6)
+
+
 MODELS = {
     "couple": (engines.COUPLE, 1e-9),
     "all orders": ('[objective]\nminimise = "rms rocking couple"\n', 1e-6),

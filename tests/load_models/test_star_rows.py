@@ -1,0 +1,24 @@
+"""Rows of a star that add up to nothing, and those that are small."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from laufruhe.load_models.star_model import StarNorm
+from laufruhe.numerics.norms import NORMS, Grid
+
+
+def test_roundings_of_what_cancels_are_nothing_and_small_rows_stay() -> None:
+    """Of 4000 rows of size 1 those that moves cancel to 1e-15 are zero, those that they leave 1e-12 of are kept."""
+    rows, left = 4000, np.array([1e-15, 1e-12])
+    constant = np.ones((rows, 2))
+    moves = np.zeros((2, 3, rows, 2))
+    moves[0, 1] = -0.5
+    moves[1, 2] = -0.5 + np.where(np.arange(rows)[:, None] % 2 == 0, left, -left)
+    turns = moves[..., None]
+    norm = StarNorm(NORMS["mean"], constant, moves, constant[..., None], turns, Grid(np.full(rows, 1.0 / rows), rows))
+    found = norm.at([1, 2])
+    for told in (found.constant, found.slope[..., 0]):
+        assert not told[:, 0].any()
+        assert np.allclose(np.abs(told[:, 1]), 1e-12, rtol=1e-3, atol=0.0)
+    assert np.array_equal(norm.at([0, 0]).constant, constant)

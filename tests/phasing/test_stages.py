@@ -1,0 +1,66 @@
+"""How many steps over the period the bounds of boxes of throws are worth, and what a peak may hide between them."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from laufruhe.errors import ModelError
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.solvers.throws.stages import Stage, missed
+from phasing import engines
+
+
+def stage(make=lambda samples: samples, most=768, enough=0.03, left_out=lambda _: 4.0) -> Stage:
+    """Return one of 96 steps that lose a tenth of a value of 1000, twice as many half of that."""
+    return Stage(make, 96, lambda samples: 9600.0 / samples, 1000.0, left_out, most, enough)
+
+
+def test_steps_double_until_they_cost_little_enough():
+    first = stage()
+    assert first.cost == pytest.approx(0.104)
+    assert first.programs == 96
+    assert first.next.programs == 192
+    assert first.next.cost == pytest.approx(0.054)
+    assert first.last.programs == 384
+    assert first.last.cost == pytest.approx(0.029)
+    assert stage(most=200).last.programs == 192
+    assert stage(enough=0.2).next is None
+    # what is left out grows faster than steps lose less
+    assert stage(left_out=lambda samples: 2.0 * samples).next is None
+
+
+def test_a_stage_too_large_to_hold_is_none():
+    def make(samples):
+        if samples > 192:
+            raise ModelError("too many numbers")
+        return samples
+
+    assert stage(make).finer.programs == 192
+    assert stage(make).finer.finer is None
+
+
+def test_steps_are_asked_for_where_boxes_tell_no_more():
+    wide, narrow = (SimpleNamespace(spread=np.array([width, 0.0])) for width in (0.2, 0.05))
+    assert stage().tells_all(900.0, 1000.0, wide)
+    assert not stage().tells_all(800.0, 1000.0, wide)
+    assert stage().tells_all(800.0, 1000.0, narrow)
+
+
+def test_a_peak_misses_no_more_than_told(tmp_path):
+    """What fine samples are over coarse ones and those half way between, and a share that falls with the step."""
+    rest = engines.MOUNTS + engines.MOUNT_FORCE.replace("mean", "maximum")
+    problem = engines.problem(tmp_path, 3, "two-stroke", "throws = [0, 100, 230]", "", rest, samples=96)
+    design, measure = evaluate(problem), problem.objective[0].measure
+    best = SimpleNamespace(final=design, problem=problem)
+    (signal,) = design.signals(measure.load)
+    told = []
+    for samples in (48, 96, 192):
+        sizes = np.linalg.norm(signal.sample(12 * samples), axis=-1).max(axis=1)
+        worst = max(sizes.max() - sizes[shift::12].max() for shift in (0, 6))
+        told.append(missed(measure, best, samples))
+        assert worst <= told[-1]
+    assert told[0] < 0.05 * sizes.max()
+    assert told[2] < 0.4 * told[1] < 0.16 * told[0]

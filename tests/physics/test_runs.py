@@ -1,0 +1,152 @@
+"""Run-ups on small blocks: loads at their moments, steps by hand, closed forms, and integration by SciPy."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from laufruhe.errors import ModelError, UncarriedLoadError
+from laufruhe.machine import Block, Mount, Run
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
+from laufruhe.physics.linear_run import NODES, Sweep
+from laufruhe.physics.modes import modes_of, static_motion
+from laufruhe.physics.run_up import MOST_STEPS, STEPS_PER_PERIOD, run_through
+from laufruhe.physics.runs import HIGHEST, STRETCHES, missed_share, sweep_of
+from laufruhe.physics.stopped_run import responses_to
+from laufruhe.physics.time_model import TimeModel, time_model
+
+HEAVE = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+
+
+def four_mounts(stiffness: float, **more: float) -> ElasticMounting:
+    """Return a block of 50 kg amid four equal mounts, so that it heaves by itself."""
+    block = Block(50.0, ((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 2.5)))
+    places = [(x, y, 0.0) for x in (-0.3, 0.3) for y in (-0.2, 0.2)]
+    return elastic_mounting(block, [Mount(f"{k}", at, (stiffness,) * 3, **more) for k, at in enumerate(places)])
+
+
+def test_loads_of_a_run_are_taken_at_the_gauss_points() -> None:
+    """Re c e^{i h angle} of every order, the first load times the square of the speed (E28)."""
+    rng = np.random.default_rng(6)
+    sweep = Sweep(20.0, 15.0, 0.003, 7)
+    loads = [(np.array(orders), rng.normal(size=(2, 6)) + 1j * rng.normal(size=(2, 6))) for orders in ([1, 2], [0, 3])]
+    nodes = 0.5 * (np.polynomial.legendre.leggauss(NODES)[0] + 1.0)
+    found = sweep.wrenches(loads).reshape(NODES, 6, sweep.count)
+    for n, node in enumerate(nodes):
+        for k in range(sweep.count):
+            t = (k + node) * sweep.step
+            speed, angle = 20.0 + 15.0 * t, 20.0 * t + 7.5 * t**2
+            first, second = (
+                sum((own * np.exp(1j * h * angle)).real for h, own in zip(*load, strict=True)) for load in loads
+            )
+            assert found[n, :, k] == pytest.approx(speed**2 * first + second, rel=1e-12)
+
+
+@pytest.mark.parametrize("seconds", [4.0, 90.0])
+def test_steps_follow_the_highest_order_and_miss_what_a_wave_leaves(seconds: float) -> None:
+    """So many steps a period of it, fewer in long runs; a cosine between two equal samples is so much higher."""
+    run = Run(speed=150.0, up=0.5 * seconds, down=seconds)
+    sweep = sweep_of(run.speed, 0.0, run.down)
+    assert sweep is not None
+    assert sweep.step * sweep.count == pytest.approx(seconds)
+    turned = HIGHEST * run.speed * sweep.step
+    allowed = STRETCHES * MOST_STEPS
+    assert turned <= math.tau / STEPS_PER_PERIOD or sweep.count == allowed
+    # no more than one step a stretch is spare
+    assert sweep.count <= min(allowed, HIGHEST * run.speed * seconds * STEPS_PER_PERIOD / math.tau + STRETCHES)
+    assert missed_share(run) == pytest.approx(1.0 / math.cos(0.5 * turned) - 1.0, rel=0.02)
+
+
+def test_a_constant_load_swings_to_twice_its_rest() -> None:
+    """Of a load from rest without damping the force is F (1 - cos w t); speeds below zero are refused."""
+    mounting = four_mounts(2e4)
+    speed, force = 90.0, 400.0
+    load = Spectrum(Fraction(1), np.array([force * HEAVE / speed**2, 0.0 * HEAVE], dtype=complex))
+    half = math.pi / math.sqrt(4.0 * 2e4 / 50.0)
+    run = run_through(mounting, load, None, speed, speed, 1.5 * half, stretches=3)
+    # four mounts carry it, and the swing ends its first stretch half way to rest
+    assert run.force == pytest.approx(2.0 * force / 4.0 * np.array([0.5, 1.0, 1.0]), rel=1e-4)
+    assert run.travel == pytest.approx(run.force / 2e4, rel=1e-6)
+    assert run.speeds == pytest.approx([speed] * 3)
+    for first, last, seconds in ((-1.0, 50.0, 1.0), (50.0, -1.0, 1.0), (50.0, 0.0, 0.0)):
+        with pytest.raises(ModelError, match="speeds that are not negative"):
+            run_through(mounting, load, None, first, last, seconds)
+
+
+def stopped(travels: Array, gaps: Array, stops: Array, stiffness: Array) -> TimeModel:
+    """Return a model of two coordinates; what the block itself would tell is left at zero."""
+    none = np.zeros((3, 2))
+    return TimeModel(
+        stiffness, np.diag([4.0, 6.0]), np.eye(2, 6), travels, none, none, gaps, stops, np.eye(3)[None],
+        np.zeros(1, dtype=np.intp), np.zeros(2),
+    )  # fmt: skip
+
+
+def test_stops_push_back_as_scipy_says() -> None:
+    """Two coordinates that a stop joins, driven past both its ends; stiff stops, and a missing design, tell none."""
+    travels = np.array([[1.0, 0.5], [0.0, 1.0], [1.0, 0.0]])
+    gaps, stops = np.array([0.01, np.inf, 0.004]), np.array([3000.0, 0.0, 0.0])
+    model = stopped(travels, gaps, stops, np.array([[900.0, 100.0], [100.0, 1600.0]]))
+    sweep = Sweep(25.0, 10.0, 5e-4, 1000)
+    wrench = np.array([0.02, 0.01, 0.0, 0.0, 0.0, 0.0])
+    (found,) = responses_to([model], sweep, [sweep.wrenches([(np.array([1.0]), wrench[None] + 0j)])])
+    assert found is not None
+
+    def rates(t: float, z: Array) -> Array:
+        push = (25.0 + 10.0 * t) ** 2 * wrench[:2] * math.cos(25.0 * t + 5.0 * t**2)
+        travel = travels @ z[:2]
+        back = travels.T @ (stops * np.sign(travel) * np.maximum(np.abs(travel) - gaps, 0.0))
+        return np.concatenate([z[2:], push - model.stiffness @ z[:2] - model.damping @ z[2:] - back])
+
+    times = sweep.step * np.arange(0, sweep.count + 1, 20)
+    told = solve_ivp(rates, (0.0, times[-1]), np.zeros(4), "DOP853", times, rtol=1e-7, atol=1e-10, max_step=0.01).y
+    # the stop is met on both sides, by far
+    reach = (travels @ found.y)[0]
+    assert reach.max() > 1.5 * gaps[0]
+    assert reach.min() < -1.5 * gaps[0]
+    assert np.abs(found.y[:, ::20] - told[:2]).max() < 2e-4 * np.abs(told[:2]).max()
+    wrenches = sweep.wrenches([(np.array([1.0]), wrench[None] + 0j)])
+    stiff = replace(model, stops=np.array([3e6, 0.0, 0.0]))
+    assert responses_to([stiff], sweep, [wrenches]) == [None]
+    assert responses_to([model, stiff], sweep, [wrenches] * 2) == [None, None]
+    assert responses_to([model, None], sweep, [wrenches] * 2) == [None, None]
+
+
+def test_a_mode_next_to_rest_is_pushed_by_stops_as_by_integration() -> None:
+    """What no spring holds drifts until it meets its stop: a rate of nothing has the series of its shares."""
+    travels = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+    gaps, stops = np.array([0.002, np.inf, np.inf]), np.array([2000.0, 0.0, 0.0])
+    model = stopped(travels, gaps, stops, np.diag([1e-4, 900.0]))
+    sweep = Sweep(10.0, 0.0, 1e-3, 300)
+    wrench = np.array([1e-3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    (found,) = responses_to([model], sweep, [sweep.wrenches([(np.array([0.0]), wrench[None] + 0j)])])
+    assert found is not None
+
+    def rates(_: float, z: Array) -> list[float]:
+        return [z[1], 0.1 - 1e-4 * z[0] - 4.0 * z[1] - 2000.0 * max(z[0] - 0.002, 0.0)]
+
+    times = sweep.step * np.arange(sweep.count + 1)
+    told = solve_ivp(rates, (0.0, 0.3), [0.0, 0.0], "DOP853", times, rtol=1e-8, atol=1e-12, max_step=5e-3).y[0]
+    assert told.max() > 0.002
+    assert np.abs(found.y[0] - told).max() < 1e-4 * told.max()
+
+
+def test_a_steady_load_turns_the_block_only_where_mounts_resist() -> None:
+    """F / k where they do, whatever else is free; a load along what is free names the motion and the remedy."""
+    held = np.diag([4e5, 5e5, 0.0, 2e4, 3e4, 6e4])
+    modes = modes_of(np.diag([50.0, 50.0, 50.0, 1.0, 2.0, 3.0]), held)
+    wrench = np.array([100.0, -40.0, 0.0, 3.0, 0.0, 9.0])
+    expected = [100.0 / 4e5, -40.0 / 5e5, 0.0, 3.0 / 2e4, 0.0, 9.0 / 6e4]
+    assert static_motion(modes, wrench) == pytest.approx(expected, rel=1e-9, abs=1e-15)
+    with pytest.raises(UncarriedLoadError, match="drives the block in bounce, which no mount resists; add a mount"):
+        static_motion(modes, wrench + HEAVE)
+    mounting = four_mounts(3e4)
+    assert static_motion(mounting.modes, 600.0 * HEAVE) == pytest.approx(600.0 / 1.2e5 * HEAVE, abs=1e-12)
+    assert time_model(mounting).size == 6
