@@ -1,16 +1,19 @@
-"""Packages of users: what they add to the tables of norms, channels, layouts, quantities and study kinds.
+"""Extensions: what they add to the tables of norms, channels, layouts, quantities and study kinds.
 
-An installed package names an `Extension` as an entry point of the group `laufruhe.extensions`. Its objects are imported
-when the table that they belong to is made, so that each of their modules imports no more than the room of that table.
+Those of this package are the folders of `laufruhe.extensions`; the core runs without each of them. Another installed
+package names an `Extension` as an entry point of the group `laufruhe.extensions`. Objects are imported when the table
+that they belong to is made, so that each of their modules imports no more than the room of that table.
 """
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
+from pathlib import Path
+from pkgutil import iter_modules
 from typing import Any, Literal
 
 from laufruhe.errors import ModelError
@@ -51,16 +54,26 @@ class Extension:
     study_kinds: tuple[str, ...] = ()
 
 
+HOMES: Mapping[str, str] = {"replication": "replication"}
+"""Extension of this package that has a kind of study part, by the kind: whoever lacks it is told its name."""
+
+
 @cache
 def extensions() -> tuple[Extension, ...]:
-    """Return the extensions of all installed packages, in the order of their names."""
+    """Return the extensions of this package, then those of others, each in the order of their names."""
     found = []
-    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
-        one = _imported(point.name, point.value)
+    for name, address in (*_in_house(), *sorted((point.name, point.value) for point in entry_points(group=GROUP))):
+        one = _imported(name, address)
         if not isinstance(one, Extension):
-            raise ModelError(f"extension '{point.name}': {point.value} is no laufruhe.extension.Extension; mend it")
+            raise ModelError(f"extension '{name}': {address} is no laufruhe.extension.Extension; mend it")
         found.append(one)
     return tuple(found)
+
+
+def _in_house() -> list[tuple[str, str]]:
+    """Return name and address of every folder of `laufruhe.extensions`."""
+    home = Path(__file__).with_name("extensions")
+    return [(one.name, f"laufruhe.extensions.{one.name}:EXTENSION") for one in iter_modules([str(home)])]
 
 
 def additions(table: Tables, kind: Any, known: Container[str]) -> list[Any]:

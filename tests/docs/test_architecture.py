@@ -43,7 +43,7 @@ def test_every_method_has_its_home() -> None:
 
 def test_rooms_stand_in_the_order_of_their_imports() -> None:
     assert [set(re.findall(r"\w+", cell)) for cell in first_cells("| room | what is in it |")] == layers()
-    (chain,) = re.findall(r"^ +(cli -> .*)$", GUIDE, re.MULTILINE)
+    (chain,) = re.findall(r"^ +(extensions -> .*)$", GUIDE, re.MULTILINE)
     assert [set(re.findall(r"\w+", part)) for part in chain.split(" -> ")] == layers()
 
 

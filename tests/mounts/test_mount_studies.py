@@ -15,8 +15,8 @@ from laufruhe.files.reader import load
 from laufruhe.files.study_tables import SweepTable, axis_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.solvers import solve, state
-from laufruhe.studies import run
 from laufruhe.studies.reader import load_study
+from laufruhe.studies.runner import run
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed
 from problem_files import PROBLEMS
 

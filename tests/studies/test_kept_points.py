@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from laufruhe.studies import run
 from laufruhe.studies.kept_points import KEPT, KeptPoints
 from laufruhe.studies.reader import load_study
+from laufruhe.studies.runner import run
 from problem_files import PROBLEMS
 
 MARKS = [f"{k:032x}" for k in range(5)]

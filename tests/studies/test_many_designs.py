@@ -23,10 +23,11 @@ from laufruhe.files.reader import load
 from laufruhe.numerics.workers import working_on
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.solvers import solve
-from laufruhe.studies import run, scenes
+from laufruhe.studies import scenes
 from laufruhe.studies.kept_points import KEPT
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.regions import Regions
+from laufruhe.studies.runner import run
 from problem_files import PROBLEMS, changed, written
 
 pytestmark = of_clusters("zarr")

@@ -19,9 +19,9 @@ from laufruhe.problem.channels import MOUNT_FORCE, MOUNT_TRAVEL, mounting_in
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure
 from laufruhe.solvers import solve
-from laufruhe.studies import run
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.reader import load_study
+from laufruhe.studies.runner import run
 from mounts.files import BLOCK, ENGINE, MOUNTS, OPEN
 from problem_files import PROBLEMS, written
 

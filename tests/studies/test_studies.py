@@ -8,7 +8,7 @@ import shutil
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,14 +27,15 @@ from laufruhe.files.study_tables import CaseTable
 from laufruhe.problem.measure import MEASURES, Limit, Measure
 from laufruhe.report.study_report import _flat
 from laufruhe.solvers import solve
-from laufruhe.studies import Point, Scenes, kinds, run, runner
+from laufruhe.studies import kinds, runner
 from laufruhe.studies.kept_points import KEPT
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.balancer_sizing import shaft_groups
 from laufruhe.studies.kinds.layout_comparison import LayoutComparison
-from laufruhe.studies.kinds.replication import Replication
 from laufruhe.studies.part import Part
 from laufruhe.studies.reader import load_study
+from laufruhe.studies.runner import run
+from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import solved
 from problem_files import PROBLEMS
 
@@ -401,29 +402,3 @@ def test_two_stroke_shaft_is_the_closed_form(star: str, root: float, second: boo
     assert result.objective is not None
     left = result.objective.value / result.objective.initial
     assert left > 0.5 if second else left < 0.06
-
-
-@pytest.mark.slow
-def test_every_figure_and_statement_is_on_the_page(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, finished: Callable[[str, Path], None]
-) -> None:
-    """The whole study by its command: a picture and a dataset a figure, and the list of statements."""
-    monkeypatch.chdir(tmp_path)
-    finished("tractor-study", tmp_path / "results" / "tractor-study")
-    answer = CliRunner().invoke(app, ["study", str(PROBLEMS / "tractor-study.toml")])
-    assert answer.exit_code == 0, answer.output
-    folder = tmp_path / "results" / "tractor-study"
-    parts = load_study(PROBLEMS / "tractor-study.toml").study.parts
-    assert {path.name for path in folder.glob("[!.]*")} == {
-        "report.md",
-        "report.html",
-        *(f"{p.name}.{e}" for p in parts for e in p.ends),
-    }
-    page = (folder / "report.md").read_text(encoding="utf-8")
-    for part in parts:
-        assert isinstance(part, Replication)
-        assert f"({part.name}.png)" in page
-        assert part.says in page
-        assert all(statement.text in page for statement in part.statements)
-    assert "38 of 45 statements are confirmed." in page
-    assert "44 of 45 statements are confirmed." in page

@@ -14,8 +14,9 @@ from laufruhe.errors import InputError
 from laufruhe.files.complaints import Refused
 from laufruhe.files.reader import load
 from laufruhe.files.study_tables import CaseTable, SweepTable, axis_of, field_at, keys_of
-from laufruhe.studies import Point, Scenes, run
 from laufruhe.studies.reader import load_study
+from laufruhe.studies.runner import run
+from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import dataset, solved
 from problem_files import PROBLEMS
 

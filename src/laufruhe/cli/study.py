@@ -14,10 +14,11 @@ from laufruhe.numerics.cores import processors
 from laufruhe.report import files
 from laufruhe.report.strict_json import strict
 from laufruhe.report.study_report import as_json, file_names, write_study
-from laufruhe.studies import Scenes, run
 from laufruhe.studies.kept_points import KEPT
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.reader import load_study
+from laufruhe.studies.runner import run
+from laufruhe.studies.scenes import Scenes
 
 
 def studied(

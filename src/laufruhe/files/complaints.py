@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from laufruhe import units
 from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, printed
+from laufruhe.extension import HOMES
 from laufruhe.files.fields import FORMS
 from laufruhe.files.toml_text import toml_key
 
@@ -151,6 +152,9 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], home: s
     if kind in ("literal_error", "union_tag_invalid"):
         allowed = str(detail["ctx"].get("expected") or detail["ctx"].get("expected_tags"))
         value = detail["ctx"].get("tag", detail["input"])
+        if kind == "union_tag_invalid" and value in HOMES:
+            return Complaint(where, short(value), f"needs the extension '{HOMES[value]}', which is not installed",
+                             "install laufruhe with all its folders")  # fmt: skip
         words = allowed.replace("' or '", "', '").replace("'", "").split(", ")
         # of two or three all are told: the nearest in letters need not be the one that is meant
         remedy = nearest(str(value), words) if len(words) > _FEW else "use one of: " + ", ".join(words)

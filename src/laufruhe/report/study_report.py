@@ -20,7 +20,6 @@ from laufruhe.report.workbook import write_book
 from laufruhe.studies.part import Part
 from laufruhe.studies.picture import Picture
 from laufruhe.studies.reader import StudyFile
-from laufruhe.studies.replication.judging import counted
 from laufruhe.studies.text import NOTHING, Rows, Text
 
 _NUMBER = re.compile(rf"[-+−]?\d[\d.,]*(e[-+]?\d+)?( %)?|{NOTHING}|")
@@ -83,8 +82,8 @@ def study_document(
     blocks.append(Paragraph(f"Made by `{command}`.", marked=True))
     if study.assumptions:
         blocks.append(Bullets("Assumptions:", study.assumptions))
-    if found := counted(datasets.values()):
-        blocks.append(Paragraph(found, marked=True))
+    found = [kind.summary(datasets.values()) for kind in dict.fromkeys(type(part) for part in study.study.parts)]
+    blocks += [Paragraph(text, marked=True) for text in found if text]
     for part in study.study.parts:
         blocks += _part(part, datasets[part.name])
     if datasets:

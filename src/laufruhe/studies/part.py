@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias
 
@@ -117,6 +117,11 @@ class Part(Table):
     def picture(data: xr.Dataset) -> Picture:
         """What is drawn of the dataset."""
         raise NotImplementedError
+
+    @staticmethod
+    def summary(datasets: Iterable[xr.Dataset]) -> str:  # noqa: ARG004
+        """Return what a report says of the datasets of all parts together; empty where that is nothing."""
+        return ""
 
     @property
     def ends(self) -> tuple[str, ...]:

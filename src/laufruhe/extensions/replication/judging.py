@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from laufruhe.studies.replication.expressions import filled, number_of
-from laufruhe.studies.replication.models import StatementTable
+from laufruhe.extensions.replication.expressions import filled, number_of
+from laufruhe.extensions.replication.models import StatementTable
 from laufruhe.studies.text import UNSTATED, Rows, Text
 
 if TYPE_CHECKING:

@@ -20,10 +20,10 @@ import numpy as np
 from pydantic import ValidationError
 
 from laufruhe.errors import ModelError
+from laufruhe.extensions.replication.functions import CONSTANTS, FUNCTIONS
+from laufruhe.extensions.replication.models import EXPRESSIONS, CurveTable, GridTable
 from laufruhe.files.complaints import nearest
 from laufruhe.files.fields import Table
-from laufruhe.studies.replication.functions import CONSTANTS, FUNCTIONS
-from laufruhe.studies.replication.models import EXPRESSIONS, CurveTable, GridTable
 
 Place: TypeAlias = tuple[str | int, ...]
 """Of a text in a file: keys, and numbers in lists from zero."""

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from laufruhe.extensions.replication.expressions import check_among
 from laufruhe.files import fields as f
 from laufruhe.files.scene import QuantityTable, Scene
 from laufruhe.numerics.spectrum import order_amplitude
@@ -18,7 +19,6 @@ from laufruhe.problem.channels import CHANNELS, mounting_in
 from laufruhe.problem.evaluation import measured, samples_of
 from laufruhe.problem.measure import MEASURES, Measure
 from laufruhe.solvers.result import Result
-from laufruhe.studies.replication.expressions import check_among
 
 ORDERS = (1.0, 2.0, 4.0, 6.0)
 FORCE, COUPLE = slice(0, 3), slice(4, 6)

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from tests.studies.conftest import PROBLEMS, parts_of
+from tests.extensions.replication.conftest import PROBLEMS, parts_of
 
 from laufruhe import load
+from laufruhe.extensions.replication.judging import CONFIRMED, counted
+from laufruhe.extensions.replication.part import Replication
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.plots.picture import draw
-from laufruhe.studies.kinds.replication import Replication
-from laufruhe.studies.replication.judging import CONFIRMED, counted
 
 Data = Callable[[str], xr.Dataset]
 Worth = Callable[..., Any]

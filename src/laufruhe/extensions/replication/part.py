@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
@@ -14,13 +14,8 @@ from pydantic import Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails
 
 from laufruhe.errors import ModelError
-from laufruhe.files import fields as f
-from laufruhe.files.study_tables import joined
-from laufruhe.solvers import Status, solve
-from laufruhe.studies.part import Part, Record
-from laufruhe.studies.picture import Picture
-from laufruhe.studies.replication.drawing import drawn
-from laufruhe.studies.replication.expressions import (
+from laufruhe.extensions.replication.drawing import drawn
+from laufruhe.extensions.replication.expressions import (
     ExpressionError,
     Place,
     check,
@@ -31,9 +26,14 @@ from laufruhe.studies.replication.expressions import (
     grid,
     numbers_of,
 )
-from laufruhe.studies.replication.judging import judged, rows
-from laufruhe.studies.replication.models import PictureTable, ReplicaCase, StatementTable
-from laufruhe.studies.replication.quantities import DIMENSIONS, AskedTable, asked, check_asked
+from laufruhe.extensions.replication.judging import counted, judged, rows
+from laufruhe.extensions.replication.models import PictureTable, ReplicaCase, StatementTable
+from laufruhe.extensions.replication.quantities import DIMENSIONS, AskedTable, asked, check_asked
+from laufruhe.files import fields as f
+from laufruhe.files.study_tables import joined
+from laufruhe.solvers import Status, solve
+from laufruhe.studies.part import Part, Record
+from laufruhe.studies.picture import Picture
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Text
 
@@ -171,6 +171,11 @@ class Replication(Part):
             quantities = {name: _by_case(own, name) for name in names}
             found[reading] = numbers_of(self.define, {**numbers_of({**self.numbers, **told}, {}), **quantities})
         return found
+
+    @staticmethod
+    def summary(datasets: Iterable[xr.Dataset]) -> str:
+        """Return how many statements of all parts are confirmed."""
+        return counted(datasets)
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:

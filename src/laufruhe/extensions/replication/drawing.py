@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from laufruhe.extensions.replication.expressions import ExpressionError, filled, number_of, value_of
+from laufruhe.extensions.replication.functions import join
+from laufruhe.extensions.replication.models import AxisTable, BarsTable, CurveTable, PanelTable, PictureTable
 from laufruhe.present.pictures import rows_of
 from laufruhe.studies.picture import Area, Axis, Bars, Line, Mark, Panel, Picture, Words, credit
-from laufruhe.studies.replication.expressions import ExpressionError, filled, number_of, value_of
-from laufruhe.studies.replication.functions import join
-from laufruhe.studies.replication.models import AxisTable, BarsTable, CurveTable, PanelTable, PictureTable
 
 if TYPE_CHECKING:
     import xarray as xr

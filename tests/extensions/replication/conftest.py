@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 import xarray as xr
 
+from laufruhe.extensions.replication.expressions import value_of
+from laufruhe.extensions.replication.part import Replication
 from laufruhe.studies.kept_points import KEPT
-from laufruhe.studies.kinds.replication import Replication
 from laufruhe.studies.reader import StudyFile, load_study
-from laufruhe.studies.replication.expressions import value_of
 from laufruhe.studies.runner import run
 from problem_files import PROBLEMS
 from shared import once

@@ -14,11 +14,11 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 from laufruhe.errors import ModelError
+from laufruhe.extensions.replication.expressions import ExpressionError, check, filled, numbers_of, value_of
+from laufruhe.extensions.replication.judging import CONFIRMED, NOT_CONFIRMED, counted, judged, rows
+from laufruhe.extensions.replication.models import Hue, StatementTable
+from laufruhe.extensions.replication.part import Replication
 from laufruhe.plots.picture import draw, hue
-from laufruhe.studies.kinds.replication import Replication
-from laufruhe.studies.replication.expressions import ExpressionError, check, filled, numbers_of, value_of
-from laufruhe.studies.replication.judging import CONFIRMED, NOT_CONFIRMED, counted, judged, rows
-from laufruhe.studies.replication.models import Hue, StatementTable
 from laufruhe.studies.scenes import Scenes
 from laufruhe.studies.text import Rows
 from problem_files import PROBLEMS

@@ -1,0 +1,69 @@
+"""Without the folder of an extension the core imports, solves the same, and names what a file lacks."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import laufruhe
+from laufruhe.extension import HOMES
+from problem_files import PROBLEMS
+
+SOURCE = Path(laufruhe.__file__).parent
+EXTENSIONS = sorted(path.name for path in (SOURCE / "extensions").iterdir() if (path / "__init__.py").exists())
+MAIN = "tractor-four-lanchester"
+EVERY_MODULE = """
+import importlib, pkgutil, laufruhe
+for module in pkgutil.walk_packages(laufruhe.__path__, "laufruhe."):
+    if module.name != "laufruhe.__main__":
+        importlib.import_module(module.name)
+"""
+STUDY = 'title = "t"\n[study]\n[[study.parts]]\nkind = "{}"\nname = "n"\ntitle = "t"\ncases = []\n'
+
+
+def without(name: str, folder: Path) -> dict[str, str]:
+    """Copy the package without an extension, and return the environment of processes that see the copy."""
+    shutil.copytree(SOURCE, folder / "laufruhe", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.rmtree(folder / "laufruhe" / "extensions" / name)
+    return {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+
+
+def run(environment: dict[str, str], *words: str | Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, *map(str, words)]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+
+def test_every_home_is_there() -> None:
+    assert set(HOMES.values()) <= set(EXTENSIONS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EXTENSIONS)
+def test_the_core_runs_without_an_extension(name: str, tmp_path: Path) -> None:
+    environment = without(name, tmp_path / "site")
+    imported = run(environment, "-c", EVERY_MODULE)
+    assert imported.returncode == 0, imported.stderr
+    file = tmp_path / "result.json"
+    solve = "-m", "laufruhe", "solve", PROBLEMS / f"{MAIN}.toml", "--no-plots", "--out", tmp_path / "out"
+    solved = run(environment, *solve, "--json", file)
+    assert solved.returncode == 0, solved.stderr
+    objective = laufruhe.solve(PROBLEMS / f"{MAIN}.toml").objective
+    assert objective is not None
+    assert json.loads(file.read_text(encoding="utf-8"))["objective"]["value"] == objective.value
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", HOMES)
+def test_a_file_that_needs_it_is_refused_by_its_name(kind: str, tmp_path: Path) -> None:
+    environment = without(HOMES[kind], tmp_path / "site")
+    (tmp_path / "study.toml").write_text(STUDY.format(kind), encoding="utf-8")
+    refused = run(environment, "-m", "laufruhe", "study", tmp_path / "study.toml")
+    assert refused.returncode == 2
+    (line,) = refused.stderr.strip().splitlines()
+    assert f"needs the extension '{HOMES[kind]}'" in line
