@@ -144,6 +144,7 @@ SHORT = {
     "NONE": "-",
     "AFFINE": "affine",
     "BIAFFINE": "affine while unbalances are held",
+    "BENT": "the same between bearings",
     "MASSES": "affine in masses that follow",
     "SHIFT": "sum of shifted parts",
     "SWING": "number of such a sum",

@@ -126,13 +126,13 @@ def test_places_of_balancer_shafts_beside_bearings() -> None:
     assert found.objective.value <= least * (1.0 + 1e-3)
     assert found.certificate.lower_bound <= least
     assert least <= 1.05 * found.objective.value
-    # of a weight on the crank itself bearings feel the place: it is searched, and little is claimed
+    # of a weight on the crank itself bearings feel the place, along a line between two of them (P20)
     moved = [{**WEBS[0], "x": open_place, "mass": "1 kg"}, *WEBS[1:]]
-    local = laufruhe.solve(problem_of({**told, "counterweights": moved}, ""))
-    assert local.certificate.kind is Proof.LOCAL
+    carried = laufruhe.solve(problem_of({**told, "counterweights": moved}, ""))
+    assert carried.certificate.kind is Proof.GLOBAL
     fixed = [
         laufruhe.solve(problem_of({**told, "counterweights": [{**moved[0], "x": f"{x} mm"}, *moved[1:]]}, ""))
         for x in (-200, -100, 0, 100, 200)
     ]
     least = min(one.objective.value for one in fixed)
-    assert local.certificate.lower_bound <= local.objective.value <= least * (1.0 + 1e-4)
+    assert carried.certificate.lower_bound <= carried.objective.value <= least * (1.0 + 1e-3)

@@ -24,6 +24,8 @@ class Dependence(StrEnum):
     AFFINE = "affine"
     """Of masses in a plane, whose lengths are added up: these are affine."""
     BIAFFINE = "affine while unbalances are held"
+    BENT = "affine between bearings while unbalances are held"
+    """Bent where a place passes a bearing of its shaft (B4)."""
     MASSES = "affine in masses that follow, times a factor that goes one way"
     """Masses follow from sizes; the factor of each place goes one way with each of them (Z2)."""
     SHIFT = "a sum of parts, each earlier by its own angle"
@@ -41,6 +43,7 @@ _LETTERS = {
     "0": Dependence.NONE,
     "a": Dependence.AFFINE,
     "b": Dependence.BIAFFINE,
+    "v": Dependence.BENT,
     "m": Dependence.MASSES,
     ">": Dependence.SHIFT,
     "w": Dependence.SWING,
@@ -64,11 +67,11 @@ surging force                       a a a  b m >  >  0 0  0 0
 swaying couple                      a a a  b m >  >  0 0  0 0
 mount force                         a a a  b m >  >  s s  0 0
 mount travel                        a a a  b m >  >  s s  0 0
-main-bearing force                  a a a  s m >  >  0 0  0 0
-main-bearing pressure               a a a  s m >  >  0 0  0 0
-main-bearing pressure times speed   a a a  s m >  >  0 0  0 0
-hammer blow                         a a a  s m >  >  0 0  0 0
-friction power                      a a a  s m >  >  0 0  0 0
+main-bearing force                  a a a  v m >  >  0 0  0 0
+main-bearing pressure               a a a  v m >  >  0 0  0 0
+main-bearing pressure times speed   a a a  v m >  >  0 0  0 0
+hammer blow                         a a a  v m >  >  0 0  0 0
+friction power                      a a a  v m >  >  0 0  0 0
 web stress                          a a a  s m s  >  0 0  0 0
 journal torsion stress              a a a  s m >  >  0 0  0 0
 journal stress                      a a a  s m s  >  0 0  0 0
@@ -137,8 +140,9 @@ TABLE: Mapping[str, Mapping[Kind, Dependence]] = _parsed(_TABLE)
 """By the name of the channel and the kind of decision."""
 # loads of bearings feel the places of rotors on the shafts that these carry
 _OF_BEARINGS = frozenset(
-    name for name, row in TABLE.items() if CHANNELS[name].is_load and row[Kind.PLACE] is Dependence.SMOOTH
-)
+    name for name, row in TABLE.items()
+    if CHANNELS[name].is_load and row[Kind.PLACE] in (Dependence.SMOOTH, Dependence.BENT)
+)  # fmt: skip
 # what an uneven speed leaves of these is not additive
 _OF_EVEN_SPEED = (Dependence.MASSES, Dependence.SHIFT, Dependence.SWING)
 
@@ -152,6 +156,9 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
         return found
     if kind is Kind.PLACE and channel.name in _OF_BEARINGS and not _moves_carried(problem):
         return Dependence.NONE
+    if found is Dependence.BENT and problem.fidelity.crankshaft != "cut":
+        # a beam hands loads on to farther bearings
+        return Dependence.SMOOTH
     if kind is Kind.STIFFNESS and problem.engine.block is None and channel.is_load:
         # rigid mounts share a force by their places alone
         return Dependence.NONE

@@ -33,7 +33,7 @@ class Search:
     starts, seed
         The most points that a search starts from, and the seed of those drawn at random.
     boxes
-        That bounds of stiffness may be divided into for a proof; as is worth it when None.
+        That what is open may be divided into for a proof; as is worth it when None.
     proves
         Whether what is found is to be proven.
     """
@@ -42,6 +42,10 @@ class Search:
     seed: int = 0
     boxes: int | None = None
     proves: bool = True
+
+    def boxes_or(self, usual: int) -> int:
+        """Return how many boxes are asked for, or the usual number."""
+        return usual if self.boxes is None else self.boxes
 
 
 class Origin(Protocol):

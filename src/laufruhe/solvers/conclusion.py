@@ -33,6 +33,8 @@ FEASIBLE = 1e-6
 """Relative excess over a limit that counts as none."""
 KEPT = 10.0 * FEASIBLE
 """Relative excess that a design may have and be called one."""
+STEEP = 10.0
+"""Times a relative excess over a limit that counts of the objective of a witness, whose prices nobody knows yet."""
 READINGS = 3
 """Times that an objective is read at more angles where a bound lies over it."""
 # share of the objective under which a price is a rounding
@@ -179,7 +181,7 @@ def known_of(design: Design, place: Array, excess: float = FEASIBLE) -> Known | 
     def read() -> float:
         nothing = nothing_of(problem, evaluation.engine)
         found = read_under(problem, evaluation, design.value, math.inf, nothing)
-        return found.value + found.doubt + nothing
+        return found.value * (1.0 + STEEP * max(design.excess, 0.0)) + found.doubt + nothing
 
     return Known(place, design.value, read)
 

@@ -8,7 +8,7 @@ limited number of them is decided so.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from laufruhe.errors import ModelError, SolverError, counted
@@ -19,6 +19,7 @@ from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Reach
 from laufruhe.solvers.conclusion import concluded, judged, values_of
 from laufruhe.solvers.result import Result
@@ -37,7 +38,9 @@ MOST_STARS = 60
 """Stars, firing orders and sets of shafts that are decided one by one."""
 
 
-def solve_generally(problem: Problem, decide: Decide, by_cones: Callable[[Problem], bool]) -> Result:
+def solve_generally(
+    problem: Problem, decide: Decide, by_cones: Callable[[Problem], bool], near: Sequence[Sequence[Value]] = ()
+) -> Result:  # fmt: skip
     """Return the best design of local programs from several starts; no bound but zero is told of others.
 
     Parameters
@@ -46,6 +49,8 @@ def solve_generally(problem: Problem, decide: Decide, by_cones: Callable[[Proble
         What decides the rest of what is open while some of it is held.
     by_cones
         Return whether cones decide a problem.
+    near
+        Designs to begin with.
     """
     phasing = problem.phasing
     if phasing is not None and (phasing.continuous or phasing.throw_bounds is not None):
@@ -56,14 +61,14 @@ def solve_generally(problem: Problem, decide: Decide, by_cones: Callable[[Proble
     initial, program = evaluate_start(problem), LocalProgram.of(problem)
     # what cannot be evaluated is refused first
     objective_value(problem, initial)
-    places = [program.shares(problem.start), *looks(problem)]
+    places = [*map(program.shares, (problem.start, *near)), *looks(problem)]
     modelled = time.perf_counter()
     best = searched(program, places, problem.search.starts)
     inner = tuple(decision for decision in problem.decisions if decision.kind in INNER)
     if 0 < len(inner) < len(problem.decisions) and by_cones(problem.changed(decisions=inner)):
         best = _in_turns(program, best, decide)
     design = judged(problem, program.values(best))
-    text = f"local programs from the best of {counted(len(places), 'start')}; nothing is proven of other designs"
+    text = f"local programs from the best of {counted(len(places), 'start')}"
     found = shown(program, design, 0.0, Reach.ASIDE, text)
     # gas and speeds may follow from open numbers
     own = replace(problem, points=tuple(loads.point for loads in design.evaluation.loads))

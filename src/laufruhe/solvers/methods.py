@@ -39,9 +39,11 @@ from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, Reach
 from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.apart import is_apart, solve_apart
+from laufruhe.solvers.boxes.place_boxes import without_places
 from laufruhe.solvers.conclusion import KEPT, Shown, concluded, judged, none_within, with_limits
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import beyond_mounts
@@ -159,9 +161,21 @@ def solve_each_apart(problem: Problem) -> Result:
     return solve_apart(problem, _decided)
 
 
-def solve_all_numbers(problem: Problem) -> Result:
+def solve_with_places(problem: Problem) -> Result:
+    """Places, and what else is open by the method of that alone."""
+    method = _method(without_places(problem))
+    # fidelity is judged once, of all
+    return _by("boxes.places:solve_places_with", problem, partial(_by, method.home), method.name, solve_all_numbers)
+
+
+def _closes_without_places(problem: Problem) -> bool:
+    """Return whether a method with a closing bound decides what is open beside places."""
+    return Kind.PLACE in kinds_of(problem) and _method(without_places(problem)).reach is Reach.WHOLE
+
+
+def solve_all_numbers(problem: Problem, near: Sequence[Sequence[Value]] = ()) -> Result:
     """Numbers that nothing better decides, by local programs; what loads are affine in by cones within them."""
-    return _by("general:solve_generally", problem, _decided, lambda part: _method(part).home == _CONES)
+    return _by("general:solve_generally", problem, _decided, lambda part: _method(part).home == _CONES, near)
 
 
 def _is_rigid(problem: Problem) -> bool:
@@ -182,6 +196,7 @@ def _tells_stars_apart(problem: Problem) -> bool:
 _U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.FLYWHEEL
 _T, _Z, _Q = Kind.TORSION, Kind.SIZE, Kind.PISTON
 _AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependence.SHIFT,)
+_PLACED = (Dependence.BIAFFINE, Dependence.BENT)
 # of stars and choices of shafts: masses are those of the shafts that are built
 _BUILT = (Dependence.SHIFT, Dependence.AFFINE)
 _OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *OF_RUNS}
@@ -208,7 +223,7 @@ METHODS: tuple[Method, ...] = (
            "boxes.shared_leads:solve_shared_leads", True, frozenset({MOUNT_FORCE, *OF_BLOCK}), _is_pointwise,
            _is_no_number, _is_rigid,
            proves="the optimum, as far as the boxes go (P15)"),
-    Method("cones over boxes of places", {_U: _AFFINE, _P: (Dependence.BIAFFINE,)}, Reach.WHOLE,
+    Method("cones over boxes of places", {_U: _AFFINE, _P: _PLACED}, Reach.WHOLE,
            "boxes.places:solve_places", True, OF_SHAFT_PLACES, _is_pointwise,
            proves="the optimum, as far as the boxes go (P8)"),
     Method("stars, each with cones", {_S: _BUILT, _U: _AFFINE}, Reach.WHOLE, "stars.phasing:solve_phasing", True,
@@ -238,6 +253,10 @@ METHODS: tuple[Method, ...] = (
     Method("stars, each with a smooth program", {_S: _BUILT, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
            "mounts.stars:solve_star_mounts", False, _OF_MOUNTS | _TOLD_APART, _is_pointwise, also=_tells_stars_apart,
            proves="a local optimum, with a bound"),
+    Method("local programs, places at their corners",
+           {_U: _AFFINE, _P: _PLACED, _Q: _AFFINE, _Z: _MASSES, Kind.LEAD: _SHIFT}, Reach.WHOLE,
+           "methods:solve_with_places", True, OF_SHAFT_PLACES | _OF_SIZES | {IRREGULARITY}, also=_closes_without_places,
+           proves="what is proven of the rest with places at the corners of their bounds (P20)"),
     Method("local programs of all numbers", dict.fromkeys(Kind, tuple(Dependence)), Reach.ASIDE,
            "methods:solve_all_numbers", norms=lambda _: True,
            proves="a local optimum by exact evaluations, without a bound; of stars each of 60 at most"),

@@ -14,7 +14,7 @@ from laufruhe.errors import counted
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach, certified
-from laufruhe.solvers.conclusion import KEPT, limit_values, with_limits
+from laufruhe.solvers.conclusion import KEPT, limit_values, result_under, with_limits
 from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
 
@@ -64,7 +64,8 @@ def with_bound(result: Result, bound: float, source: str) -> Result:
     if own is None or told is None or own.kind is Proof.NONE or not bound > own.lower_bound:
         return result
     nothing = nothing_of(result.problem, result.final.engine)
-    text = f"{own.method}; {source}"
-    proof = certified(told.value, bound, nothing, result.problem.tolerance, Reach.NEAR, own.kkt_residual, text)
+    result, doubt = result_under(result, bound, nothing)
+    value, text = (result.objective or told).value, f"{own.method}; {source}"
+    proof = certified(value, bound, nothing, result.problem.tolerance, Reach.NEAR, own.kkt_residual, text, doubt)
     status = Status.OPTIMAL if proof.kind is Proof.GLOBAL else result.status
     return replace(result, certificate=proof, status=status)

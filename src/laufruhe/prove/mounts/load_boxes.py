@@ -79,7 +79,8 @@ def load_bound(
     Parameters
     ----------
     told
-        What no design goes under; boxes that have not come to it after a share of them are not worth the others.
+        What no design goes under; boxes that have not come to it after a share of them are not worth the others. Where
+        nothing is told, all are.
     known
         A design by its numbers of the mounts, the columns of its unbalances, and its open throws.
     throws
@@ -93,7 +94,8 @@ def load_bound(
         return Divided(0.0, 0)
     divided = divided_on(boxes, boxes.lower, boxes.upper, value, room, (math.ceil(EARLY * most), most), known)
     found = next(divided)
-    return next(divided) if told < found.bound < value - room and not passed() else found
+    is_worth = (told < found.bound or told <= 0.0) and found.bound < value - room
+    return next(divided) if is_worth and not passed() else found
 
 
 def _is_affine(measure: Measure, problem: Problem) -> bool:

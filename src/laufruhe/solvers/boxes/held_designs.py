@@ -105,14 +105,13 @@ class HeldDesigns(Search[S, HeldDesign]):
         first
             A design to begin with.
         most
-            Boxes, where no number of them is asked for.
+            Boxes.
         what, how
             Is divided, and bounded, in words.
         """
         started, problem = time.perf_counter(), self.problem
         initial, best, bound, boxes = evaluate(problem), first, math.inf, 1
         if not isinstance(root, Over) and first is not None:
-            most = most if problem.search.boxes is None else problem.search.boxes
             nothing = nothing_of(problem)
             best, bound, boxes = divided(self, root, first, nothing, problem.tolerance, most, f"boxes of {what}")
         timing = {"solve": time.perf_counter() - started}

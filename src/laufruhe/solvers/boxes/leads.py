@@ -48,8 +48,8 @@ def solve_leads(problem: Problem) -> Result:
     search.check_acts()
     root, first = search.box(search.model.lower, search.model.upper), search.first()
     if search.model.domains:
-        return search.solved(root, first, MOST_PROGRAMS, "leads", "second-order cones over")
-    return search.solved(root, first, MOST_BOXES, "leads", "local searches; lower bound on")
+        return search.solved(root, first, problem.search.boxes_or(MOST_PROGRAMS), "leads", "second-order cones over")
+    return search.solved(root, first, problem.search.boxes_or(MOST_BOXES), "leads", "local searches; lower bound on")
 
 
 @dataclass(frozen=True, eq=False)

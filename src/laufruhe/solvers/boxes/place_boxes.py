@@ -6,16 +6,20 @@ the corners r_c, it is the load of unbalances
     U_c = l_c U,    sum l_c = 1,    l_c >= 0,    r = sum l_c r_c                           (P8)
 
 at the corners. That the U_c share one angle, and unbalances of one place their l_c, is left
-out: a cone program, whose least value no design with its places in the box goes under. The
+out: no design with its places in the box goes under the least value of the program. The
 smaller the box, the less was left out. An unbalance that is given makes U r linear in r, and
 nothing is left out at all.
+
+The two bearings beside a load share it, so that their forces bend where the place passes a
+bearing (B4). Planes of bearings between the ends of a box are corners too (P20). Whatever else
+is open stays open: the program is a problem of its own, without open places.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +27,18 @@ from numpy.typing import NDArray
 from laufruhe.machine import Role, Rotor
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.channels import ADDED_MASS
-from laufruhe.problem.decision import Decision, Kind, RotorDrive
+from laufruhe.problem.decision import Decision, Kind, RotorDrive, sides_of
+from laufruhe.problem.dependence import Dependence, dependence
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Set, Value
-from laufruhe.solvers.conclusion import unbalances_of
+from laufruhe.solvers.conclusion import unbalances_of, values_of
 from laufruhe.solvers.result import Result
+
+ALONG = 0
+"""Axis of a place along its shaft."""
+UNUSED = 1e-6
+"""Share of the largest unbalance at the corners, under which one counts as none."""
 
 
 class Relaxation:
@@ -37,35 +47,58 @@ class Relaxation:
     Parameters
     ----------
     problem
-        Whose decisions are unbalances and places.
+        With open places.
     share
         Of its tolerance, that a program may use up.
     """
 
     def __init__(self, problem: Problem, share: float) -> None:
-        self.problem, self._tolerance = problem, share * problem.tolerance
+        self._tolerance = share * problem.tolerance
+        # what limits places alone is no limit of a program
+        kept = tuple(limit for limit in problem.limits if not limit.measure.channel.is_placing)
+        self.problem = problem = problem.changed(limits=kept)
         self.places = tuple(d for d in problem.decisions if d.kind is Kind.PLACE)
+        self.others = tuple(d for d in problem.decisions if d.kind is not Kind.PLACE)
         self.unbalances = problem.unbalances
         self._least = [_least(decision.set) for decision in self.unbalances]
         # what each unbalance is when every decision is as small as it may be
-        self._still = {rotor.name: rotor for rotor in problem.design(self._least, self.unbalances).rotors}
+        self._base = problem.design(self._least, self.unbalances)
+        self._still = {rotor.name: rotor for rotor in self._base.rotors}
         self._placed: dict[str, list[int]] = {}
         for k, place in enumerate(self.places):
             for drive in place.place_drives:
                 self._placed.setdefault(drive.rotor, []).append(k)
+        self._bends = [self._bends_of(place) for place in self.places]
+
+    def _bends_of(self, place: Decision) -> Array:
+        """Where a bearing force bends as a place moves [m]: at all bearings of its shaft but the outermost."""
+        asked = {dependence(measure.channel, Kind.PLACE, self.problem) for measure in self.problem.measures}
+        if Dependence.BENT not in asked:
+            return np.zeros(0)
+        shafts = {self._still[drive.rotor].shaft for drive in place.place_drives if drive.axis == ALONG}
+        return np.unique([
+            x for shaft in shafts for x in sorted(b.x for b in self.problem.engine.bearings if b.shaft == shaft)[1:-1]
+        ])  # fmt: skip
+
+    def _nodes(self, lower: Array, upper: Array) -> list[Array]:
+        """Coordinates of the corners along every side of a box."""
+        sides = zip(self._bends, lower, upper, strict=True)
+        return [np.array([low, *bends[(bends > low) & (bends < high)], high]) for bends, low, high in sides]
 
     def program(self, lower: Array, upper: Array) -> Problem:
-        """Every unbalance whose place is open at the corners of its box."""
-        rotors, decisions = self._given(lower, upper)
+        """Return the problem with every unbalance whose place is open at the corners of its box, and nothing placed."""
+        nodes = self._nodes(lower, upper)
+        rotors, decisions = self._given(nodes)
         limits: list[Limit] = []
         names = {name: [name] for name in self._placed}
-        for decision, least in zip(self.unbalances, self._least, strict=True):
+        least = dict(zip((decision.name for decision in self.unbalances), self._least, strict=True))
+        for decision in self.others:
             axes = self._axes(decision)
             if not axes:
-                decisions.append(replace(decision, start=least))
+                decisions.append(replace(decision, start=least.get(decision.name, decision.start)))
                 continue
             parts: dict[str, list[Rotor]] = {drive.rotor: [] for drive in decision.rotor_drives}
-            for c, corner in enumerate(_corners(lower, upper, axes)):
+            for c, corner in enumerate(_corners(nodes, axes)):
                 drives = []
                 for drive in decision.rotor_drives:
                     rotor = self._placed_at(drive.rotor, corner, f"{drive.rotor} | {decision.name} {c}")
@@ -82,32 +115,37 @@ class Relaxation:
         problem = self.problem
         return replace(
             problem,
-            engine=replace(problem.engine, rotors=(*kept, *rotors)),
+            engine=replace(self._base, rotors=(*kept, *rotors)),
             decisions=tuple(decisions),
             objective=tuple(replace(t, measure=_renamed(t.measure, names)) for t in problem.objective),
             limits=(*(replace(x, measure=_renamed(x.measure, names)) for x in problem.limits), *limits),
             tolerance=self._tolerance,
         )
 
-    def _given(self, lower: Array, upper: Array) -> tuple[list[Rotor], list[Decision]]:
-        """Unbalances that are there whatever is decided: their loads are linear in how far they are moved."""
+    def _given(self, nodes: Sequence[Array]) -> tuple[list[Rotor], list[Decision]]:
+        """Unbalances that are there whatever is decided: their loads are linear in how far they are between corners.
+
+        That a place reaches the end of a cell before it enters the next is left out.
+        """
         rotors: list[Rotor] = []
-        drives: list[list[RotorDrive]] = [[] for _ in self.places]
+        decisions: list[Decision] = []
+        drives: dict[str, list[RotorDrive]] = {}
         for name, axes in self._placed.items():
             unbalance = self._still[name].unbalance
-            least = {k: float(lower[k]) for k in axes}
-            rotors.append(self._placed_at(name, least, name))
+            first = {k: float(nodes[k][0]) for k in axes}
+            rotors.append(self._placed_at(name, first, name))
             for k in axes if unbalance else ():
-                for at, gain in ((0.0, -unbalance), (1.0, unbalance)):
-                    end = self._placed_at(name, least | {k: least[k] + at}, f"{name} | {k} {at:g}")
-                    # its mass is counted once, where it stands
-                    rotors.append(replace(end, role=Role.THROW))
-                    drives[k].append(RotorDrive(end.name, gain))
-        decisions = [
-            Decision(f"{place.name} | .place", place.unit, Interval(0.0, float(high - low)), 0.0, tuple(own))
-            for place, low, high, own in zip(self.places, lower, upper, drives, strict=True)
-            if own
-        ]
+                for c, (low, high) in enumerate(pairwise(nodes[k])):
+                    if high == low:
+                        continue
+                    for at, gain in ((low, -unbalance), (high, unbalance)):
+                        end = self._placed_at(name, first | {k: float(at)}, f"{name} | {k} {c} {gain:g}")
+                        # its mass is counted once, where it stands
+                        rotors.append(replace(end, role=Role.THROW))
+                        drives.setdefault(_cell_name(self.places[k], c), []).append(RotorDrive(end.name, gain))
+        for place, own in zip(self.places, nodes, strict=True):
+            names = [_cell_name(place, c) for c in range(len(own) - 1)]
+            decisions += [Decision(n, "", Interval(0.0, 1.0), 0.0, tuple(drives[n])) for n in names if n in drives]
         return rotors, decisions
 
     def _placed_at(self, name: str, places: dict[int, float], new: str) -> Rotor:
@@ -124,37 +162,68 @@ class Relaxation:
 
     def placing(self, relaxed: Problem, result: Result, lower: Array, upper: Array) -> tuple[Array, Array]:
         """Where the program puts each place, and how far apart what shares it."""
-        found = dict(zip((d.name for d in relaxed.decisions), unbalances_of(relaxed, result), strict=True))
+        found = dict(zip((d.name for d in relaxed.unbalances), unbalances_of(relaxed, result), strict=True))
         # of every place what its unbalances are, and where, one pair of arrays for each that is decided apart
         votes: list[list[tuple[NDArray[np.complex128], Array]]] = [[] for _ in self.places]
-        for k, place in enumerate(self.places):
-            if f"{place.name} | .place" in found:
+        nodes = self._nodes(lower, upper)
+        for k, (place, own) in enumerate(zip(self.places, nodes, strict=True)):
+            shares = [found.get(_cell_name(place, c), 0.0) for c in range(len(own) - 1)]
+            if _cell_name(place, 0) in found:
                 still = sum(abs(self._still[drive.rotor].unbalance) for drive in place.place_drives)
-                votes[k].append((np.array([still], complex), lower[[k]] + found[f"{place.name} | .place"].real))
+                votes[k].append((np.array(-still * np.diff([1.0, *shares, 0.0]), complex), own))
         for decision in self.unbalances:
             axes = self._axes(decision)
-            corners = _corners(lower, upper, axes) if axes else ()
+            corners = _corners(nodes, axes) if axes else ()
             gain = sum(abs(drive.gain) for drive in decision.rotor_drives)
             sizes = np.array([gain * found[_corner_name(decision, c)] for c in range(len(corners))], complex)
             for k in axes:
                 votes[k].append((sizes, np.array([corner[k] for corner in corners])))
         middle, spread = 0.5 * (lower + upper), np.zeros(len(lower))
-        for k, own in enumerate(votes):
-            total = sum(float(np.abs(sizes).sum()) for sizes, _ in own)
+        for k, each in enumerate(votes):
+            total = sum(float(np.abs(sizes).sum()) for sizes, _ in each)
             if total > 0.0:
-                middle[k] = np.clip(sum(np.abs(sizes) @ at for sizes, at in own) / total, lower[k], upper[k])
-                spread[k] = sum(abs(sizes @ (at - middle[k])) for sizes, at in own) / total
+                middle[k] = np.clip(sum(np.abs(sizes) @ at for sizes, at in each) / total, lower[k], upper[k])
+                spread[k] = sum(_apart(sizes, at, float(middle[k]), self._bends[k]) for sizes, at in each) / total
         return middle, spread
+
+    def values(self, relaxed: Problem, result: Result, middle: Array) -> tuple[Value, ...]:
+        """Decisions about those of a program: places, what its corners have together, and what else it decides."""
+        found = dict(zip((d.name for d in relaxed.decisions), values_of(relaxed, result), strict=True))
+        own: dict[str, Value] = {place.name: float(x) for place, x in zip(self.places, middle, strict=True)}
+        for decision in self.others:
+            names = [_corner_name(decision, c) for c in range(len(relaxed.decisions))] if self._axes(decision) else ()
+            parts = [found[name] for name in names if name in found]
+            own[decision.name] = sum(parts) if parts else found[decision.name]
+        return tuple(own[decision.name] for decision in self.problem.decisions)
 
     def _axes(self, decision: Decision) -> list[int]:
         """Places of what an unbalance drives."""
         return sorted({k for drive in decision.rotor_drives for k in self._placed.get(drive.rotor, ())})
 
 
-def _corners(lower: Array, upper: Array, axes: Sequence[int]) -> tuple[dict[int, float], ...]:
+def without_places(problem: Problem) -> Problem:
+    """Return a problem without places that no design of one with open places goes under (P8, P20)."""
+    relaxation = Relaxation(problem, 1.0)
+    return relaxation.program(*sides_of(relaxation.places))
+
+
+def _corners(nodes: Sequence[Array], axes: Sequence[int]) -> tuple[dict[int, float], ...]:
     """Corners of a box along some of its sides."""
-    sides = product(*((float(lower[k]), float(upper[k])) for k in axes))
-    return tuple(dict(zip(axes, corner, strict=True)) for corner in sides)
+    return tuple(dict(zip(axes, map(float, corner), strict=True)) for corner in product(*(nodes[k] for k in axes)))
+
+
+def _apart(sizes: NDArray[np.complex128], at: Array, middle: float, bends: Array) -> float:
+    """How far unbalances pull a place from its middle, weighed by their size."""
+    weights = np.abs(sizes)
+    used = at[weights > UNUSED * weights.max(initial=0.0)]
+    if used.size and ((bends > used.min()) & (bends < used.max())).any():
+        # on both sides of a bend no place does what they do together
+        return float(weights @ np.abs(at - middle))
+    return float(abs(sizes @ (at - middle)))
+
+
+def _cell_name(place: Decision, cell: int) -> str:
+    return f"{place.name} | {cell}.place"
 
 
 def _corner_name(decision: Decision, corner: int) -> str:

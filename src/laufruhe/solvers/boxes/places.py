@@ -1,27 +1,38 @@
-"""Places of unbalances, and the unbalances with them: boxes of places, each bounded by its program (P8)."""
+"""Places of unbalances, and what is open with them: boxes of places, each bounded by its program (P8, P20)."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice, product
+from typing import TypeAlias
 
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
+from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Side
+from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import EMPTY, Box, Over, halves
 from laufruhe.prove.witness import thin
 from laufruhe.solvers.boxes.held_designs import SHARE, HeldDesign, HeldDesigns, best_with
 from laufruhe.solvers.boxes.place_boxes import Relaxation
-from laufruhe.solvers.conclusion import Design
+from laufruhe.solvers.boxes.search import divided
+from laufruhe.solvers.conclusion import Design, judged, none_within, values_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.prices import ACTIVE, Price, Slopes, edges_at, prices_of
+from laufruhe.solvers.relaxed import with_bound
 from laufruhe.solvers.result import Result, Status
 
-MOST_BOXES = 300
+Solve: TypeAlias = Callable[[Problem], Result]
+Propose: TypeAlias = Callable[[Problem, Sequence[Sequence[Value]]], Result]
+MOST_BOXES, MOST_OTHERS = 300, 500
+"""Boxes of places, and those of a method that decides what else is open."""
+HALF = 0.5
+"""Share of the tolerance that such a method may use up."""
 # [m]
 EXACT = 1e-6
 # share of the bounds of a place by which it is moved to see what that is worth
@@ -42,6 +53,8 @@ class _Box:
     ----------
     spread
         By how much what was left out pulls each place apart [m]; next to nothing where it made no difference.
+    near
+        Decisions of the problem that are about those of its program.
     """
 
     lower: Array
@@ -49,6 +62,7 @@ class _Box:
     bound: float
     middle: Array
     spread: Array
+    near: tuple[Value, ...] = ()
 
     @property
     def is_exact(self) -> bool:
@@ -57,17 +71,38 @@ class _Box:
 
 
 def solve_places(problem: Problem) -> Result:
-    """Places and unbalances, proven as far as dividing the boxes of places goes.
-
-    Parameters
-    ----------
-    problem
-        Whose decisions are unbalances and places.
-    """
+    """Places and unbalances, proven as far as dividing the boxes of places goes."""
     search = _Search(problem)
     root = search.box(*search.bounds)
     first = None if isinstance(root, Over) else search.at(root.middle)
-    return search.solved(root, first, MOST_BOXES, "places", "second-order cones over")
+    return search.solved(root, first, problem.search.boxes_or(MOST_BOXES), "places", "second-order cones over")
+
+
+def solve_places_with(problem: Problem, prove: Solve, how: str, propose: Propose) -> Result:
+    """Places and whatever else is open by a proposal, with the bound of the box of all places (P20).
+
+    Parameters
+    ----------
+    prove, how
+        Decides the same without places, and its name.
+    propose
+        Seeks a design near some.
+    """
+    started, most = time.perf_counter(), problem.search.boxes_or(MOST_OTHERS)
+
+    def prove_roughly(part: Problem) -> Result:
+        return prove(replace(part, tolerance=HALF * problem.tolerance, search=replace(part.search, boxes=most)))
+
+    search = _Others(problem, prove_roughly)
+    root = search.box(*search.bounds)
+    if isinstance(root, Over):
+        return none_within(problem, evaluate(problem), search.conflict, {"solve": time.perf_counter() - started})
+    found = propose(problem, [root.near])
+    if not found.status.has_design or not problem.search.proves:
+        return found
+    first = HeldDesign(judged(problem, values_of(problem, found), found.final.samples), found)
+    _, bound, _ = divided(search, root, first, nothing_of(problem), problem.tolerance, 1, "boxes of places")
+    return with_bound(found, bound, f"{how} with places at the corners of their bounds")
 
 
 class _Search(HeldDesigns[_Box]):
@@ -77,7 +112,7 @@ class _Search(HeldDesigns[_Box]):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
-        self.relaxation = Relaxation(problem.changed(limits=problem.load_limits), SHARE)
+        self.relaxation = Relaxation(problem, SHARE)
         self._envelope = [limit for limit in problem.limits if limit.measure.channel.is_placing]
         self.places = self.relaxation.places
 
@@ -107,9 +142,7 @@ class _Search(HeldDesigns[_Box]):
             return EMPTY
         lower, upper = self._shrunk(lower, upper)
         relaxed = self.relaxation.program(lower, upper)
-        result = solve_unbalances(relaxed, angles=self.angles)
-        # what all places needed, their parts need too
-        self.angles = self.angles or result.final.samples // 2
+        result = self._solve(relaxed)
         if result.status is Status.INFEASIBLE:
             self.told(result.conflict)
             return EMPTY
@@ -118,12 +151,26 @@ class _Search(HeldDesigns[_Box]):
         allowed = self._pushed(middle, lower, upper)
         # what the program does not know of moves the places too
         moved = upper - lower if allowed is None else np.abs(allowed - middle)
-        return _Box(lower, upper, max(bound, floor), middle if allowed is None else allowed, np.maximum(spread, moved))
+        spread, middle = np.maximum(spread, moved), middle if allowed is None else allowed
+        near = self.relaxation.values(relaxed, result, middle)
+        return _Box(lower, upper, max(bound, floor), middle, spread, near)
+
+    def place(self, found: HeldDesign) -> Array:
+        """Return the places of a design."""
+        values = dict(zip((d.name for d in self.problem.decisions), found.design.values, strict=True))
+        return np.array([float(np.real(values[place.name])) for place in self.places])
 
     def around(self, found: HeldDesign) -> _Box | Over:
         """Return a thin box around the places of a design, and its bound at the first angles that are tried."""
         few = _Search(self.problem.changed(search=replace(self.problem.search, proves=False)))
         return few.box(*thin(self.place(found), *self.bounds))
+
+    def _solve(self, relaxed: Problem) -> Result:
+        """The best unbalances at the corners of a box."""
+        result = solve_unbalances(relaxed, angles=self.angles)
+        # what all places needed, their parts need too
+        self.angles = self.angles or result.final.samples // 2
+        return result
 
     def _spans(self, lower: Array, upper: Array) -> Iterator[tuple[Limit, float, float]]:
         """Least and largest of each distance that is limited, with its places in a box."""
@@ -191,8 +238,7 @@ class _Search(HeldDesigns[_Box]):
 
     def prices(self, design: Design) -> dict[Side, Price]:
         """Prices of limits on distances: what the least objective loses and they gain as places move (P19)."""
-        values = dict(zip((d.name for d in self.problem.decisions), design.values, strict=True))
-        places = np.array([float(np.real(values[place.name])) for place in self.places])
+        places = self.place(HeldDesign(design))
         # every shaft that stands at a limit has a distance of its own
         held = [
             (limit, k, side)
@@ -226,6 +272,24 @@ class _Search(HeldDesigns[_Box]):
     def at(self, places: Array) -> HeldDesign:
         """The best design with its places given."""
         where: dict[str, Value] = {p.name: float(x) for p, x in zip(self.places, places, strict=True)}
-        engine = self.problem.design(list(where.values()), self.places)
-        held = replace(self.problem, engine=engine, decisions=self.problem.unbalances)
+        engine, own = self.problem.design(list(where.values()), self.places), self.relaxation
+        held = replace(own.problem, engine=engine, decisions=own.others)
         return best_with(self.problem, held, where, self.angles)
+
+
+class _Others(_Search):
+    """Boxes of the places of a problem whose other decisions have a method of their own."""
+
+    is_shared = False
+
+    def __init__(self, problem: Problem, prove: Solve) -> None:
+        super().__init__(problem)
+        self._prove = prove
+
+    def around(self, found: HeldDesign) -> _Box | Over:
+        """Return a thin box around the places of a design, and its bound."""
+        return self.box(*thin(self.place(found), *self.bounds))
+
+    def _solve(self, relaxed: Problem) -> Result:
+        """What is decided of the corners of a box."""
+        return self._prove(relaxed)

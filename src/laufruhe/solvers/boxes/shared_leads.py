@@ -33,7 +33,7 @@ def solve_shared_leads(problem: Problem) -> Result:
     boxes, best = SharedGasBoxes(problem), _best(problem, lower, upper)
     allowed = best is not None and best.excess <= KEPT
     value = best.value if best is not None and allowed else math.inf
-    most = MOST_BOXES if problem.search.boxes is None else problem.search.boxes
+    most = problem.search.boxes_or(MOST_BOXES)
     room = SHARE * problem.tolerance * max(value, nothing_of(problem)) if allowed else 0.0
     known = known_of(best, np.array([float(x.real) for x in best.values])) if best is not None and allowed else None
     found = divide(boxes, lower, upper, value, room, most, known)

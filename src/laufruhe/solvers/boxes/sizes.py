@@ -98,7 +98,7 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
 
     def bounded(value: float, room: float, design: Design) -> Divided:
         usual = MOST_WITH_ROD if model.moves_rod else MOST_PROGRAMS if model.domains else MOST_BOXES
-        most = usual if problem.search.boxes is None else problem.search.boxes
+        most = problem.search.boxes_or(usual)
         if boxes is None:
             return Divided(0.0, 0)
         if known < value < math.inf:

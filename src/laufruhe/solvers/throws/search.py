@@ -147,7 +147,7 @@ def search_throws(
     except ModelError:
         # a throw alone may drive what no mount carries
         return None
-    most = len(search.roots) + (MOST_BOXES if problem.search.boxes is None else problem.search.boxes)
+    most = len(search.roots) + problem.search.boxes_or(MOST_BOXES)
     found, bound, boxes = divided(search, _Part(floor), _Best(best), nothing, search.reached, most, search.what)
     return Searched(bound, found.design, boxes, search.conflict, search.what)
 

@@ -1,0 +1,142 @@
+"""Open places beside bearings, sizes and leads: bounds against an independent model (P20)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import laufruhe
+from attack.crossings import leads_and_places, places_and_bearings, sizes_and_places
+from attack.families import toml
+from attack.openings import Openings
+from attack.plain_loads import number
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers.boxes.place_boxes import Relaxation, without_places
+from laufruhe.solvers.methods import METHODS
+
+READING = 2e-5
+DRAWN = {
+    "bearings": (places_and_bearings, "rms main-bearing force"),
+    "sizes": (sizes_and_places, "rms mount force"),
+    "leads": (leads_and_places, "rms mount force"),
+}
+
+
+def _narrowed(value: Any, rng: np.random.Generator, width: float) -> Any:
+    """Replace the bounds of every open place by a part of them, a share of them wide."""
+    if isinstance(value, list):
+        return [_narrowed(each, rng, width) for each in value]
+    if not isinstance(value, dict):
+        return value
+    if value == {"between": ["-0.2 m", "0.2 m"]}:
+        low = -0.2 + 0.4 * (1.0 - width) * rng.random()
+        return {"between": [f"{low:.9f} m", f"{low + 0.4 * width:.9f} m"]}
+    return {key: _narrowed(each, rng, width) for key, each in value.items()}
+
+
+def _drawn(kind: str, seed: int, width: float) -> tuple[dict[str, Any], np.random.Generator]:
+    """Return a random problem whose places lie in a random box, and the generator that goes on from there."""
+    make, measure = DRAWN[kind]
+    rng = np.random.default_rng([seed, len(kind)])
+    table = make(rng)
+    for key in ("constraints", "search", "gas"):
+        table.pop(key, None)
+    table["title"], table["objective"], table["search"] = kind, {"minimise": measure}, {"boxes": 40, "starts": 2}
+    return _narrowed(table, rng, width), rng
+
+
+def _bound(problem: Problem) -> float:
+    """Return the bound of all places within their bounds, by whatever decides what else is open."""
+    relaxed = without_places(problem)
+    method = next(each for each in METHODS if each.suits(relaxed))
+    result = method.decided(relaxed)
+    assert result.certificate is not None
+    return float(result.certificate.lower_bound)
+
+
+def _loaded(table: dict[str, Any], folder: Path) -> Problem:
+    path = folder / "crossing.toml"
+    path.write_text(toml(table), encoding="utf-8")
+    return laufruhe.load(path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [1.0, 0.3, 1e-5])
+@pytest.mark.parametrize("kind", DRAWN)
+def test_no_design_of_a_box_goes_under_its_bound(kind: str, width: float, tmp_path: Path) -> None:
+    """Designs are evaluated by a model that shares nothing with the package."""
+    for seed in range(2):
+        table, rng = _drawn(kind, seed, width)
+        bound = _bound(_loaded(table, tmp_path))
+        openings = Openings(table)
+        found = [openings.scene(openings.random(rng)).objective for _ in range(30)]
+        assert min(found) >= bound * (1.0 - READING)
+
+
+def _carried(x: Any, mass: Any) -> dict[str, Any]:
+    """Return one cylinder on three bearings whose crank carries a weight."""
+    return {
+        "title": "one weight over three bearings",
+        "engine": {
+            "layout": "inline", "cycle": "two-stroke", "bore": "80 mm", "stroke": "80 mm", "rod_ratio": 0.28,
+            "reciprocating_mass": "0.5 kg", "rotating_mass": "0.4 kg", "cylinder_spacing": "100 mm", "throws": [0, 180],
+        },
+        "operating_points": [{"speed": "3000 rpm"}],
+        "main_bearings": [{"x": "110 mm"}, {"x": "10 mm"}, {"x": "-110 mm"}],
+        "mounts": {"names": ["a", "b", "c"],
+                   "positions": [["0.2 m", "0.2 m", "0 m"], ["0.2 m", "-0.2 m", "0 m"], ["-0.3 m", "0 m", "0 m"]]},
+        "counterweights": [{"name": "w", "x": x, "radius": "50 mm", "mass": mass, "angle": 180}],
+    }  # fmt: skip
+
+
+PLACE = {"between": ["-150 mm", "150 mm"]}
+
+
+@pytest.mark.parametrize("measure", ["maximum main-bearing force", "rms main-bearing force", "mean main-bearing force"])
+@pytest.mark.parametrize("mass", ["0.6 kg", {"between": ["0.2 kg", "1 kg"]}], ids=["given", "open"])
+@pytest.mark.slow
+def test_the_best_place_is_that_of_a_row_of_places(measure: str, mass: Any, tmp_path: Path) -> None:
+    told = {**_carried(PLACE, mass), "objective": {"minimise": measure}, "fidelity": {"samples": 180}}
+    found = laufruhe.solve(_loaded(told, tmp_path))
+    assert found.certificate.kind is Proof.GLOBAL
+    problem = _loaded(told, tmp_path)
+    masses = [number(mass)] if isinstance(mass, str) else np.linspace(0.2, 1.0, 5).tolist()
+    row = []
+    for x in np.linspace(-0.15, 0.15, 31):
+        for each in masses:
+            values = [float(x)] if isinstance(mass, str) else [_value(d, float(x), each) for d in problem.decisions]
+            row.append(objective_value(problem, evaluate(problem, problem.design(values))))
+    assert found.certificate.lower_bound <= min(row) * (1.0 + 1e-9)
+    assert found.objective.value <= min(row) * (1.0 + 1e-4)
+
+
+def _value(decision: Any, x: float, mass: float) -> complex | float:
+    """Return the value of a decision, an unbalance of a mass or a place."""
+    return mass * 0.05 * decision.set.directions[0] if decision.is_affine else x
+
+
+@pytest.mark.slow
+def test_a_bound_that_knows_no_bearing_is_false(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without corners at the middle bearing its load is that of the outer ones: a false bound."""
+    told = {**_carried(PLACE, "0.6 kg"), "objective": {"minimise": "maximum main-bearing force"}}
+    problem = _loaded({**told, "fidelity": {"samples": 180}}, tmp_path)
+    whole = _bound(problem)
+    monkeypatch.setattr(Relaxation, "_bends_of", lambda *_: np.zeros(0))
+    least = min(
+        objective_value(problem, evaluate(problem, problem.design([float(x)]))) for x in np.linspace(-0.15, 0.15, 61)
+    )
+    assert whole <= least
+    assert _bound(problem) > 1.01 * least
+
+
+def test_a_beam_is_not_taken_for_a_shaft_that_is_cut(tmp_path: Path) -> None:
+    told = {**_carried(PLACE, "0.6 kg"), "objective": {"minimise": "maximum main-bearing force"}}
+    beam = _loaded({**told, "fidelity": {"samples": 60, "crankshaft": "beam"}}, tmp_path)
+    cut = _loaded({**told, "fidelity": {"samples": 60}}, tmp_path)
+    assert not any(method.suits(beam) for method in METHODS[:-1])
+    assert any(method.suits(cut) for method in METHODS[:-1])
