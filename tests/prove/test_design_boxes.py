@@ -21,6 +21,7 @@ from laufruhe.problem.decision import TURNED
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import lower_bound, minorant
+from laufruhe.prove.mounts import design_boxes
 from laufruhe.prove.mounts.design_boxes import DesignBoxes, mixes_corners
 from laufruhe.prove.mounts.mount_loops import is_looped, mount_loop
 from laufruhe.prove.mounts.mounted_loads import MountedLoads
@@ -226,6 +227,16 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
                 if design is not None and design.excess <= 0.0:
                     assert bound <= design.value * (1.0 + 1e-7)
     assert told >= 2
+
+
+@pytest.mark.slow
+def test_loads_of_too_many_numbers_have_no_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
+    boxes = DesignBoxes(joint(780004), math.inf, best_at, lambda *_: math.inf)
+    count = boxes.loads.rows * boxes.loads.columns
+    for most, few, worth in ((count, 2, True), (count - 1, 2, False), (count, 10**9, False)):
+        monkeypatch.setattr(design_boxes, "MOST_NUMBERS", most)
+        monkeypatch.setattr(design_boxes, "FEW", few)
+        assert (boxes.most_boxes > 0) is worth
 
 
 CROSSED = {
