@@ -45,7 +45,9 @@ LOG = MAP.with_name("mutants.jsonl")
 """What became of each mutant, one a line; a run goes on where the last one ended."""
 FEW = 10
 Key = tuple[str, str]
-KILLED, SURVIVED, UNREACHED = "killed", "survived", "not called by any test"
+Found = tuple[Mutant, str, int]
+"""A mutant, what became of it, and how many tests it passed."""
+KILLED, SURVIVED, UNREACHED = "killed", "survived", "met no test"
 
 
 class Calls:
@@ -135,7 +137,7 @@ def tests_of(mutant: Mutant, table: dict[str, Any], seconds: float, passed: Iter
     chosen, total = [], 0.0
     for name, taken in sorted((pair for pair in pairs if pair[0] not in passed), key=lambda pair: pair[1]):
         total += taken
-        if chosen and total > seconds:
+        if total > seconds:
             break
         chosen.append(name)
     return chosen
@@ -207,7 +209,7 @@ def run(arguments: argparse.Namespace) -> None:
             killers[key] = entry["failed"]
         passed[key].update(entry["passed"])
     _import_libraries()
-    found: list[tuple[Mutant, str]] = []
+    found: list[Found] = []
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder, LOG.open("a", encoding="utf-8") as log:
         copies: SimpleQueue[Path] = SimpleQueue()
         for k in range(arguments.workers):
@@ -226,6 +228,7 @@ def run(arguments: argparse.Namespace) -> None:
                 said, failed = outcome(mutant, tests, source, arguments.seconds)
             finally:
                 copies.put(source)
+            passed[key].update(tests if said == SURVIVED else [])
             entry = {"change": key[0], "code": key[1], "outcome": said, "failed": failed,
                      "passed": tests if said == SURVIVED else []}  # fmt: skip
             log.write(f"{json.dumps(entry)}\n")
@@ -235,40 +238,42 @@ def run(arguments: argparse.Namespace) -> None:
         unproven: set[str] = set()
         with ThreadPoolExecutor(arguments.workers) as pool:
             for mutant, (said, failed) in zip(sample, pool.map(tried, sample), strict=True):
-                found.append((mutant, said))
+                found.append((mutant, said, len(passed[mutant.change, code_of(mutant.file)])))
                 unproven.update(failed)
                 if said != KILLED:
                     print(f"{said}: {mutant}", flush=True)
-        fine, failed = _forked(sorted(unproven), copies.get(), 10.0 * arguments.seconds)
+        fine, failed = _forked(sorted(unproven), copies.get(), 600.0)
     if unproven and not fine:
         sys.exit(f"these fail without any change: {failed or 'the run itself'}; nothing is written")
-    killed = sum(said == KILLED for _, said in found)
+    killed = sum(said == KILLED for _, said, _ in found)
     print(f"{killed} of {len(found)} mutants killed")
     if arguments.page:
         PAGE.parent.mkdir(exist_ok=True)
-        PAGE.write_text(page(found, arguments), encoding="utf-8")
+        PAGE.write_text(page(found, len(table["tests"]), arguments), encoding="utf-8")
 
 
-def page(found: Iterable[tuple[Mutant, str]], arguments: argparse.Namespace) -> str:
+def page(found: Iterable[Found], tests: int, arguments: argparse.Namespace) -> str:
     """Return the page that says what was killed in each room and which mutants survive."""
     found = list(found)
     lines = [
         "# One-line mutants",
         "",
         f"Made by `make mutants`: {len(found)} mutants drawn with seed {arguments.seed} from all single-line changes",
-        "of operators, numbers, signs and extremes in the rooms below. Each runs the tests that call its function, for",
-        f"{arguments.seconds:g} s of a core at most. What is killed is not run again while the code of its file stays.",
-        "All tests that kill pass without any change. A survivor is a change that no test sees.",
+        f"of operators, numbers, signs and extremes in the rooms below. Each meets those of the {tests} tests of the",
+        "map that call its function, the cheapest first, until one fails or the time of a run is over. A run goes on",
+        "where earlier ones ended: what is killed is not run again while the code of its file stays, and a survivor",
+        "meets only tests that it has not met yet. All tests that kill pass without a change. A survivor either",
+        "returns the same as the source, or shows a test that is missing.",
         "",
         "| room | mutants | killed | share |",
         "| --- | ---: | ---: | ---: |",
     ]
     for room in (*ROOMS, "all"):
-        own = [said for mutant, said in found if room == "all" or mutant.file.startswith(f"laufruhe/{room}/")]
+        own = [said for mutant, said, _ in found if room == "all" or mutant.file.startswith(f"laufruhe/{room}/")]
         killed = sum(said == KILLED for said in own)
         lines.append(f"| {room} | {len(own)} | {killed} | {killed / max(len(own), 1):.0%} |")
-    lines += ["", "## Survivors", ""]
-    lines += [f"- {said}: `{mutant}`" for mutant, said in found if said != KILLED] or ["None."]
+    lines += ["", "## Survivors", "", "With the number of tests that each passed.", ""]
+    lines += [f"- {count}: `{mutant}`" for mutant, said, count in found if said != KILLED] or ["None."]
     return "\n".join(lines) + "\n"
 
 

@@ -128,7 +128,7 @@ def _nodes(tree: ast.AST, scope: str = "", function: str | None = None) -> Itera
 
 
 def _placeholders(node: ast.AST) -> Iterator[ast.AST]:
-    """Yield numbers that change nothing: in place of a size of zero, and as the length that reshaping works out."""
+    """Yield numbers that change nothing: in place of a size of zero, of a length that reshaping works out, seeds."""
     match node:
         case ast.BoolOp(op=ast.Or(), values=[*_, ast.Constant(value=float(1.0)) as last]):
             yield last
@@ -136,6 +136,8 @@ def _placeholders(node: ast.AST) -> Iterator[ast.AST]:
             op=ast.Div(), right=ast.Call(func=ast.Attribute(attr="where"), args=[_, _, ast.Constant() as last])
         ):
             yield last
+        case ast.Call(func=ast.Attribute(attr="default_rng"), args=[seed]):
+            yield seed
         case ast.Call(func=ast.Attribute(attr="reshape"), args=args):
             sizes = [size for arg in args for size in ast.walk(arg)]
             yield from (s.operand for s in sizes if isinstance(s, ast.UnaryOp) and isinstance(s.op, ast.USub))

@@ -52,14 +52,14 @@ def test_messages_annotations_and_texts_are_left_alone(tmp_path, monkeypatch) ->
 
 def test_numbers_that_change_nothing_are_left_alone(tmp_path, monkeypatch) -> None:
     text = """def f(a, b):
-    size = b.max() or 1.0
+    size = b.max() or np.random.default_rng(7).random() or 1.0
     return (a / np.where(b > 0.0, b, 1.0)).reshape(-1, 3) / size
 """
     (tmp_path / "one.py").write_text(text)
     monkeypatch.setattr("mutants.single_lines.SOURCE", tmp_path)
     assert [m.after.strip() for m in mutants_of(tmp_path / "one.py")] == [
-        "size = b.max() and 1.0",
-        "size = b.min() or 1.0",
+        "size = b.max() and np.random.default_rng(7).random() or 1.0",
+        "size = b.min() or np.random.default_rng(7).random() or 1.0",
         "return (a / np.where(b > 0.0, b, 1.0)).reshape(-1, 3) * size",
         "return (a * np.where(b > 0.0, b, 1.0)).reshape(-1, 3) / size",
         "return (a / np.where(b < 0.0, b, 1.0)).reshape(-1, 3) / size",
