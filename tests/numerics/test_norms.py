@@ -124,6 +124,18 @@ class TestEveryNorm:
             assert not z[lengths(v) == 0.0].any()
 
     @given(rows())
+    def test_kinks_touch_the_norm(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
+        """Each of the dual rows that are told attains the norm to what counts as touching (P19)."""
+        weights, v, _ = data
+        grid = one_signal(weights)
+        whole, z = norm.value(grid, v), norm.subgradient(grid, v)
+        kinks = norm.kinks(grid, v, z)
+        for own in () if kinks is None or whole <= 1e-200 else (kinks.base, *kinks.others):
+            # what counts as zero of a row, a length or a direction
+            assert float((own * v).sum()) == pytest.approx(whole, rel=5e-3)
+            assert norm.dual_norm(grid, norm.balanced(grid, own)) <= 1.0 + 5e-3
+
+    @given(rows())
     def test_subgradient_lies_below_the_norm(self, norm: Norm, data: tuple[np.ndarray, ...]) -> None:
         """norm(W) >= norm(V) + <Z, W - V> for any W."""
         weights, v, w = data

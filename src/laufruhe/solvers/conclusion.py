@@ -346,7 +346,8 @@ def _limit_value(
 ) -> LimitValue:
     found = evaluation.standing(limit)
     if prices is None:
-        price = Price(0.0, 0.0)
+        # nothing is open that takes a step
+        price = Price.both(math.nan)
     elif found.excess >= -ACTIVE and not _is_moved(problem, evaluation, limit):
         # nothing open moves it: relaxed it changes nothing, and tightened no design keeps it
         price = Price(0.0, math.inf)
@@ -391,7 +392,7 @@ def with_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
     problem, known = result.problem, dict(zip(result.problem.limits, result.limits, strict=False))
     still, finer = result.final, finely(result.final)
     shown = tuple(
-        known.get(limit) or _limit_value(problem, limit, finer if still.excess([limit]) > KEPT else still, None, 0.0)
+        known.get(limit) or _limit_value(problem, limit, finer if still.excess([limit]) > KEPT else still, {}, 0.0)
         for limit in limits
     )
     resonant = not known and result.final.resonance

@@ -239,6 +239,14 @@ def edges_at(decision: Decision, column: Array) -> dict[str, Array]:
     return found
 
 
+def _at_nothing(decision: Decision, column: Array) -> list[Array]:
+    """Outward normals of the edges of an angle at a size of nothing, shape (2,) each."""
+    own = decision.set
+    if own.width == 1 or own.free_angle or float(np.hypot(*column)) > own.scale * ACTIVE:
+        return []
+    return [sign * np.array([-edge[1], edge[0]]) for edge, sign in zip(own.edges, (-1.0, 1.0), strict=False)]
+
+
 def bounds_of(decision: Decision, column: Array, slope: Array) -> dict[str, Price]:
     """Return prices of the edges that a decision stands at, where this slope is left of all else."""
     edges = edges_at(decision, column).items()
@@ -268,8 +276,12 @@ def affine_prices(
     held = [
         _slopes(problem.limits[k][1], x, found.limits[k] / solver[k] if solver[k] else None) for k in active
     ]  # fmt: skip
-    normals = np.zeros((len(edges), problem.size))
-    for row, (columns, normal) in zip(normals, edges.values(), strict=True):
+    # at nothing a size is held by the edges of its angle, which have no prices there
+    apex = [
+        (domain.columns, own) for domain in problem.domains for own in _at_nothing(domain.decision, x[domain.columns])
+    ]
+    normals = np.zeros((len(edges) + len(apex), problem.size))
+    for row, (columns, normal) in zip(normals, [*edges.values(), *apex], strict=True):
         row[columns] = normal
     scaled = [None if own is None else own.scaled(problem.units) for own in (*objective, *held)]
     known = [own for own in scaled if own is not None]
@@ -277,25 +289,28 @@ def affine_prices(
     if len(known) == len(scaled) and not problem.groups:
         ranges = prices_of(known[:count], known[count:], normals * problem.units)
     if ranges is None:
-        # what the bound itself leaves over prices the edges
+        # what the bound itself leaves over prices the edges; how far the sides lie apart is not known
         left: dict[str, Price] = {}
         for domain in problem.domains:
             left |= bounds_of(domain.decision, x[domain.columns], bound.gradient[domain.columns])
-        return prices, left
+        one_sided = {
+            side: Price(price.relaxed, math.nan) for side, price in prices.items() if price.is_one and price.relaxed
+        }
+        return prices | one_sided, {name: Price(price.relaxed, math.nan) for name, price in left.items()}
     for k, price in zip(active, ranges, strict=False):
         if not price.is_one:
             side = limits[k], "at most"
             prices[side] = Price(price.relaxed, math.inf if problem.limits[k][0] == 0.0 else price.tightened)
-    return prices, dict(zip(edges, ranges[len(active) :], strict=True))
+    return prices, dict(zip(edges, ranges[len(active) :], strict=False))
 
 
 def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) -> Slopes | None:
-    """All slopes of a norm at a design; None where too much of it vanishes."""
+    """All slopes of a norm at a design; None where they are not known, or too much of it vanishes."""
     rows = norm.rows(x)
     kinks = norm.norm.kinks(norm.grid, rows, norm.norm.subgradient(norm.grid, rows) if z is None else z)
-    if len(kinks.vanishing) > MOST_VANISHING:
+    if kinks is None or len(kinks.vanishing) > MOST_VANISHING:
         return None
-    hull = norm.pulled(kinks.base)[None]
+    hull = np.array([norm.pulled(own) for own in (kinks.base, *kinks.others)])
     if len(kinks.longest):
         own = rows[kinks.longest]
         hull = np.einsum("ad,adn->an", own / np.linalg.norm(own, axis=1)[:, None], norm.slope[kinks.longest])

@@ -51,6 +51,8 @@ class Grid:
 TOUCHES, VANISHES, COUNTS = 1e-5, 1e-6, 1e-4
 """Shares of the longest row that a row may lack and be as long, and up to which it is none; share of all dual rows
 from which one counts."""
+MOST_KINKS = 64
+"""Dual rows of which a mixture is told."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,11 +67,14 @@ class Kinks:
         Rows of which each alone, along itself, would do in its place; none where the base is needed.
     vanishing
         Rows that are zero: anything no longer than their weight may be added.
+    others
+        Further dual rows of the shape of the base; any mixture of these and the base would do.
     """
 
     base: Array
     longest: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
     vanishing: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    others: tuple[Array, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,9 +206,9 @@ class Norm(ABC):
         excess = self.dual_norm(grid, z)
         return z if excess <= 1.0 else z / excess
 
-    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks:
-        """Return all dual rows that touch the norm here, as far as it tells them from those given (P19)."""
-        return Kinks(z)
+    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks | None:
+        """Return all dual rows that touch the norm here, with those given; None where they are not known (P19)."""
+        return None
 
     def balanced(self, grid: Grid, z: Array) -> Array:
         """The nearest dual rows whose dual norm is finite (P3)."""

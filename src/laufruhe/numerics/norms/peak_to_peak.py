@@ -9,16 +9,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import combinations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.balls import smallest_balls
 from laufruhe.numerics.norms.maximum import in_place
 from laufruhe.numerics.norms.norm import (  # fmt: skip
+    MOST_KINKS,
+    TOUCHES,
     Cones,
     Grid,
+    Kinks,
     Norm,
     SmoothProgram,
     amplitudes,
@@ -27,6 +32,9 @@ from laufruhe.numerics.norms.norm import (  # fmt: skip
     softened_lengths,
 )
 from laufruhe.numerics.spectrum import Spectrum
+
+SAME_WAY = 1e-3
+"""Share of a radius that tells directions apart."""
 
 
 class PeakToPeak(Norm):
@@ -55,6 +63,28 @@ class PeakToPeak(Norm):
             along = (rows[at] - balls.centres[largest]) / balls.radii[largest]
             np.add.at(z, at, 2.0 * shares[:, None] * along)
         return z
+
+    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks | None:
+        """Return the shares of points that hold every largest ball; None where they are many (P19).
+
+        No more points than directions and one have shares of their own; all others are mixtures of these.
+        """
+        balls, found = smallest_balls(_signals(rows, grid.steps)), list[Array]()
+        largest = float(balls.radii.max(initial=0.0))
+        for k in np.flatnonzero(balls.radii >= (1.0 - TOUCHES) * largest) if largest else ():
+            first = int(k) * grid.steps
+            along = (rows[first : first + grid.steps] - balls.centres[k]) / balls.radii[k]
+            at = _peaks(lengths(along))
+            count = int(np.linalg.matrix_rank(_balance(along[at]), tol=SAME_WAY)) if len(at) else 0
+            if math.comb(len(at), count) > MOST_KINKS:
+                return None
+            for few in combinations(at.tolist(), count):
+                shares = _shares_of(along[[*few]])
+                if shares is not None:
+                    own = np.zeros_like(rows)
+                    own[first + np.array(few)] = 2.0 * shares[:, None] * along[[*few]]
+                    found.append(own)
+        return Kinks(found[0], others=tuple(found[1:])) if 0 < len(found) <= MOST_KINKS else None
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """Half the sum of the lengths; infinite where the rows of a signal do not add up to nothing."""
@@ -125,6 +155,29 @@ class PeakToPeak(Norm):
 
 def _signals(rows: Array, steps: int) -> Array:
     return rows.reshape(-1, steps, rows.shape[-1])
+
+
+def _peaks(sizes: Array) -> NDArray[np.intp]:
+    """Return where lengths are as large as the largest, of neighbours the largest alone."""
+    touching = np.flatnonzero(sizes >= (1.0 - TOUCHES) * sizes.max(initial=0.0))
+    groups = np.split(touching, np.flatnonzero(np.diff(touching) > 1) + 1)
+    if len(groups) > 1 and groups[0][0] == 0 and groups[-1][-1] == len(sizes) - 1:
+        groups = [np.concatenate([groups.pop(), groups[0]]), *groups[1:]]
+    return np.array([group[np.argmax(sizes[group])] for group in groups if len(group)], dtype=np.intp)
+
+
+def _balance(along: Array) -> Array:
+    return np.vstack([along.T, np.ones(len(along))])
+
+
+def _shares_of(along: Array) -> Array | None:
+    """Return the only shares, one in sum, with which directions add up to nothing; None where there are no such."""
+    system = _balance(along)
+    right = np.zeros(len(system))
+    right[-1] = 1.0
+    shares, _, rank, _ = np.linalg.lstsq(system, right, rcond=SAME_WAY)
+    near = np.abs(system @ shares - right).max() <= SAME_WAY and shares.min() >= -SAME_WAY
+    return np.maximum(shares, 0.0) if near and rank == len(along) else None
 
 
 def _swing(signal: Spectrum) -> float:

@@ -12,7 +12,17 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.mean import Mean
-from laufruhe.numerics.norms.norm import Cones, Grid, Norm, SmoothProgram, lengths, softened_lengths
+from laufruhe.numerics.norms.norm import (
+    MOST_KINKS,
+    TOUCHES,
+    Cones,
+    Grid,
+    Kinks,
+    Norm,
+    SmoothProgram,
+    lengths,
+    softened_lengths,
+)
 from laufruhe.numerics.spectrum import Spectrum
 
 _MEAN = Mean()
@@ -36,6 +46,18 @@ class WorstMean(Norm):
             own = slice(int(np.argmax(means)) * _size(grid), (int(np.argmax(means)) + 1) * _size(grid))
             z[own] = _MEAN.subgradient(Grid(_shares(grid)[own], grid.steps), rows[own])
         return z
+
+    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks | None:
+        """Return those of the mean of every operating point that is as large; None where a row of one vanishes."""
+        means, size, found = self._means(grid, rows), _size(grid), list[Array]()
+        for point in np.flatnonzero(means >= (1.0 - TOUCHES) * means.max(initial=0.0)):
+            own, base = slice(point * size, (point + 1) * size), np.zeros_like(rows)
+            mean = _MEAN.kinks(Grid(_shares(grid)[own], grid.steps), rows[own], rows[own])
+            if len(mean.vanishing):
+                return None
+            base[own] = mean.base
+            found.append(base)
+        return Kinks(found[0], others=tuple(found[1:])) if 0 < len(found) <= MOST_KINKS else None
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         """sum_p max_k |z_k| / w_k, weights of every operating point adding up to one."""
