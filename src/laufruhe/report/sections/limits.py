@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from laufruhe.present.measures import changed, is_met, limits_of, objective_unit
-from laufruhe.present.numbers import number, prices_of, with_unit
+from laufruhe.present.numbers import DASH, number, prices_of, with_unit
 from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import LimitValue
@@ -24,7 +24,7 @@ def tables(result: Result) -> list[Grid]:
     sides = {limit.side for limit in limits}
     head = ("limit", "value", sides.pop() if len(sides) == 1 else "bound", "state", "shadow price")
     title = "Limits" if changed(result) else "Limits, and the design as given"
-    notes = [PRICES] if any(limit.shadow_price or limit.tightening_price for limit in limits) else []
+    notes = [PRICES] if decided and any(limit.shadow_price or limit.tightening_price for limit in limits) else []
     notes += [BOTH] if any(limit.tightening_price is not None for limit in limits) else []
     notes += [
         f"Samples may have missed {100.0 * limit.error_estimate:.1g} % of '{limit.name}'."
@@ -40,4 +40,4 @@ def _row(limit: LimitValue, unit: str, decided: bool) -> tuple[str, ...]:
     value = f"{number(limit.value * factor, scale=limit.limit * factor)} {name}"
     side = "" if limit.side == "at most" else f"{limit.side} "
     bound = side + with_unit(limit.limit, limit.unit)
-    return limit.name, value, bound, state, prices_of(limit, unit, limit.active and decided)
+    return limit.name, value, bound, state, prices_of(limit, unit, limit.active) if decided else DASH
