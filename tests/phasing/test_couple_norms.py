@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from lanes import first_fast
 from laufruhe.load_models.couple_norms import CoupleNorms, CoupleTerm, couple_norms, three_stars
 from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.physics.crank_stars import Stars, star_sums
@@ -111,10 +112,10 @@ def test_weights_on_single_throws_are_told_by_no_couple(tmp_path):
     assert norms_of(problem, family) is None
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("cylinders", "name", "gas"), [(11, "mean", False), (12, "maximum", True), (15, "mean", False)]
-)
+LENGTHS = [(11, "mean", False), (12, "maximum", True), (15, "mean", False)]
+
+
+@pytest.mark.parametrize(("cylinders", "name", "gas"), first_fast(LENGTHS, 0, 2))
 def test_long_cranks_are_proven(cylinders, name, gas, tmp_path):
     """No star drawn, and no exchange of the best one, is under what was proven."""
     problem, family = asked(tmp_path, cylinders, "two-stroke", name, gas)
