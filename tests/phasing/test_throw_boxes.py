@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.throw_waves import ThrowWaves
+from laufruhe.load_models.affine import AffineNorm
+from laufruhe.load_models.throw_waves import ThrowWaves, WaveNorm
 from laufruhe.load_models.uneven_model import rides_of
 from laufruhe.machine.firing import firing_turns, intervals_of, lap_orders
+from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.numerics.turns import angle_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
@@ -18,7 +20,7 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.prove.throws.arcs import ArcBox
 from laufruhe.solvers import Status, solve
 from laufruhe.solvers.stars.design import StarDesign, solve_fixed
-from laufruhe.solvers.throws.boxes import ThrowPrograms
+from laufruhe.solvers.throws.boxes import ThrowPrograms, _small
 from laufruhe.solvers.throws.riders import Riders
 from laufruhe.solvers.throws.windows import firing_of, nearest, windows_of
 from phasing import engines
@@ -287,3 +289,19 @@ def test_a_limit_that_no_crank_keeps_is_named(tmp_path):
     result = solve(engines.problem(tmp_path, 5, "four-stroke", phasing=allowed, rest=over))
     assert result.status in (Status.OPTIMAL, Status.FEASIBLE)
     assert result.certificate.gap < 0.05
+
+
+def test_rows_lose_only_components_that_nothing_loads():
+    """One component has a constant alone, one a slope, one waves, and one nothing."""
+    constant, slope = np.zeros((5, 4)), np.zeros((5, 4, 2))
+    waves = np.zeros((1, 2, 5, 4), dtype=complex)
+    constant[1, 0], slope[2, 1, 0], waves[0, 1, 3, 2] = 3.0, -4.0, 5.0j
+    grid = Grid(np.full(5, 0.2), 5)
+    small = _small(WaveNorm(AffineNorm(NORMS["maximum"], constant, slope, grid), waves, 0.5))
+    assert np.array_equal(small.fixed.constant, constant[:, :3])
+    assert np.array_equal(small.fixed.slope, slope[:, :3])
+    assert np.array_equal(small.waves, waves[..., :3])
+    assert small.left_out == 0.5
+    # a signal of nothing keeps a row to have a norm
+    none = _small(WaveNorm(AffineNorm(NORMS["maximum"], 0.0 * constant, 0.0 * slope, grid), 0.0 * waves, 0.0))
+    assert none.fixed.constant.shape == (5, 1)
