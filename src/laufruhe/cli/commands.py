@@ -79,7 +79,6 @@ app = typer.Typer(
 
 
 def _example(*lines: str) -> str:
-    """What can be typed as it stands, under the help of a command."""
     return "\b\n" + "\n".join([f"Example{'s' * (len(lines) > 1)}:", *(f"  {line}" for line in lines)])
 
 

@@ -74,7 +74,6 @@ def described() -> tuple[str, dict[str, Any]]:
 
 
 def _hint(question: _Question, answers: Answers) -> str:
-    """What stands behind the words of a question."""
     if question.among:
         return f" ({', '.join(question.among)})"
     if question.key == "firing_order" and LAYOUTS[answers["layout"]].takes("bank_stagger"):
@@ -128,7 +127,6 @@ def _tried(question: _Question, before: Answers, text: str) -> Any:
 
 
 def _value(text: str) -> int | float | str:
-    """A number where it is one."""
     for read in (int, float):
         with suppress(ValueError):
             return read(text)

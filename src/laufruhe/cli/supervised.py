@@ -68,7 +68,6 @@ def listen() -> None:
 
 
 def _sudden(number: int) -> str:
-    """What is said of an end that nobody asked for."""
     for_want = "most likely for want of memory; ask for less at once"
     why = for_want if number == signal.SIGKILL else "which is a defect; report it"
     return f"laufruhe: the computation was ended by signal {number}, {why}\n"

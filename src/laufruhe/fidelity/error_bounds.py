@@ -285,7 +285,6 @@ def _straight(gas: GasModel | None, cycle: Cycle) -> GasModel | None:
 
 
 def _thinned(gas: GasModel | None) -> GasModel | None:
-    """A trace of every other point."""
     if not isinstance(gas, PressureTrace) or len(gas.angles) < FEWEST:
         return gas
     keeps = [*range(0, len(gas.angles) - 1, 2), len(gas.angles) - 1]

@@ -237,5 +237,4 @@ def _orders(fidelity: Fidelity) -> str:
 
 
 def _gas_steps(problem: Problem) -> int | None:
-    """Of a rung whose own steps are too few for gas."""
     return EXACT.samples if GAS.is_there(problem) else None

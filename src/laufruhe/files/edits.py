@@ -130,7 +130,6 @@ def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
 
 
 def _throw(tables: Mapping[str, Any], name: str, k: int) -> Keys:
-    """Of one throw, counted from zero."""
     throws = tables.get("engine", {}).get("throws")
     if not isinstance(throws, list) or not 0 <= k < len(throws):
         remedy = "give values for all throws, or write them into the problem file first"
@@ -171,7 +170,6 @@ def _twisting(torsion: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
 
 
 def _sections(label: str, keys: Keys, shaft: Mapping[str, Any] | None) -> Iterator[tuple[str, Keys]]:
-    """A shaft and the first of its pieces, which alone may be open."""
     if shaft:
         yield from ((label, (*keys, "pieces", 0)) for _ in shaft.get("pieces", ())[:1])
         yield label, keys

@@ -129,7 +129,6 @@ def _sharing_chambers(table: EngineTable, parts: Sequence[SliderCrank], gas: boo
 
 
 def _check_pistons(table: EngineTable) -> None:
-    """What an engine with pistons must say, and one without must not."""
     if table.kind.has_pistons:
         for key in ("stroke", "reciprocating_mass"):
             if getattr(table, key) is None:

@@ -166,7 +166,6 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
 
 
 def _values(table: MountsTable, place: MountTable, key: str, where: str, remedy: str) -> Sequence[float | Open]:
-    """What stands at a key of a mount, or of all of them."""
     value = getattr(place, key)
     if value is None and key in _OF_ALL:
         value = getattr(table, key)

@@ -140,7 +140,6 @@ def _has_open(value: object) -> bool:
 
 
 def _check_openable(engine: EngineTable) -> None:
-    """Whether the layout lets open what is open."""
     for key in _OPENABLE:
         if key not in engine.kind.openable and _has_open(engine.own(key)):
             others = " or ".join(name for name, other in LAYOUTS.items() if key in other.openable)

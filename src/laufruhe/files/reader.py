@@ -213,7 +213,6 @@ class _Rebuilt:
 
     @cached_property
     def _plainly(self) -> Mapping[str, Any]:
-        """The tables without a choice of fidelity, which is made once."""
         if self.tables.get("fidelity", {}).get("kinematics") != "auto":
             return self.tables
         own = {key: value for key, value in self.tables["fidelity"].items() if key not in ("kinematics", "tolerance")}
@@ -254,7 +253,6 @@ def _check_shape(tables: dict[str, Any], path: Path) -> None:
 
 @cache
 def _typed() -> bytes:
-    """What comes from standard input, read once."""
     return sys.stdin.buffer.read(MOST_BYTES + 1)
 
 

@@ -148,7 +148,6 @@ def size_decisions(
 
 
 def _check_rod(engine: EngineTable) -> None:
-    """Every rod length allowed lets the crank turn."""
     shortest = Open.of(engine.rod_length or math.inf).lower
     if engine.kind.is_free or engine.offset:
         raise Refused("engine.rod_length", None, "is decided in layouts without offset", "fix it, or take a layout")

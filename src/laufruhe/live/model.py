@@ -215,7 +215,6 @@ def _between(domains: Sequence[Domain]) -> Array:
 
 
 def _design(name: str, x: Array, moving: Problem, domains: Sequence[Domain], asked: Sequence[Measure | None]) -> Design:
-    """A design as `evaluate` finds it."""
     found = evaluate(moving, moving.design([domain.complex_value(x) for domain in domains]))
     told = (None if measure is None else float(found.value(measure)) for measure in asked)
     return Design(name, tuple(map(float, x)), tuple(told))

@@ -82,7 +82,6 @@ def _marks(decisions: Sequence[Decision]) -> tuple[tuple[str, str, str], ...]:
 
 
 def _filled(text: str, marks: Sequence[tuple[str, str, str]], moving: Problem) -> str:
-    """With the values that the moving decisions start from."""
     numbers: dict[str, float] = {}
     for decision in moving.decisions:
         numbers[decision.name], numbers[angle_name(decision)] = decision.set.split(decision.start)
@@ -99,7 +98,6 @@ def written(value: float, unit: str) -> str:
 
 
 def _fixed(tables: dict[str, Any], result: Result, values: Mapping[str, Value]) -> dict[str, Any]:
-    """What has no slider, as it was decided."""
     for decision in result.problem.decisions:
         if not decision.is_affine:
             number = float(values[decision.name].real)

@@ -312,7 +312,6 @@ def _change(problem: Problem, decision: Decision, direction: complex) -> _Change
 
 
 def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
-    """All rotors of an engine, those not named at zero."""
     changed = {rotor.name: rotor.unbalance for rotor in rotors}
     return tuple(replace(rotor, unbalance=changed.get(rotor.name, 0.0)) for rotor in engine.rotors)
 

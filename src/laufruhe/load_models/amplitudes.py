@@ -81,7 +81,6 @@ class AmplitudeObjective:
         return Window(self.orders[place], complex(-most, -most), complex(most, most))
 
     def _forces(self, space: StarSpace, pattern: Sequence[int]) -> float:
-        """What terms of forces alone have of a pattern."""
         forces = np.abs(phase_waves(space.phases, self.orders) @ np.array(pattern))
         forces[forces <= 1e-12 * space.throws] = 0.0
         pure = [term for term in self.terms if not any(term.couple)]

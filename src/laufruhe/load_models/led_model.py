@@ -175,7 +175,6 @@ def _moved(share: Share, lead: float) -> Share:
 
 
 def _derived(share: Share) -> Share:
-    """By the lead of its shaft."""
     return _each(share, lambda signal: signal.derivative)
 
 
@@ -184,7 +183,6 @@ def _each(share: Share, change: Callable[[Spectrum], Spectrum]) -> Share:
 
 
 def _sum(still: Share, led: Sequence[Share]) -> Share:
-    """Of what stands and what was moved."""
     own = [reduce(add, each) for each in zip(still.own, *(share.own for share in led), strict=True)]
     columns = [
         [reduce(add, each) for each in zip(*by, strict=True)]

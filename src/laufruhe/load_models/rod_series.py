@@ -143,7 +143,6 @@ def _with_rest(own: RodSeries, lengths: Sequence[float], exact: Sequence[AffineN
 
 
 def _lengths(low: float, high: float, count: int) -> list[float]:
-    """Of the nodes of a series between two."""
     places = np.cos(np.pi * (np.arange(count) + 0.5) / count)
     return [float(2.0 / ((1.0 + x) / low + (1.0 - x) / high)) for x in places]
 

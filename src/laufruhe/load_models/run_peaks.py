@@ -212,7 +212,6 @@ def _of(measure: Measure, response: Response) -> Array:
 
 
 def _peaks(parts: Sequence[Array], between: bool) -> Array:
-    """The largest of every stretch and place, flat."""
     return np.concatenate([_lengths(squares, top, between) for squares, top in _tops(parts)])
 
 

@@ -291,14 +291,12 @@ def _heavier(engine: Engine, masses: Array) -> Engine:
 
 
 def _moved(engine: Engine, decision: Decision, direction: complex) -> Engine:
-    """With one unit of a column of an unbalance."""
     by = {drive.rotor: drive.of(direction) for drive in decision.rotor_drives}
     rotors = (replace(r, unbalance=r.unbalance + by.get(r.name, 0.0)) for r in engine.rotors)
     return replace(engine, rotors=tuple(rotors))
 
 
 def _affine(rows: Sequence[Rows]) -> AffineNorm:
-    """Of rows without any column, and with one unit of each."""
     slopes = [own.vectors - rows[0].vectors for own in rows[1:]]
     return AffineNorm(rows[0].norm, rows[0].vectors, np.stack(slopes, axis=-1), rows[0].grid)
 

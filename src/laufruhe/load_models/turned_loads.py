@@ -133,7 +133,6 @@ class TurnedLoads:
         return self._loaded(working(self._point, part.name), lone(engine, k, self._beside, part))
 
     def _of_unit(self, rotor: Rotor) -> list[Spectrum]:
-        """Of one that is 1, and i."""
         engine = self._problem.engine
         units = (only_rotors(engine, [replace(rotor, unbalance=u)], self._beside) for u in (1.0, 1.0j))
         return [self._loaded(motored(self._point), unit) for unit in units]
@@ -162,7 +161,6 @@ def _kept(squares: Array, orders: Array, felt: Felt) -> Mask:
 
 
 def _leaning(rows: Sequence[ComplexArray]) -> _Leaning:
-    """From the three banks of `QUARTERS`, or from one that stays."""
     if len(rows) == 1:
         return _Leaning(0.0 * rows[0], 0.0 * rows[0], rows[0])
     return _Leaning(*leaning(*rows))

@@ -149,7 +149,6 @@ class UnevenModel:
         self, point: OperatingPoint, at: Symbols, signal: Callable[[PointLoads], Spectrum], felt: Sequence[Felt],
         beside: bool,
     ) -> list[Lines]:  # fmt: skip
-        """Of every place that a signal has."""
         k, parts = self.problem.points.index(point), self.problem.engine.slider_cranks
         turned = TurnedLoads(self.problem, k, signal, at.bank is not None, felt, beside)
         placed = [self._place(k, part, at) for k, part in enumerate(parts)]
@@ -249,7 +248,6 @@ def _wrench_of(loads: PointLoads) -> Spectrum:
 
 
 def _steps(lines: Lines) -> int:
-    """That a period needs."""
     return max(LEAST_SAMPLES, int(SAMPLES_PER_ORDER * float(lines.orders.max()) / lines.base))
 
 

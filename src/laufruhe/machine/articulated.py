@@ -50,7 +50,6 @@ class Knuckle:
         return lib, alpha + lead, (zero + self.master.crank_radius) / length, self.master.offset / length
 
     def _arm(self, lib: Any, alpha: Any, bank: float) -> tuple[Any, Any, Any]:
-        """From the crank pin to this one, and how it turns."""
         shape = self._shape(lib, alpha, bank)
         rod = kinematics.cos_psi(*shape) - 1j * kinematics.sin_psi(*shape)
         turn = 0.0 * alpha + (self.angle - (bank - self.master.bank))

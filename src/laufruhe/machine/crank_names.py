@@ -30,6 +30,5 @@ def name_of_crank(throws: Sequence[float]) -> str:
 
 
 def _turned(throws: Sequence[float], other: Sequence[float]) -> bool:
-    """Whether one crank is the other, turned."""
     ahead = throws[0] - other[0]
     return all(abs(math.remainder(a - b - ahead, math.tau)) < _SAME for a, b in zip(throws, other, strict=True))

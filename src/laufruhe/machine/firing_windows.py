@@ -183,7 +183,6 @@ class FiringBounds:
 
     @cached_property
     def _own_of(self) -> list[int]:
-        """The own angle of every cylinder."""
         return [self._named.index((pin, self.share(k))) for k, pin in enumerate(self.layout.pins)]
 
     @cached_property

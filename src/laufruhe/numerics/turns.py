@@ -184,7 +184,6 @@ def _both_parts(count: int) -> NDArray[np.float64]:
 
 
 def _rounding(count: int) -> float:
-    """Of a sum of so many terms, over the size of them all."""
     return (count + 2) * _EPS
 
 

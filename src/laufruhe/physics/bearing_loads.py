@@ -99,7 +99,6 @@ def _carried(parts: Sequence[SliderCrank]) -> Array | None:
 
 
 def _of_parts(of: OfPart, engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """The load of every slider-crank side by side."""
     _check_even(fidelity)
     return _side_by_side(of, engine.cycle, engine.slider_cranks, point.speed, fidelity.gas_of(point), fidelity)
 

@@ -117,7 +117,6 @@ def _turning(block: Block) -> Array:
 
 
 def _along(block: Block) -> Array:
-    """The same of length one in coordinates in which the mass is one."""
     found = np.linalg.cholesky(block.mass_matrix).T @ _turning(block)
     return np.asarray(found / np.linalg.norm(found))
 

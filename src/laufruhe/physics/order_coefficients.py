@@ -97,7 +97,6 @@ def cos_psi_power_orders(power: float, rod_ratio: float, offset_ratio: float, hi
 
 
 def _fixed(found: ComplexArray) -> ComplexArray:
-    """What is kept, and nobody may change."""
     found.setflags(write=False)
     return found
 

@@ -136,7 +136,6 @@ def _shot(run: Callable[[Array], Array], count: int, size: float, tolerance: flo
 
 
 def _static_size(model: TimeModel, loads: NDArray[np.complex128]) -> float:
-    """A size of the motion that is not zero."""
     stiffness = float(np.linalg.norm(model.stiffness)) or 1.0
     return float(np.abs(loads).max(initial=0.0)) / stiffness or 1e-9
 

@@ -101,13 +101,11 @@ _loads = lru_cache(maxsize=8)(run_loads)
 
 @lru_cache(maxsize=8)
 def _wrenches(sweep: Sweep, engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Array:
-    """Of an engine without block and mounts."""
     parts = [part for part in _loads(engine, point, fidelity) if part is not None]
     return sweep.wrenches([(part.orders, part.coefficients) for part in parts])
 
 
 def _envelope(response: Response, first: float, last: float) -> RunUp:
-    """The most within every stretch, its ends included."""
     signals = (response.force, response.travel, response.twist)
     edges = np.arange(0, len(response.twist), (len(response.twist) - 1) // STRETCHES)
     sizes = [np.linalg.norm(signal, axis=-1).max(axis=-1) for signal in signals]

@@ -102,7 +102,6 @@ def _turning_loads(known: _Turning, rotors: tuple[Rotor, ...], speed: float, cyc
 
 @lru_cache(maxsize=256)
 def _indices(cycle: Cycle, ratios: tuple[float, ...]) -> tuple[int, ...]:
-    """Of the orders of some shafts among those of a cycle."""
     return tuple(order_index(cycle, abs(ratio)) for ratio in ratios)
 
 

@@ -122,7 +122,6 @@ def _grown(space: StarSpace, first: Partial) -> Iterator[Stars]:
 
 
 def _next(space: StarSpace, partial: Partial) -> Partial:
-    """One more throw placed, images left out."""
     child = _children(partial)
     return _kept(child, _first_of_images(space, child))
 

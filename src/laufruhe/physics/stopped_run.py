@@ -114,7 +114,6 @@ def _side_by_side(runs: Sequence[LinearRun], step: float) -> _Side:
 
 
 def _stiffness(model: TimeModel) -> Array:
-    """Of the stops that can be met."""
     return np.where(np.isfinite(model.gaps), model.stops, 0.0)
 
 
@@ -147,7 +146,6 @@ def _touches(side: _Side, free: ComplexArray) -> bool:
 
 
 def _free(driven: ComplexArray, z: ComplexArray, decays: ComplexArray, powers: ComplexArray) -> ComplexArray:
-    """A block of steps without stops, from modes z on."""
     out, reach = np.array(driven), 1
     while reach < out.shape[-1]:
         out[..., reach:] += (decays**reach)[..., None] * out[..., :-reach]

@@ -107,7 +107,6 @@ def _places(axes: Axes, errors: Array, times: Array) -> Array:
 
 
 def _colour_bar(drawn: Page, dots: PathCollection) -> None:
-    """The scale of regret above the panel."""
     place, high = drawn.panels[0].get_position(), drawn.figure.get_size_inches()[1]
     above = drawn.figure.add_axes((place.x0 + 0.3 * place.width, place.y1 + 0.3 / high, 0.7 * place.width, 0.1 / high))
     bar = drawn.figure.colorbar(dots, cax=above, orientation="horizontal", format=_PLAIN)

@@ -111,13 +111,11 @@ class Numbers:
         return given.moved(self.of_kind(Kind.FLYWHEEL, dict(enumerate(given.numbers))).values())
 
     def _turned(self, rotor: Rotor) -> Rotor:
-        """With its unbalance and place."""
         unbalance, place = self.unbalances[rotor.name], tuple(self.places[rotor.name])
         moved = rotor if unbalance == rotor.unbalance else replace(rotor, unbalance=unbalance)
         return moved if place == rotor.place else moved.placed(*place)
 
     def _loaded(self, part: SliderCrank) -> SliderCrank:
-        """With its masses changed."""
         changes = ((key, change) for (kind, key), change in self.changes.items() if kind is Kind.PISTON)
         own = {mass: change for (name, mass), change in changes if name == part.name}
         # a sum of changes may leave a bound of zero by a rounding; what a rod lacks of inertia may be less than nothing

@@ -324,7 +324,6 @@ def selected(measure: Measure, signal: Spectrum, engine: Engine) -> Spectrum:
 
 
 def _roles(measure: Measure) -> tuple[Role, ...]:
-    """Of the rotors whose masses it adds up."""
     if not isinstance(measure.channel, MassChannel):
         raise TypeError(f"{measure.name} is no mass")
     return measure.channel.roles

@@ -50,7 +50,6 @@ def nothing_of(problem: Problem, engine: Engine | None = None) -> float:
 
 
 def _of_all_orders(measure: Measure) -> Measure:
-    """What is measured of some orders, of all."""
     return measure if not measure.is_load else measure.of_all_orders
 
 
@@ -68,7 +67,6 @@ def _parts(engine: Engine) -> Iterator[Engine]:
 
 
 def _alone(problem: Problem, part: Engine) -> float:
-    """The loads that are minimised, of one part."""
     try:
         found = evaluate(problem, part, min(problem.fidelity.samples, SAMPLES))
         return sum(term.weight * found.value(term.measure) for term in problem.load_terms if not term.measure.is_mass)

@@ -321,6 +321,5 @@ def bounded_stars(phasing: PhasingOf[Any], layout: Layout) -> list[tuple[float, 
 
 
 def _nearest(angle: float, low: float, high: float) -> float:
-    """The angle within bounds that is nearest on the circle."""
     turned = angle + math.tau * round((0.5 * (low + high) - angle) / math.tau)
     return min(max(turned, low), high)

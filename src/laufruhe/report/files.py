@@ -127,7 +127,6 @@ def staged(wanted: Set) -> Iterator[Path]:
 
 @contextmanager
 def _reporting(wanted: Set) -> Iterator[None]:
-    """What stands in the way before any work is done is a complaint."""
     try:
         yield
     except OSError as error:

@@ -21,7 +21,6 @@ from laufruhe.solvers.values import DecisionValue, LimitValue, ObjectiveValue
 
 
 def _numbers(entry: Any) -> Any:
-    """Where JSON has null there is no number."""
     if not isinstance(entry, dict):
         return entry
     # the price as an edge is tightened is told again where it is the same

@@ -62,7 +62,6 @@ def _number(cell: str) -> str | float:
 
 
 def _values(found: Sequence[DecisionValue | LimitValue]) -> Sheet:
-    """All fields of some values."""
     return Sheet([field.name for one in found[:1] for field in fields(one)], [list(astuple(one)) for one in found])
 
 

@@ -202,7 +202,6 @@ def _cost(trades: Sequence[Trade], name: str, what: str) -> str:
 
 
 def _middle(shares: Sequence[float]) -> str:
-    """Of a few problems the middle says nothing."""
     count = len(shares)
     return f", {_percent(shares[count // 2])} in the middle of {count} problems" if count > 2 else ""
 

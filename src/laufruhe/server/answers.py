@@ -121,7 +121,6 @@ def begin(source: Source) -> dict[str, Any]:
 
 
 def _opens(source: Source) -> bool:
-    """Whether the crank may be left open."""
     try:
         load_tables(Edit("open crank", CRANK, 1)(source.tables), source.path)
     except LaufruheError:

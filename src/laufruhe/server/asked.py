@@ -131,7 +131,6 @@ def _open_crank(tables: Tables, _: str, __: Any) -> dict[str, Any]:
 
 
 def _first(tables: Tables, _: str, value: Any) -> dict[str, Any]:
-    """One of several objectives before the others."""
     ranks = tables.get("objective")
     if not isinstance(ranks, list) or not isinstance(value, int) or not 0 <= value < len(ranks):
         raise _strange("objective", "is none of this problem's")

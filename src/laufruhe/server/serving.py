@@ -106,7 +106,6 @@ class Page:
         return {"version": self.watched.version, "complaint": self.watched.complaint}
 
     def _asked(self, desk: Desk, seconds: float, work: Callable[..., str], *more: Any) -> Callable[[Any], Answer]:
-        """How requests of one kind are answered."""
         return _read(lambda asked: _worked(partial(desk.ask, seconds, work, self.watched.source, asked, *more)))
 
     def _lines(self, desk: Desk, most: int, work: Callable[..., str], asked: Asked, *more: Any) -> Answer:

@@ -77,7 +77,6 @@ def _found(stage: Problem, limits: tuple[Limit, ...], held: list[Limit], solve: 
 
 
 def _least_room(measure: Measure) -> float:
-    """Of a mean or a peak samples know no more digits."""
     return SAMPLED if measure.is_load and not measure.norm.is_euclidean else CLOSE
 
 

@@ -90,7 +90,6 @@ def _is_like(problem: Problem, known: Result) -> bool:
 
 
 def _best(problem: Problem, engines: Sequence[Engine | None]) -> Engine | None:
-    """Of several, where there are any."""
     designs = [given_design(problem, evaluate(problem, engine)) for engine in engines if engine is not None]
     best = min((design for design in designs if design is not None), key=lambda design: design.rank, default=None)
     return None if best is None else best.evaluation.engine
@@ -114,7 +113,6 @@ def _of_stars(problem: Problem, known: Result) -> Engine | None:
 
 
 def _coarse(fidelity: Fidelity) -> Fidelity:
-    """The same physics at steps that are enough to tell stars apart."""
     return replace(fidelity, samples=min(fidelity.samples, STEPS), gas_samples=fidelity.gas_steps)
 
 

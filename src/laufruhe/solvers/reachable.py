@@ -154,7 +154,6 @@ def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], found: Resu
 
 
 def _in_time(answer: _Answer) -> _Answer:
-    """With whether it was ended before its own end."""
     told = answer.told
     return replace(answer, told=replace(told, ended=passed() and not told.why and told.proof is not Proof.GLOBAL))
 
@@ -233,7 +232,6 @@ def _at_edges(
 
 
 def _extreme(result: Result, limit: Limit, high: bool) -> float:
-    """The largest or least of the numbers that are limited."""
     values = result.final.values(limit.measure)
     return (max if high else min)(values, default=limit.maximum if high else limit.minimum)
 

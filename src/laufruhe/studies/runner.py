@@ -79,7 +79,6 @@ def run(
 
 @contextmanager
 def _making_room() -> Iterator[None]:
-    """A full disk costs what is at hand, and says so."""
     try:
         yield
     except OSError as error:

@@ -117,7 +117,6 @@ class _Engine(NamedTuple):
 
 
 def _engines(data: xr.Dataset) -> dict[str, _Engine]:
-    """All of them, by their names."""
     names = ("build", "standing", "shafts", "optimum", "optimum_bound")
     rows = zip(*(data[name].values.tolist() for name in names), strict=True)
     return {row[0]: _Engine(*row) for row in rows}

@@ -71,7 +71,6 @@ def _rows(panel: Panel, wide: float) -> list[Panel]:
 
 
 def _within(mark: Mark, row: range) -> Iterator[Mark]:
-    """What of a mark stands over these groups."""
     if isinstance(mark, Words):
         yield from [mark] if row[0] - 0.5 < mark.x < row[-1] + 0.5 else []
     elif isinstance(mark, Bars):

@@ -123,7 +123,6 @@ def _by_order(part: slice, result: Result, table: AskedTable) -> Labelled:
 
 
 def _turning(part: slice, result: Result, table: AskedTable) -> Labelled:
-    """What of a free load turns with the crank and against it."""
     orders = table.orders or ORDERS
     values = [list(turning_parts(*result.final.loads[0].wrench.at(order)[part][-2:])) for order in orders]
     return Labelled(values, {"order": list(orders), "turns": ["with the crank", "against the crank"]})

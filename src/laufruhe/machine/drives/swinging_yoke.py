@@ -22,7 +22,6 @@ class Yoke(Mechanism):
     own: Mapping[str, float]
 
     def _made_of(self, plain: SliderCrank, number: int) -> SliderCrank:  # noqa: ARG002
-        """One ram and its lever."""
         return SwingingYoke(**numbers_of(plain) | dict(self.own))
 
 

@@ -165,7 +165,6 @@ def _check_order(order: Sequence[int] | None, firsts: Sequence[SliderCrank]) -> 
 def _piston(
     triangle: Triangle, corner: int, bank: int, x: float, throw: float, asked: Asked, number: int
 ) -> SliderCrank:
-    """One piston, its row turned by the throw of the lower crank."""
     shaft = triangle.shafts[corner]
     centre = within(triangle.centre(corner, bank) - as_turn(throw), 1)
     axis = triangle.axis(corner, bank)

@@ -32,7 +32,6 @@ class RotorMechanism(Mechanism):
     rotor_inertia: float
 
     def _made_of(self, plain: SliderCrank, number: int) -> SliderCrank:
-        """One rotor."""
         own = {key: getattr(self, key) for key in ("rotor_radius", "rotor_width", "rotor_inertia")}
         return RotaryUnit(**numbers_of(plain) | own | {"name": f"rotor {number}"})
 

@@ -108,7 +108,6 @@ class WorstMean(Norm):
         return np.asarray((_shares(grid) * lengths(rows)).reshape(grid.points, _size(grid)).sum(axis=1))
 
     def _prices(self, grid: Grid, z: Array) -> Array:
-        """Of every operating point the dual norm of a mean of its own."""
         blocks = zip(
             _shares(grid).reshape(grid.points, _size(grid)),
             z.reshape(grid.points, _size(grid), z.shape[-1]),

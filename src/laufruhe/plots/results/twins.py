@@ -53,7 +53,6 @@ def figure(result: Result) -> Figure:
 
 
 def _crank(engine: Engine) -> str:
-    """The name that the crank of a parallel twin has."""
     parts = engine.slider_cranks
     name = name_of_crank([part.throw for part in parts]) if len({part.bank for part in parts}) == 1 else ""
     return f"; crank {name}" if name else ""
@@ -65,7 +64,6 @@ def _sizes(parts: Parts, kind: str) -> float:
 
 
 def _seen(parts: Parts, most: float) -> Parts:
-    """What cannot be seen beside the largest is nothing."""
     return {
         key: (ahead * (abs(ahead) > UNSEEN * most), back * (abs(back) > UNSEEN * most))
         for key, (ahead, back) in parts.items()

@@ -34,7 +34,6 @@ def _names_of_cylinders(engine: Engine) -> Sequence[str]:
 
 
 def _names_of_sides(engine: Engine) -> Sequence[str]:
-    """Of what stands before the pin of every cylinder, and behind."""
     return [f"{part.name} {side}" for part in engine.slider_cranks for side in ("front", "rear")]
 
 

@@ -99,7 +99,6 @@ def _earlier(signal: Spectrum, lead: float) -> Spectrum:
 
 
 def _most(torque: Spectrum) -> float:
-    """No less than the torque about its mean at any angle."""
     own = torque.holding(np.concatenate([[0.0], torque.coefficients[1:]]))
     steps = max(8 * len(own.coefficients), 64)
     values = np.concatenate([own.sample(steps), own.values(own.bends)])

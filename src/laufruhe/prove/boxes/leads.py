@@ -161,7 +161,6 @@ class LeadBoxes:
 
     @staticmethod
     def _size(program: AffineProblem, multipliers: Multipliers) -> float:
-        """What limits that exclude a box are a difference of."""
         prices = replace(multipliers, terms=()).shadow_prices(program)
         sizes = [most + norm.value(np.zeros(program.size)) for most, norm in program.limits]
         return sum(price * size for price, size in zip(prices, sizes, strict=True))

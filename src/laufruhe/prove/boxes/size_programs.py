@@ -106,7 +106,6 @@ class SizePrograms:
         return rows
 
     def _engine(self, number: Number, lower: Array, upper: Array) -> Engine:
-        """Whose factors a measure has where these are least."""
         own = np.any(number.ways)
         return self._model.engine(corner(number.ways, lower, upper)) if own else self._model.problem.engine
 

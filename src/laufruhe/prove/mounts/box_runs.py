@@ -169,7 +169,6 @@ class _Look:
         return np.asarray(start + np.where(places <= run.sweep.count, sizes, 0.0).argmax(axis=0))
 
     def _rows(self, position: Array, rate: Array) -> Array:
-        """From (y, y') as it is counted."""
         return np.concatenate([position / self._of.scale, rate], axis=-1)
 
     def _places(self, rows: Array) -> Array:
@@ -177,7 +176,6 @@ class _Look:
         return rows.reshape(*rows.shape[:-2], -1, self._d, rows.shape[-1])
 
     def _lengths(self, z: Array) -> Array:
-        """At the middles, (boxes, places, times) of (boxes, 2 n, times)."""
         seen = self._rows(self._maps.position, self._maps.rate) @ z
         return np.asarray(np.linalg.norm(self._places(seen), axis=-2))
 

@@ -208,7 +208,6 @@ class DesignBoxes:
         return near, *self._told(pairing, self._met(_Even.of(loop, len(lower)), near), near)
 
     def _met(self, even: _Even, near: Array) -> _Met:
-        """What loads of unbalances about these meet."""
         orders = self.loads.orders
         still = orders.loads[:, :1] + np.einsum("q,wqi->wi", near, orders.loads[:, 1:])[:, None]
         return _Met(even, np.concatenate([still, orders.loads[:, 1:]], axis=1))
@@ -303,7 +302,6 @@ class _Met:
 
 
 def _next(places: Sequence[Array], known: Sequence[Corner | None], k: int) -> Corner:
-    """What is known of the corner that shares most sides with one."""
     shared = [(int(np.sum(place == places[k])), -n) for n, place in enumerate(places) if known[n] is not None]
     found = known[-max(shared)[1]]
     assert found is not None

@@ -104,7 +104,6 @@ class RunMatrices:
         return np.asarray(self._model.at(name, self._model.lower[None])[0])
 
     def _padded(self, rows: Array) -> Array:
-        """With columns of the fluid, which feels none of it."""
         return np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, self.size - 6)])
 
     def _square(self, name: str) -> Linear:

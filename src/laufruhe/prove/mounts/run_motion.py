@@ -111,7 +111,6 @@ def _under(forces: Array) -> Array:
 
 
 def _root(matrices: Array) -> Array:
-    """Of matrices (boxes, 6, 6)."""
     squares, modes = np.linalg.eigh(matrices)
     return np.asarray((modes * np.sqrt(np.maximum(squares, 0.0))[:, None]) @ np.swapaxes(modes, 1, 2))
 

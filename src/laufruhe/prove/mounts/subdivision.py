@@ -134,7 +134,6 @@ class StiffnessBoxes:
 
     @property
     def _cost(self) -> int:
-        """Of one box, in numbers."""
         mounts = len(self.problem.engine.mounts)
         lines = sum(len(lines.omegas) for _, _, lines, _ in (*self._terms, *self._limits))
         ratios = [term.measure for term in self.problem.mount_terms]

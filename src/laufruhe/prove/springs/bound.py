@@ -275,7 +275,6 @@ def _of_shapes(shapes: Shapes, found: Priced, aim: Array) -> float:
 
 
 def _left(shapes: Shapes, found: Priced) -> Array:
-    """What conditions of a mode leave of Z, Z_1 ..."""
     left = np.tensordot(found.equal, shapes.equal, 1) - np.tensordot(np.maximum(found.sides, 0.0), shapes.sides, 1)
     for tensor, multiplier in zip(shapes.matrices, found.matrices, strict=True):
         left -= np.einsum("ab,mabxy->mxy", _positive(multiplier), tensor)
@@ -312,7 +311,6 @@ def _shared(program: Program, prices: Array, multipliers: Sequence[Array]) -> li
 
 
 def _positive(matrix: Array) -> Array:
-    """The part of it that is nowhere negative."""
     values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T))
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T)
 

@@ -127,11 +127,9 @@ class SpringBox:
 
     @property
     def _is_whole(self) -> bool:
-        """Whether it is all that is divided."""
         return np.array_equal(self.lower, self.search.lower) and np.array_equal(self.upper, self.search.upper)
 
     def _shown(self, heads: Sequence[Head], roots: Array) -> tuple[float, Array, Array | None]:
-        """What a mean is not under where its roots are not under these."""
         mean, pull = self._mean(heads, roots), np.zeros(len(self.lower))
         if mean.floor >= self.enough:
             return mean.floor, pull, None
@@ -152,7 +150,6 @@ class SpringBox:
         return worth(pull, found, lacking)
 
     def _alone(self, heads: Sequence[Head], known: Array) -> Array:
-        """What every root is at least by itself."""
         units, found = np.array([head.unit for head in heads]), known.copy()
         for k in np.flatnonzero(_matter(units * [head.share for head in heads])).tolist():
             least = self._together([heads[k]], np.ones(1), near=ROUGH)[0]
@@ -183,7 +180,6 @@ class SpringBox:
         return least
 
     def _mean(self, heads: Sequence[Head], least: Array) -> Mean:
-        """A mean as roots of heads, which are not under these."""
         key = tuple(map(id, heads))
         if key not in self._taken:
             self._taken[key] = [self._of_head(head) for head in heads]
@@ -215,7 +211,6 @@ class SpringBox:
         return replace(line, most=min(most, line.largest))
 
     def _line(self, head: Head, order: Order) -> tuple[Line, list[Held]]:
-        """Of an order, and what it has to keep."""
         return self._line_of(order, self.each.at_most(order, head, self.most))
 
     def _line_of(self, order: Order, felt: Felt) -> tuple[Line, list[Held]]:

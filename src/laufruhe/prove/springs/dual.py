@@ -163,7 +163,6 @@ def solver_for(
 
 
 def _factor(cost: Array) -> float:
-    """With which its largest entry is about one."""
     size = float(np.abs(cost).max(initial=0.0))
     return float(np.clip(1.0 / size, _LEAST, _MOST)) if size > 0.0 else 1.0
 

@@ -72,7 +72,6 @@ def _others(mounts: OpenMounts, mirror: Array) -> list[int] | None:
 
 
 def _is_closed(place: Place, others: list[int]) -> bool:
-    """Whether all that moves with a place moves so in the mirror too."""
     side = float((ACROSS @ place.axis) @ place.axis)
     reaches = dict(place.mounts)
     return all(abs(reaches.get(others[m], 0.0) - side * h) <= SAME * abs(h) for m, h in place.mounts)
@@ -112,7 +111,6 @@ def _part(mounts: OpenMounts, others: list[int], basis: Array) -> OpenMounts:
 
 
 def _seen(place: Place, number: dict[int, int], times: Array, root: Array) -> Place:
-    """A place with the turns alone that this part has."""
     turns = np.linalg.norm(place.aside @ root.T[3:], axis=1)
     some = turns > SAME * float(np.linalg.norm(root[:, 3:]))
     own = tuple((number[m], float(h * times[number[m]])) for m, h in place.mounts if m in number)
@@ -120,7 +118,6 @@ def _seen(place: Place, number: dict[int, int], times: Array, root: Array) -> Pl
 
 
 def _moves(spring: Spring, motions: Array, places: Sequence[Place]) -> bool:
-    """Whether anything of this part moves a spring along its axes."""
     size, motion = float(np.abs(motions).max()), motions[spring.mount]
     moved = [h * place.arms for place in places for m, h in place.mounts if m == spring.mount]
     return any(np.abs(each @ spring.axes).max(initial=0.0) > SAME * size for each in (motion.T, *moved))

@@ -125,7 +125,6 @@ class Stated:
         self.cones.append((cone, name))
 
     def _whole(self) -> None:
-        """The first entry of every moment matrix is one."""
         count = len(self.program.sizes)
         self._add(np.eye(count), np.asarray(self.ends[:-1]), ZERO, right=np.ones(count))
 
@@ -327,11 +326,9 @@ def _numbers(parts: Sequence[Array]) -> Array:
 
 
 def _entries(size: int) -> int:
-    """Of a triangle."""
     return size * (size + 1) // 2
 
 
 def _diagonal(size: int) -> Array:
-    """One where an entry of a triangle is on the diagonal."""
     i, j, _ = triangle(size)
     return np.where(i == j, 1.0, 0.0)

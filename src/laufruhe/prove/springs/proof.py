@@ -161,7 +161,6 @@ def _under(boxes: SpringBoxes, share: float, room: float, known: Known | None) -
 
 
 def _level(boxes: SpringBoxes, share: float, room: float) -> float:
-    """So much less than the best."""
     return boxes.value - max(share * boxes.value, NEARLY * room)
 
 

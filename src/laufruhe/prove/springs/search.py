@@ -237,7 +237,6 @@ class SpringBoxes:
         return found
 
     def _needed(self, head: Head, value: float) -> tuple[Order, ...]:
-        """Those without which a tenth of what is to be shown is not lost."""
         size = np.array([float(np.sum(np.abs(order.felt) ** 2)) for order in head.orders])
         left = 1.0 - np.cumsum(size) / max(float(size.sum()), 1e-300)
         enough = left <= NEEDED * (1.0 - value / self.value)

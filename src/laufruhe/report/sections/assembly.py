@@ -29,7 +29,6 @@ def _row(place: Place) -> tuple[str, ...]:
 
 
 def _beside(found: AssemblyResult, unit: str) -> str:
-    """What other assemblies have."""
     middle, most = (figure(found.quantiles[int(share * (len(found.quantiles) - 1))], unit) for share in (0.5, 0.95))
     told = f"Of {found.assemblies:,.0f} assemblies; {found.random} of them at random"
     worst, mean = figure(found.worst, unit), figure(found.mean_parts, unit)

@@ -22,7 +22,6 @@ def tables(result: Result) -> list[Grid]:
 
 
 def _free(result: Result) -> str:
-    """What of the optimum is not unique."""
     if not result.free:
         return ""
     ends = (f"{d.name} from {with_unit(d.low, d.unit)} to {with_unit(d.high, d.unit)}" for d in result.free)

@@ -39,7 +39,6 @@ def _modes(facts: MountingFacts, title: str) -> Grid:
 
 
 def _of_fluid(facts: MountingFacts) -> str:
-    """What modes mean where stiffness depends on frequency."""
     if not facts.depends_on_frequency:
         return ""
     together = ", ".join(number(frequency) for frequency in facts.with_fluid)

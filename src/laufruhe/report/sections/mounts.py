@@ -40,7 +40,6 @@ def _table(result: Result, places: Places) -> Grid:
 
 
 def _cells(each: list[CycleMeasures], scale: float) -> list[str]:
-    """Of one design, or of two beside each other."""
     a, b = each[0], each[-1]
     if len(each) == 1:
         return [number(value, scale=scale) for value in (b.mean, b.max, b.rms)]

@@ -46,6 +46,5 @@ def _tolerance(tolerance: PricedTolerance, unit: str) -> tuple[str, ...]:
 
 
 def _checked(found: RobustResult) -> str:
-    """What a second sample says of the objective."""
     told = f"Checked: of {found.engines:,} other engines {found.exceeding} exceed the objective"
     return f"{told}, so at most {100.0 * found.exceeding_at_most:.2g} % of all do ({100.0 * CONFIDENCE:g} % sure)."

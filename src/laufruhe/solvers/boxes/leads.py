@@ -154,7 +154,6 @@ class _Search(HeldDesigns[_Box]):
                 raise ModelError(f"{decision.name} {why}")
 
     def _numbers(self, leads: Array) -> Array:
-        """Of everything asked."""
         program, _ = self.model.at(leads, self.samples)
         norms = [norm.value(np.zeros(0)) for _, norm in (*program.terms, *program.limits)]
         return np.array([*norms, *self.boxes.numbers(leads)])

@@ -232,14 +232,12 @@ def _corner_name(decision: Decision, corner: int) -> str:
 
 
 def _least(own: Set) -> Value:
-    """The value of a decision that is nearest to nothing."""
     if isinstance(own, Interval):
         return min(max(own.lower, 0.0), own.upper) * own.directions[0]
     return 0.0j
 
 
 def _from_zero(own: Set) -> Set:
-    """What may be added to the least value, and any share of it."""
     if isinstance(own, Interval):
         least = min(max(own.lower, 0.0), own.upper)
         return replace(own, lower=min(own.lower - least, 0.0), upper=max(own.upper - least, 0.0))
@@ -247,14 +245,12 @@ def _from_zero(own: Set) -> Set:
 
 
 def _together(decision: Decision, drive: RotorDrive, parts: Sequence[Rotor]) -> Limit:
-    """All corners together are no larger than the unbalance may be."""
     radius = parts[0].radius or 1.0
     most = _from_zero(decision.set).scale * abs(drive.gain) / radius
     return Limit(decision.name, Measure(ADDED_MASS, rotors=tuple(part.name for part in parts)), most)
 
 
 def _renamed(measure: Measure, names: dict[str, list[str]]) -> Measure:
-    """A measure of named rotors, of all that stand for them."""
     if measure.rotors is None:
         return measure
     return replace(measure, rotors=tuple(part for name in measure.rotors for part in names.get(name, [name])))

@@ -127,7 +127,6 @@ class _Search(HeldDesigns[_Box]):
             yield half, None if isinstance(half, Over) or half.bound >= value else self.at(half.middle)
 
     def _halves(self, box: _Box) -> Iterator[_Box | Over]:
-        """A box cut where what was left out pulls most."""
         width, whole = box.upper - box.lower, self.bounds[1] - self.bounds[0]
         pulled = box.spread if box.spread.max(initial=0.0) > 1e-9 * whole.max() else width / whole
         side = int(np.argmax(pulled))
@@ -166,7 +165,6 @@ class _Search(HeldDesigns[_Box]):
         return few.box(*thin(self.place(found), *self.bounds))
 
     def _solve(self, relaxed: Problem) -> Result:
-        """The best unbalances at the corners of a box."""
         result = solve_unbalances(relaxed, angles=self.angles)
         # what all places needed, their parts need too
         self.angles = self.angles or result.final.samples // 2
@@ -291,5 +289,4 @@ class _Others(_Search):
         return self.box(*thin(self.place(found), *self.bounds))
 
     def _solve(self, relaxed: Problem) -> Result:
-        """What is decided of the corners of a box."""
         return self._prove(relaxed)

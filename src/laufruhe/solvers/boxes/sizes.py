@@ -160,7 +160,6 @@ def _boxes(model: SizeModel) -> SizeBoxes | None:
 
 
 def _reach(boxes: SizeBoxes | None) -> Reach:
-    """What such boxes can prove."""
     if boxes is None:
         return Reach.ASIDE
     return Reach.WHOLE if boxes.is_whole else Reach.NEAR

@@ -171,7 +171,6 @@ def solve_quadratic(
 
 
 def _rank(problem: AffineProblem, x: Array | None) -> tuple[float, float]:
-    """By what breaks limits least, then by what is least."""
     if x is None:
         return np.inf, np.inf
     excess = problem.excess(x)

@@ -84,7 +84,6 @@ def _times(problem: AffineProblem) -> list[int]:
 
 
 def _none(problem: AffineProblem) -> Multipliers:
-    """That say nothing."""
     terms, limits = (
         tuple(np.zeros_like(norm.constant) for _, norm in each) for each in (problem.terms, problem.limits)
     )

@@ -130,7 +130,6 @@ def _mounts(design: Design) -> list[float]:
 
 
 def _share(design: Design) -> tuple[Problem, Sequence[float]]:
-    """What `_balance` needs of a design."""
     return design.problem, _mounts(design)
 
 

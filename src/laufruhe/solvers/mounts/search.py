@@ -204,7 +204,6 @@ class MountSearch:
         self._take(optima)
 
     def _program(self, margin: float = 0.0) -> SmoothProgram:
-        """Of the limits that may be felt, tightened by a share."""
         limits = tuple(limit for limit in self.problem.limits if limit not in self._left_out)
         asked = self.problem if not self._left_out else replace(self.problem, limits=limits)
         return SmoothProgram(asked, self._size, margin, self.moves, coarser=self._coarser)
@@ -316,7 +315,6 @@ class MountSearch:
 
 
 def _is_other(found: Found, other: Found) -> bool:
-    """Whether two ends are worth different amounts."""
     return abs(found.design.value - other.design.value) > 1e-3 * abs(other.design.value)
 
 

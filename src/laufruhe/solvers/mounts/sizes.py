@@ -117,5 +117,4 @@ def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> 
 
 
 def _sized(measure: Measure) -> bool:
-    """Whether factors of sizes are in it."""
     return measure.is_load and measure.load.of_sizes is not None

@@ -210,7 +210,6 @@ def _bounded(found: list[StarDesign], phasing: Phasing, designs: int) -> list[St
 
 
 def _bounded_one(piece: tuple[int, Result], value: float, enough: float) -> tuple[int, Result]:
-    """Of a star, and which it is."""
     number, result = piece
     return number, bounded_under(result, value, enough)
 
@@ -282,7 +281,6 @@ def _bound(found: list[StarDesign]) -> float:
 def _certificate(
     best: StarDesign, bound: float, doubt: float, method: str, nothing: float, tolerance: float
 ) -> Certificate | None:  # fmt: skip
-    """By a bound of all stars."""
     own = best.result.certificate
     if own is None:
         return None

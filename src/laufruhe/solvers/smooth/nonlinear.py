@@ -235,7 +235,6 @@ class _AtHand:
         return sorted(found, key=lambda o: o.start)
 
     def _shares(self, share: Share) -> list[tuple[Hashable, Share]]:
-        """With what they are known by."""
         task, points = share
         shares = [points[k :: self._count] for k in range(min(self._count, len(points)))]
         return [((task.stages, tuple(number for number, _ in own)), (task, own)) for own in shares]

@@ -135,7 +135,6 @@ def _acting(affine: AffineProblem, idle: Sequence[bool]) -> AffineProblem:
 
 
 def _with_idle(multipliers: Multipliers, rows_of: StarProblem, idle: Sequence[bool]) -> Multipliers:
-    """No price on the limits that were left out."""
     rows = iter(multipliers.limits)
     limits = tuple(
         np.zeros_like(norm.constant) if out else next(rows) for (_, norm), out in zip(rows_of.limits, idle, strict=True)

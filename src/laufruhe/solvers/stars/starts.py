@@ -148,5 +148,4 @@ def _blocks(phases: int, rng: np.random.Generator) -> Indices:
 
 
 def _primes(number: int) -> list[int]:
-    """Those that divide it."""
     return [k for k in range(2, number + 1) if number % k == 0 and all(k % low for low in range(2, k))]

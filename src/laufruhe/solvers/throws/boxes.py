@@ -269,7 +269,6 @@ class ThrowPrograms:
         return True
 
     def _is_known(self, program: Program, columns: BoxColumns, arcs_of: ArcBox, cut: float) -> bool:
-        """Whether multipliers of another box do for this one."""
         for found in self._proofs:
             value, _ = self._under(program.rows, columns, found, arcs_of)
             if value - self.left_out >= cut or self._is_excluded(program, columns, found, arcs_of):
@@ -278,7 +277,6 @@ class ThrowPrograms:
         return False
 
     def _remember(self, found: Multipliers) -> None:
-        """The last few that proved something, the last one first."""
         self._proofs = [found, *(other for other in self._proofs if other is not found)][:_KNOWN]
 
 

@@ -232,7 +232,6 @@ def _base(own: Set) -> Value:
 
 
 def _from_base(own: Set) -> Set:
-    """What is added to the base."""
     if not isinstance(own, Interval):
         return own
     turn = math.pi if own.upper <= 0.0 else 0.0

@@ -196,7 +196,6 @@ class ThrowSearch(Search[_Part, _Best]):
 
     @property
     def _is_one_angle(self) -> bool:
-        """Whether all that is open is one angle of a crank with one throw."""
         phasing = self._phasing
         throws = phasing.layout(*phasing.least_geometry).throw_positions
         return sum(phasing.opened) == 1 and len(throws) == 1 and phasing.throw_bounds is None

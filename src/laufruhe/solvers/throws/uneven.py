@@ -122,7 +122,6 @@ def _near(phasing: Phasing, candidate: Candidate, moving: bool) -> StarDesign | 
 
 
 def _narrowed(phasing: Phasing, share: float) -> Intervals:
-    """A share of the unevenness that is allowed."""
     even, allowed = phasing.even_interval, phasing.intervals
     return Intervals(even - share * (even - allowed.least), even + share * (allowed.most - even))
 
@@ -242,7 +241,6 @@ def _evaluated(phasing: Phasing, candidate: Candidate, residual: float, moved: b
 
 
 def _is_kept(design: StarDesign) -> bool:
-    """Whether it breaks no limit."""
     return math.isfinite(design.value) and design.result.final.excess(design.result.problem.limits) <= FEASIBLE
 
 

@@ -161,7 +161,6 @@ def _taken(
 
 
 def _limited(own: LimitValue, worst: float, price: float, tolerance: float) -> LimitValue:
-    """A limit as the worst engine stands to it."""
     active = worst >= own.limit * (1.0 - tolerance)
     return replace(own, value=worst, active=active, shadow_price=price if active else 0.0)
 

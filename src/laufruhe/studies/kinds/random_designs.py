@@ -88,7 +88,6 @@ class RandomDesigns(Sampled):
         return data.assign_coords(proof=("case", [one["proof"] for one in best]))
 
     def _prepared(self, point: Point, scenes: Scenes) -> tuple[Problem, Designs, list[str]]:
-        """What all pieces of a case share, once a process."""
         mark = scenes.fingerprint(Point(point.case), self.settings())
         if mark not in _PREPARED:
             _PREPARED.clear()

@@ -268,7 +268,6 @@ def _one(case: str, design: str, own: Mapping[str, Any], record: Mapping[str, An
 
 
 def _readable(data: xr.Dataset) -> xr.Dataset:
-    """The dataset in the units that a reader expects."""
     units, factors = zip(*(readable(str(unit)) for unit in data["measure_unit"].values), strict=True)
     found = data.assign(value=data["value"] * np.array(factors), limit=data["limit"] * np.array(factors))
     if "amplitude" in data:
@@ -277,7 +276,6 @@ def _readable(data: xr.Dataset) -> xr.Dataset:
 
 
 def _designs(data: xr.Dataset) -> Iterator[tuple[str, str, xr.Dataset]]:
-    """The points of every case and design."""
     keys = list(zip(data["case"].values.tolist(), data["design"].values.tolist(), strict=True))
     for case, design in dict.fromkeys(keys):
         yield case, design, data.isel(point=np.flatnonzero([key == (case, design) for key in keys]))
