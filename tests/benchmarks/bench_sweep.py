@@ -26,8 +26,8 @@ from laufruhe import load  # noqa: E402
 from laufruhe.load_models.affine import AffineModel, AffineProblem  # noqa: E402
 from laufruhe.solvers import solve  # noqa: E402
 from laufruhe.solvers.cones.conic import solve_cones  # noqa: E402
-from laufruhe.studies import run  # noqa: E402
 from laufruhe.studies.reader import load_study  # noqa: E402
+from laufruhe.studies.runner import run  # noqa: E402
 
 PROBLEM = ROOT / "problems" / "tractor-four-lanchester-and-moment.toml"
 OUT = PAGES / "sweep.md"
