@@ -169,7 +169,7 @@ def solve_with_places(problem: Problem) -> Result:
 
 
 def _closes_without_places(problem: Problem) -> bool:
-    """Return whether a method with a closing bound decides what is open beside places."""
+    """Tell if a method with a closing bound decides what is open beside places."""
     return Kind.PLACE in kinds_of(problem) and _method(without_places(problem)).reach is Reach.WHOLE
 
 
@@ -377,10 +377,22 @@ def _decided(problem: Problem, reductions: Sequence[Reduction] | None = None) ->
     for k, reduction in enumerate(left):
         if reduction.applies(problem):
             return reduction.solve(problem, _decided, partial(_decided, reductions=left[k + 1 :]))
-    method = _method(problem)
+    return _by_method(problem)
+
+
+def _by_method(problem: Problem) -> Result:
+    """Decide a problem by the first method that suits it, with the bound of another where that closes."""
+    method, kinds = _method(problem), kinds_of(problem)
     # what is decided apart is asked once more, each part by itself
     tell(method.name)
-    return method.decided(problem)
+    conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and kinds <= {_U, _K, _M} else ()
+    if conflict:
+        return none_within(problem, evaluate_start(problem), conflict, {})
+    closing = _closing(problem, kinds, method)
+    if closing is None:
+        return method.decided(problem)
+    other, fewer = closing
+    return solve_relaxed(problem, fewer, other.decided, method.decided)
 
 
 def _fixed_limits(problem: Problem) -> list[Limit]:
@@ -402,7 +414,7 @@ def _without_fixed_limits(problem: Problem, decide: Decide, _: Decide) -> Result
 
 
 def _is_settled(problem: Problem) -> bool:
-    """Return whether nothing open changes what is minimised."""
+    """Tell if nothing open changes what is minimised."""
     kinds = kinds_of(problem)
     if not kinds or not problem.objective or problem.phasing is not None:
         return False
@@ -415,23 +427,6 @@ def _as_given(problem: Problem, _: Decide, rest: Decide) -> Result:
         return rest(problem)
     shown = Shown(design.value, Reach.WHOLE, 0.0, "nothing open changes what is minimised")
     return concluded(design, design.evaluation, shown, {})
-
-
-def _is_of_mounts(problem: Problem) -> bool:
-    return kinds_of(problem) <= {_U, _K, _M} and Kind.MOUNT in _method(problem).decides
-
-
-def _within_mounts(problem: Problem, _: Decide, rest: Decide) -> Result:
-    conflict = beyond_mounts(problem)
-    return none_within(problem, evaluate_start(problem), conflict, {}) if conflict else rest(problem)
-
-
-def _relaxed(problem: Problem, _: Decide, rest: Decide) -> Result:
-    closing = _closing(problem)
-    if closing is None:
-        return rest(problem)
-    other, fewer = closing
-    return solve_relaxed(problem, fewer, other.decided, rest)
 
 
 @dataclass(frozen=True)
@@ -466,17 +461,14 @@ REDUCTIONS: tuple[Reduction, ...] = (
     Reduction("run-ups", lambda p: asks_runs(p) and bool(kinds_of(p)) and Kind.NUMBER not in kinds_of(p),
               lambda p, decide, _: _by("runs:solve_runs", p, kinds_of(p), decide)),
     Reduction("an objective that nothing open moves", _is_settled, _as_given),
-    Reduction("a conflict that no mounts mend", _is_of_mounts, _within_mounts),
-    Reduction("a bound without what a method does not know", lambda p: p.search.proves, _relaxed),
 )  # fmt: skip
-"""What is decided by deciding simpler problems, in the order in which it is looked for."""
+"""Reductions in the order in which they are looked for; methods decide what none of them applies to."""
 
 
-def _closing(problem: Problem) -> tuple[Method, Problem] | None:
+def _closing(problem: Problem, kinds: frozenset[Kind], method: Method) -> tuple[Method, Problem] | None:
     """Return a method whose bound closes on what it knows of what is asked, and the problem of that alone."""
-    if _method(problem).reach is Reach.WHOLE:
+    if method.reach is Reach.WHOLE or not problem.search.proves:
         return None
-    kinds = kinds_of(problem)
     for other in METHODS:
         if other.reach is not Reach.WHOLE or not kinds <= other.decides:
             continue
