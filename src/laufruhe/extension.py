@@ -7,7 +7,7 @@ that they belong to is made, so that each of their modules imports no more than 
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -24,7 +24,7 @@ Tables = Literal["norms", "channels", "layouts", "quantities", "study_kinds"]
 
 @dataclass(frozen=True)
 class Extension:
-    """What a package adds, each object by the name `module:attribute`.
+    """Objects that a package adds to the tables, each by its name `module:attribute`.
 
     Attributes
     ----------
@@ -76,31 +76,34 @@ def _in_house() -> list[tuple[str, str]]:
     return [(one.name, f"laufruhe.extensions.{one.name}:EXTENSION") for one in iter_modules([str(home)])]
 
 
-def additions(table: Tables, kind: Any, known: Container[str]) -> list[Any]:
-    """Return the objects, or classes, of a kind that extensions add to a table.
+def extended(
+    table: Tables, kind: Any, own: Iterable[Any], name_of: Callable[[Any], str] = lambda one: str(one.name)
+) -> dict[str, Any]:
+    """Return a table by names: objects, or classes, of this package, then those that extensions add.
 
     Parameters
     ----------
     kind
         Class of the objects, or base of the classes.
-    known
-        Names that the table has without them.
+    own
+        Those of this package.
+    name_of
+        Return the name of one in the table.
 
     Raises
     ------
     ModelError
         If one cannot be imported, is of another kind, or has the name of another one.
     """
-    found: list[Any] = []
+    found = {name_of(one): one for one in own}
     for extension in extensions():
         for address in getattr(extension, table):
             one = _imported(extension.name, address)
             if not (issubclass(one, kind) if isinstance(one, type) else isinstance(one, kind)):
                 raise ModelError(f"extension '{extension.name}': {address} is no {kind.__name__}; mend it")
-            name = getattr(one, "name", None)
-            if isinstance(name, str) and (name in known or name in [other.name for other in found]):
+            if (name := name_of(one)) in found:
                 raise ModelError(f"extension '{extension.name}': {table} have '{name}' already; give it another name")
-            found.append(one)
+            found[name] = one
     return found
 
 

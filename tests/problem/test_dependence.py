@@ -15,7 +15,9 @@ import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.errors import LaufruheError
+from laufruhe.errors import LaufruheError, ModelError
+from laufruhe.extension import Extension
+from laufruhe.problem import dependence as module
 from laufruhe.problem.channels import CHANNELS, Channel, LoadChannel, NumberChannel
 from laufruhe.problem.decision import Decision, Kind, domains_of
 from laufruhe.problem.dependence import Dependence, dependence
@@ -208,3 +210,28 @@ def test_no_star_moves_what_is_constant() -> None:
                         np.testing.assert_allclose(each, told[0], rtol=1e-9)
                         seen.add(channel.name)
     assert seen
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("mount force   a a a  b m >  >  a a  0 0", "'mount force' is no channel without dependences"),
+        ("no such force   a a a  b m >  >  s s  0 0", "'no such force' is no channel"),
+        ("mount force", "is no line of dependences"),
+        ("own force   a a a", "is no line of dependences"),
+        ("own force   a a a  b m >  >  s s  0 !", "is no line of dependences"),
+    ],
+)
+def test_an_extension_speaks_of_its_own_channels_alone(line: str, said: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Another line about a channel of the package would change what is proven of it."""
+    monkeypatch.setattr(module, "extensions", lambda: [Extension("own", dependences=(line,))])
+    with pytest.raises(ModelError, match=said):
+        module._with_added(module.TABLE)
+
+
+def test_a_line_of_an_extension_is_one_of_the_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = replace(CHANNELS["mount force"], name="own force")
+    monkeypatch.setitem(CHANNELS, own.name, own)  # type: ignore[arg-type]
+    line = "own force   a a a  b m >  >  s s  0 0"
+    monkeypatch.setattr(module, "extensions", lambda: [Extension("own", dependences=(line,))])
+    assert module._with_added(module.TABLE)["own force"] == module.TABLE["mount force"]

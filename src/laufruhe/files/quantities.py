@@ -14,14 +14,14 @@ from typing import Annotated, Any, ClassVar
 from pydantic import Field, create_model
 from pydantic_core import PydanticCustomError
 
-from laufruhe.extension import additions
+from laufruhe.extension import extended
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, key_path
 from laufruhe.files.nested import Place, at, put
 
 
 class Quantity(ABC):
-    """One number that others follow.
+    """A number that several numbers of the file follow.
 
     Attributes
     ----------
@@ -59,10 +59,7 @@ class StrokeOverBore(Quantity):
         return {("engine", "stroke"): value * own, ("engine", "bore"): own}
 
 
-_OWN = (StrokeOverBore(),)
-QUANTITIES: Mapping[str, Quantity] = {
-    one.name: one for one in (*_OWN, *additions("quantities", Quantity, [one.name for one in _OWN]))
-}
+QUANTITIES: Mapping[str, Quantity] = extended("quantities", Quantity, (StrokeOverBore(),))
 _NUMBERS = {name: f.Number(one.unit, above=0.0) for name, one in QUANTITIES.items()}
 _KEYS: dict[str, Any] = {
     name: (Annotated[float, _NUMBERS[name]] | None, Field(default=None, description=one.words))

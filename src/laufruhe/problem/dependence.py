@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from enum import StrEnum
 
+from laufruhe.errors import ModelError
 from laufruhe.extension import extensions
 from laufruhe.problem.channels import CHANNELS, Channel
 from laufruhe.problem.decision import Kind
@@ -126,17 +127,30 @@ absorber heat                       0 0 s  0 s 0  w  0 0  0 s
 """
 
 
-def _parsed(text: str) -> dict[str, dict[Kind, Dependence]]:
-    found: dict[str, dict[Kind, Dependence]] = {}
-    added = [line for extension in extensions() for line in extension.dependences]
-    for line in (*text.strip().splitlines()[1:], *added):
-        name, letters = line.split("  ", 1)
-        kinds = zip(_COLUMNS, letters.split(), strict=True)
-        found[name] = {kind: _LETTERS[letter] for kind, letter in kinds}
+def _row(line: str) -> tuple[str, dict[Kind, Dependence]]:
+    name, letters = line.split("  ", 1)
+    kinds = zip(_COLUMNS, letters.split(), strict=True)
+    return name, {kind: _LETTERS[letter] for kind, letter in kinds}
+
+
+def _with_added(own: Mapping[str, Mapping[Kind, Dependence]]) -> dict[str, Mapping[Kind, Dependence]]:
+    """Return the table with the lines of extensions, which may speak of no channel but their own."""
+    found = dict(own)
+    for extension in extensions():
+        for line in extension.dependences:
+            try:
+                name, row = _row(line)
+            except (KeyError, ValueError):
+                rule = f"{line!r} is no line of dependences; give a channel, two blanks and {len(_COLUMNS)} letters"
+                raise ModelError(f"extension '{extension.name}': {rule}") from None
+            if name in found or name not in CHANNELS:
+                rule = f"'{name}' is no channel without dependences; leave its line out"
+                raise ModelError(f"extension '{extension.name}': {rule}")
+            found[name] = row
     return found
 
 
-TABLE: Mapping[str, Mapping[Kind, Dependence]] = _parsed(_TABLE)
+TABLE: Mapping[str, Mapping[Kind, Dependence]] = _with_added(dict(map(_row, _TABLE.strip().splitlines()[1:])))
 """By the name of the channel and the kind of decision."""
 # loads of bearings feel the places of rotors on the shafts that these carry
 _OF_BEARINGS = frozenset(

@@ -3,7 +3,7 @@
 Cylinders are counted from the front (C3).
 """
 
-from laufruhe.extension import additions
+from laufruhe.extension import extended
 from laufruhe.machine.layouts.base import Asked, Key, LayoutKind, rod_of
 from laufruhe.machine.layouts.boxer import Boxer, boxer
 from laufruhe.machine.layouts.build import Mechanism, Throw, build, even_throws, firing_angles, throw_rotors
@@ -16,10 +16,11 @@ from laufruhe.machine.layouts.radial import Radial
 from laufruhe.machine.layouts.rotary import Rotary
 from laufruhe.machine.layouts.vee import Vee, vee
 
-_OWN = (Inline(), Vee(), Boxer(), OpposedPiston(), Delta(), Radial(), Rotary(), Parts())
-LAYOUTS: dict[str, LayoutKind] = {
-    kind.name: kind for kind in (*_OWN, *additions("layouts", LayoutKind, [kind.name for kind in _OWN]))
-}
+LAYOUTS: dict[str, LayoutKind] = extended(
+    "layouts",
+    LayoutKind,
+    (Inline(), Vee(), Boxer(), OpposedPiston(), Delta(), Radial(), Rotary(), Parts()),
+)
 
 __all__ = [
     "LAYOUTS",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from laufruhe.extension import additions
+from laufruhe.extension import extended
 from laufruhe.numerics.norms.maximum import Maximum
 from laufruhe.numerics.norms.mean import Mean
 from laufruhe.numerics.norms.norm import Cones, Grid, Norm, SmoothProgram, lengths, only, softened_lengths
@@ -14,8 +14,6 @@ from laufruhe.numerics.norms.worst_mean import WorstMean
 
 __all__ = ["MEAN", "NORMS", "RMS", "Cones", "Grid", "Norm", "SmoothProgram", "lengths", "softened_lengths"]
 
-_OWN = (Mean, Maximum, RootMeanSquare, PeakToPeak, WorstMean)
-NORMS: Mapping[str, Norm] = {
-    norm.name: norm for norm in map(only, (*_OWN, *additions("norms", Norm, [norm.name for norm in _OWN])))
-}
+_CLASSES = extended("norms", Norm, (Mean, Maximum, RootMeanSquare, PeakToPeak, WorstMean))
+NORMS: Mapping[str, Norm] = {name: only(norm) for name, norm in _CLASSES.items()}
 MEAN, RMS = NORMS["mean"], NORMS["rms"]

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
-from laufruhe.extension import additions
+from laufruhe.extension import extended
 from laufruhe.machine import Engine, OperatingPoint, Role
 from laufruhe.machine.clearances import Span, distances, reaches
 from laufruhe.numerics.spectrum import Spectrum
@@ -194,13 +194,10 @@ def is_at_mounts(channel: Channel) -> bool:
     return channel in AT_EACH_MOUNT
 
 
-_OWN: Sequence[Channel] = (
+CHANNELS: Mapping[str, Channel] = extended("channels", Channel, (
     MOUNT_FORCE, MOUNT_TRAVEL, *OF_BLOCK,
     HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,
     SIDE_FORCE, FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS,
     ADDED_MASS, *OF_MOUNTING, *OF_RUNS, *OF_APEXES, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES,
     *TORSIONAL,
-)  # fmt: skip
-CHANNELS: Mapping[str, Channel] = {
-    channel.name: channel for channel in (*_OWN, *additions("channels", Channel, [channel.name for channel in _OWN]))
-}
+))  # fmt: skip
