@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any, TypeAlias, get_args
 
 from pydantic import BaseModel, ValidationError
+from pydantic_core import PydanticCustomError
 
 from laufruhe import units
 from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, printed
 from laufruhe.extension import HOMES
-from laufruhe.files.fields import FORMS
+from laufruhe.files.fields import FORMS, Number, Open
 from laufruhe.files.toml_text import toml_key
 
 Loc: TypeAlias = tuple[str | int, ...]
@@ -175,6 +176,21 @@ class Refused(LaufruheError):
     def __init__(self, where: str, value: Any, rule: str, remedy: str) -> None:
         self.complaint = Complaint(where, "" if value is None else short(value), rule, remedy)
         super().__init__(str(self.complaint))
+
+
+def number_read(number: Number, place: Sequence[str | int], given: Any) -> float | Open:
+    """Return what stands at a place of a file, as its key reads a number.
+
+    Raises
+    ------
+    Refused
+        If it is no such number.
+    """
+    try:
+        return number.read(given)
+    except PydanticCustomError as error:
+        rule, _, remedy = error.message().partition("; ")
+        raise Refused(key_path(place), given, rule, remedy) from None
 
 
 @contextmanager

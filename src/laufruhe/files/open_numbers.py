@@ -10,10 +10,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pydantic_core import PydanticCustomError
-
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, key_path
+from laufruhe.files.complaints import Refused, key_path, number_read
 from laufruhe.files.model_walk import annotations_at, number_at, tables_on
 from laufruhe.files.nested import Place, at, inside, put
 from laufruhe.files.problem_file import ProblemFile
@@ -76,11 +74,7 @@ def _read(tables: Mapping[str, Any], place: Place, number: f.Number | None, node
     if number is None:
         rule = "cannot be left open: it is no number with a unit but a count, a name or a choice"
         raise Refused(where, node, rule, "give one, and compare others in a study")
-    try:
-        given = replace(number, openable=True).read(node)
-    except PydanticCustomError as error:
-        rule, _, remedy = error.message().partition("; ")
-        raise Refused(where, node, rule, remedy) from None
+    given = number_read(replace(number, openable=True), place, node)
     assert isinstance(given, f.Open)
     return OpenNumber(place, _name(tables, place), number.unit, given)
 

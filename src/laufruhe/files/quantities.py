@@ -12,12 +12,12 @@ from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar
 
 from pydantic import Field, create_model
-from pydantic_core import PydanticCustomError
 
 from laufruhe.extension import extended
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, key_path
+from laufruhe.files.complaints import Refused, key_path, number_read
 from laufruhe.files.nested import Place, at, put
+from laufruhe.problem.decision import AddressDrive
 
 
 class Quantity(ABC):
@@ -85,10 +85,11 @@ def followed(tables: Mapping[str, Any]) -> Mapping[str, Any]:
     found = tables
     for name, one in QUANTITIES.items():
         if name in asked:
-            value = _read(_NUMBERS[name], ("quantities", name), asked[name])
+            value = number_read(_NUMBERS[name], ("quantities", name), asked[name])
+            assert isinstance(value, float)
             given = {place: _given(found, place, unit, name) for place, unit in one.follow.items()}
             for place, own in one.values(value, given).items():
-                found = put(found, place, f"{own!r} {one.follow[place]}" if one.follow[place] else own)
+                found = put(found, place, AddressDrive(place, one.follow[place]).written(own))
     return found
 
 
@@ -100,14 +101,6 @@ def _given(tables: Mapping[str, Any], place: Place, unit: str, name: str) -> flo
     if number is None or isinstance(number, Mapping | list):
         rule = f"follows quantities.{name}, and is not given as a number"
         raise Refused(key_path(place), number, rule, "give it, or leave the quantity out")
-    return _read(f.Number(unit), place, number)
-
-
-def _read(number: f.Number, place: Place, given: Any) -> float:
-    try:
-        read = number.read(given)
-    except PydanticCustomError as error:
-        rule, _, remedy = error.message().partition("; ")
-        raise Refused(key_path(place), given, rule, remedy) from None
-    assert isinstance(read, float)
-    return read
+    value = number_read(f.Number(unit), place, number)
+    assert isinstance(value, float)
+    return value

@@ -148,8 +148,7 @@ def _begun(problem: Problem, known: Result) -> Problem:
 
 def _unproven(problem: Problem, starts: int, few: int) -> Search:
     """With so many starts at most, and a few boxes where these find designs."""
-    most = problem.search.boxes if problem.search.boxes is not None else few
-    boxes = min(most, few) if kinds_of(problem) & {Kind.PLACE, Kind.LEAD} else 0
+    boxes = min(problem.search.boxes_or(few), few) if kinds_of(problem) & {Kind.PLACE, Kind.LEAD} else 0
     return replace(problem.search, starts=min(problem.search.starts, starts), boxes=boxes, proves=False)
 
 

@@ -120,11 +120,10 @@ class DesignBoxes:
     @property
     def most_boxes(self) -> int:
         """As many as some tens of seconds allow."""
-        asked = self.loads.problem.search.boxes
         count = len(self.lower)
         if self.most_corners < FEW * 2**count or self.loads.rows * self.loads.columns > MOST_NUMBERS:
             return 0
-        return BOXES * self.most_corners // max(4 ** (count - 3), 1) if asked is None else asked
+        return self.loads.problem.search.boxes_or(BOXES * self.most_corners // max(4 ** (count - 3), 1))
 
     @property
     def most_corners(self) -> int:

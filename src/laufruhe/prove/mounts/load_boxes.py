@@ -199,8 +199,7 @@ class LoadBoxes:
     @property
     def most_boxes(self) -> int:
         """Count the boxes that are asked for, or that some seconds allow."""
-        asked = self.problem.search.boxes
-        return int(min(WORK / self._cost, MOST_BOXES)) if asked is None else asked
+        return self.problem.search.boxes_or(int(min(WORK / self._cost, MOST_BOXES)))
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         """Least objective on every box, infinite where no design is allowed; and the side worth halving."""

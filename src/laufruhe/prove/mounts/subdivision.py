@@ -149,12 +149,8 @@ class StiffnessBoxes:
     @property
     def most_boxes(self) -> int:
         """As many as asked for, or as a few seconds allow."""
-        asked = self.problem.search.boxes
-        if asked is not None:
-            return asked
-        if len(self.problem.mount_decisions) > MOST_OPEN:
-            return 0
-        return int(min(WORK / self._cost, MOST_BOXES))
+        few = len(self.problem.mount_decisions) <= MOST_OPEN
+        return self.problem.search.boxes_or(int(min(WORK / self._cost, MOST_BOXES)) if few else 0)
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         """Least objective on every box, infinite where no design is allowed; and the side worth halving."""

@@ -118,8 +118,7 @@ def _ladder(boxes: SpringBoxes, of_many: bool) -> _Ladder:
         found = _Ladder((*FIRST, *LEVELS), FEW_RELAXED)
     else:
         found = _Ladder((OF_MANY, 0.0) if of_many else (0.0,), boxes.most_boxes)
-    asked_for = boxes.problem.search.boxes
-    return found if asked_for is None else replace(found, most=asked_for)
+    return replace(found, most=boxes.problem.search.boxes_or(found.most))
 
 
 def _by_levels(boxes: SpringBoxes, room: float, ladder: _Ladder, known: Known | None) -> Divided:

@@ -178,8 +178,7 @@ class SpringBoxes:
         """As many as some tens of seconds allow."""
         parts = [order.part for heads in self._heads for head in heads for order in head.orders]
         cost = sum((1 + self.columns.count + 2 * self._parts[k].products) ** EFFORT for k in parts)
-        asked_for = self.problem.search.boxes
-        return int(min(WORK / max(cost, 1), MOST_BOXES)) if asked_for is None else asked_for
+        return self.problem.search.boxes_or(int(min(WORK / max(cost, 1), MOST_BOXES)))
 
     def look(self, lower: Array, upper: Array) -> tuple[float, Array]:
         """The better bound of the designs of a box that are not over the value, and the pull of its sides."""

@@ -55,6 +55,4 @@ def solve_torsion(problem: Problem) -> Result:
 
 
 def _most_boxes(problem: Problem) -> int:
-    if problem.search.boxes is not None:
-        return problem.search.boxes
-    return MOST_BOXES if len(problem.decisions) <= MOST_OPEN else 0
+    return problem.search.boxes_or(MOST_BOXES if len(problem.decisions) <= MOST_OPEN else 0)

@@ -16,7 +16,7 @@ from laufruhe.numerics.norms import MEAN, Grid
 from laufruhe.problem.decision import Domain, columns_of, vector_of
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import objective_value
-from laufruhe.problem.measure import Limit
+from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, judged, unbalances_of
@@ -55,7 +55,7 @@ def equal_designs(found: Result, limit: Limit) -> tuple[DecisionRange, ...]:
     kinds = {decision.kind for decision in affine}
     moved = [bound for bound in (*problem.limits, limit) if depends(bound.measure.channel, kinds, problem)]
     problem = replace(problem, phasing=None, objective=(), limits=tuple(moved))
-    numbers = any(bound.measure.channel.is_number or not bound.measure.norm.is_convex for bound in moved)
+    numbers = any(_has_no_cones(bound.measure) for bound in moved)
     if not affine or len(affine) < len(problem.decisions) or len(affine) > MOST_OPEN or numbers or passed():
         return ()
     model = AffineModel(problem)
@@ -78,7 +78,7 @@ def free_decisions(found: Result) -> tuple[DecisionRange, ...] | None:
     objective and limits are convex. There may be designs beyond. None where it is not looked at.
     """
     problem = replace(found.problem, phasing=None)
-    of_numbers = any(measure.channel.is_number or not measure.norm.is_convex for measure in problem.measures)
+    of_numbers = any(_has_no_cones(measure) for measure in problem.measures)
     plain = problem.over is None and problem.assembly is None and not problem.ranks and not of_numbers
     affine = all(decision.is_affine for decision in problem.decisions)
     if not (plain and affine and 0 < len(problem.decisions) <= MOST_OPEN) or passed():
@@ -94,6 +94,10 @@ def free_decisions(found: Result) -> tuple[DecisionRange, ...] | None:
     rows = _kept_by(model.at(min(model.full_samples, FEW)), x)
     designs = [x, *(good for end in _around(rows, x, LITTLE) for good in _good(found, problem, model, x, end))]
     return tuple(told for domain in _moving(rows, designs) for told in _ranges(domain, designs))
+
+
+def _has_no_cones(measure: Measure) -> bool:
+    return measure.channel.is_number or not measure.norm.is_convex
 
 
 def _kept_by(rows: AffineProblem, x: Array) -> AffineProblem:
