@@ -1,4 +1,4 @@
-"""What the lanes take of many: the fast one the first few, the usual one some more, `make test-long` the rest."""
+"""Lanes of tests: the fast one takes the first few of many, the usual one some more, `make test-long` the rest."""
 
 from __future__ import annotations
 

@@ -141,7 +141,7 @@ def test_a_star_that_was_pruned_is_found_out(rank: int) -> None:
 
 
 def test_throws_are_walked_from_the_star_that_is_told_and_from_no_other() -> None:
-    """Every throw and angle of the best star may move, and its cranks change places; of no star there is nothing."""
+    """Move every throw and angle of the best star, and exchange its cranks; without a star move nothing."""
     problem = load(PROBLEMS / "inline-seven-uneven.toml")
     assert problem.phasing is not None
     phasing, throws = problem.phasing, tuple(math.tau * k / 7 for k in range(7))

@@ -9,7 +9,7 @@ from laufruhe.numerics.norms import NORMS, Grid
 
 
 def test_roundings_of_what_cancels_are_nothing_and_small_rows_stay() -> None:
-    """Of 4000 rows of size 1 those that moves cancel to 1e-15 are zero, those that they leave 1e-12 of are kept."""
+    """Take 4000 rows of size 1: cancelled to 1e-15 they are zero, with 1e-12 left they are kept."""
     rows, left = 4000, np.array([1e-15, 1e-12])
     constant = np.ones((rows, 2))
     moves = np.zeros((2, 3, rows, 2))

@@ -191,7 +191,7 @@ def test_a_limit_beside_a_stop_is_met_and_proven() -> None:
 @pytest.mark.parametrize("gap", ["none", "narrow"])
 @pytest.mark.parametrize("name", ASKED)
 def test_the_program_settles_where_the_block_does(name: str, gap: str, tmp_path: Path) -> None:
-    """Its rows hold the length at each mount in each load case, with stops at a balance that its variables are in."""
+    """Hold the rows of the program to the length at each mount in each load case, at a balance with stops."""
     problem = problem_of(tmp_path, ENGINE, AHEAD, GAPS[gap], CASES, ASKED[name])
     measure, held, mounting = problem.objective[0].measure, Gathered(), mounting_in(problem.engine)
     root, numbers = mass_root(mounting.block), ca.MX.sym("d", 2)

@@ -461,7 +461,7 @@ def test_limits_with_room_at_every_start_are_no_rows(tmp_path):
     ("ends", "chosen"), [([(2.0, 0.0), (1.0, 1e-8)], 1), ([(2.0, 0.3), (1.0, 0.5)], 0)], ids=["ends", "none"]
 )
 def test_a_search_is_refined_from_its_best_end(ends, chosen, tmp_path, monkeypatch):
-    """Where no start ended within the limits, from the one that misses them least."""
+    """Refine the end that misses the limits least if no start ended within them."""
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], SEARCH)
     search, begun = MountSearch(problem, evaluate(problem)), []
     places = np.array([[2e5, 3e5], [4e5, 5e5]])

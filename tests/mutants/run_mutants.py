@@ -42,7 +42,7 @@ MAP = ROOT / ".pytest_cache" / "functions-of-tests.json"
 TESTS = (*ROOMS, "numerics", "problem", "mounts", "phasing", "fidelity", "literature", "claims", "validation", "attack")
 OPTIONS = ("-q", "-p", "no:xdist", "-p", "no:cacheprovider", "--import-mode=importlib")
 LOG = MAP.with_name("mutants.jsonl")
-"""What became of each mutant, one a line; a run goes on where the last one ended."""
+"""Outcome of each mutant, one a line; a run goes on where the last one ended."""
 FEW = 10
 Key = tuple[str, str]
 Found = tuple[Mutant, str, int]

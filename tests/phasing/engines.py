@@ -24,6 +24,7 @@ x = "-200 mm"
 unbalance = { between = ["0 kg m", "0.2 kg m"] }
 angle = { between = [0, 360] }
 """
+OPEN = 'throws = "open"\nfiring_order = "open"\nrotating_mass = "0.7 kg"\n'
 COUPLE = '[objective]\nminimise = "rms rocking couple"\norders = [1, 2]\n'
 MOUNT_FORCE = '[objective]\nminimise = "mean mount force"\n'
 

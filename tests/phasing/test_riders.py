@@ -37,7 +37,6 @@ angle = 20
 name = "all"
 balance_factor = { between = [0.1, 0.7] }
 """
-OPEN = 'throws = "open"\nfiring_order = "open"\nrotating_mass = "0.7 kg"\n'
 
 
 def unbalances(engine: Engine) -> np.ndarray:
@@ -48,7 +47,7 @@ def unbalances(engine: Engine) -> np.ndarray:
 def test_columns_at_given_throws_are_the_unbalances_of_the_engine(own: tuple[float, float], tmp_path: Path) -> None:
     """Random values of every kind of decision; an interval may lie on either side of nothing, or around it."""
     problem = engines.problem(
-        tmp_path, 3, "two-stroke", OPEN, 'intervals = { largest_deviation = "25 deg" }',
+        tmp_path, 3, "two-stroke", engines.OPEN, 'intervals = { largest_deviation = "25 deg" }',
         STILL + engines.MOUNTS + engines.MOUNT_FORCE, "inline", 96,
     )  # fmt: skip
     throws, phasing = (0.0, 4.3, 2.0), problem.phasing

@@ -26,7 +26,6 @@ from laufruhe.solvers.throws.windows import firing_of, nearest, windows_of
 from phasing import engines
 
 GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "70 bar"\nimep = "8 bar"\n'
-OPEN = 'throws = "open"\nfiring_order = "open"\nrotating_mass = "0.7 kg"\n'
 ALLOWED = 'intervals = { largest_deviation = "25 deg" }'
 FORCE = engines.MOUNTS + engines.MOUNT_FORCE
 FACTOR = '[[counterweights]]\nname = "all"\nbalance_factor = { between = [%s, %s] }\n'
@@ -50,21 +49,21 @@ angle = { between = [10, 100] }
 LIMIT = '[[constraints]]\nlimit = "%s"\nmax = "%s"\n'
 MASS = LIMIT % ("added mass", "3 kg")
 RADIUS = 'radius = "60 mm"\n'
-VEE = OPEN + "bank_angle = 90\nsplit_pin_angle = 30\n"
+VEE = engines.OPEN + "bank_angle = 90\nsplit_pin_angle = 30\n"
 
 RMS = FORCE.replace("mean", "rms")
 
 SCENES = {
-    "couple": ("inline", "two-stroke", 4, OPEN, engines.COUPLE),
-    "mean": ("inline", "two-stroke", 4, OPEN, FORCE),
-    "gas": ("inline", "four-stroke", 3, OPEN, GAS + FORCE),
-    "maximum": ("inline", "four-stroke", 3, OPEN, FORCE.replace("mean", "maximum")),
-    "peak to peak": ("inline", "two-stroke", 3, OPEN, FORCE.replace("mean", "peak to peak")),
-    "limited": ("inline", "two-stroke", 4, OPEN, RMS + LIMIT % ("rms rocking couple", "900 N m")),
-    "weights": ("inline", "two-stroke", 3, OPEN, engines.WEIGHTS + FORCE),
-    "riders": ("inline", "two-stroke", 3, OPEN, RIDERS + FORCE),
-    "factor": ("inline", "four-stroke", 3, OPEN, FACTOR % (0.1, 0.7) + GAS + FORCE),
-    "factor of both signs": ("inline", "two-stroke", 3, OPEN, FACTOR % (-0.4, 0.6) + RMS),
+    "couple": ("inline", "two-stroke", 4, engines.OPEN, engines.COUPLE),
+    "mean": ("inline", "two-stroke", 4, engines.OPEN, FORCE),
+    "gas": ("inline", "four-stroke", 3, engines.OPEN, GAS + FORCE),
+    "maximum": ("inline", "four-stroke", 3, engines.OPEN, FORCE.replace("mean", "maximum")),
+    "peak to peak": ("inline", "two-stroke", 3, engines.OPEN, FORCE.replace("mean", "peak to peak")),
+    "limited": ("inline", "two-stroke", 4, engines.OPEN, RMS + LIMIT % ("rms rocking couple", "900 N m")),
+    "weights": ("inline", "two-stroke", 3, engines.OPEN, engines.WEIGHTS + FORCE),
+    "riders": ("inline", "two-stroke", 3, engines.OPEN, RIDERS + FORCE),
+    "factor": ("inline", "four-stroke", 3, engines.OPEN, FACTOR % (0.1, 0.7) + GAS + FORCE),
+    "factor of both signs": ("inline", "two-stroke", 3, engines.OPEN, FACTOR % (-0.4, 0.6) + RMS),
     "vee with gas": ("vee", "four-stroke", 6, VEE, GAS + FORCE),
     "vee with weights": ("vee", "four-stroke", 6, VEE, RIDERS + RMS),
 }  # fmt: skip
@@ -183,7 +182,7 @@ def test_waves_add_up_to_the_exact_loads(tmp_path, name):
                                                         ("vee", "four-stroke", 6)])  # fmt: skip
 def test_every_way_to_fire_is_in_one_window(tmp_path, layout, cycle, count):
     """Random cranks, all firing orders that they can have: in one window where intervals are kept, else in none."""
-    engine = VEE if layout == "vee" else OPEN
+    engine = VEE if layout == "vee" else engines.OPEN
     problem = engines.problem(
         tmp_path, count, cycle, engine, ALLOWED, engines.MOUNTS + GAS + engines.MOUNT_FORCE, layout
     )

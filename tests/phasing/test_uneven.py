@@ -139,7 +139,7 @@ MODELS = {
 @pytest.mark.parametrize("name", MODELS)
 def test_smooth_model_equals_the_exact_one(tmp_path, layout, name):
     rest, tolerance = MODELS[name]
-    open_ = 'throws = "open"\nfiring_order = "open"\nrotating_mass = "0.7 kg"\n' + (SPLIT if layout == "vee" else "")
+    open_ = engines.OPEN + (SPLIT if layout == "vee" else "")
     allowed = 'intervals = { largest_deviation = "40 deg" }'
     phasing = engines.problem(tmp_path, 6, "four-stroke", open_, allowed, rest, layout, 480).phasing
     rng = np.random.default_rng(11)
@@ -172,7 +172,7 @@ def test_throws_between_bounds_of_their_own(tmp_path):
 
 @pytest.mark.slow
 def test_bank_and_split_pins_move_within_bounds(tmp_path):
-    engine = f'{SPLIT}throws = "open"\nfiring_order = "open"\nrotating_mass = "0.7 kg"\n'
+    engine = SPLIT + engines.OPEN
     allowed, few = 'intervals = { largest_deviation = "10 deg" }\nbest = 2', "[search]\nboxes = 4\n"
     result = solve(
         engines.problem(tmp_path, 6, "four-stroke", engine, allowed, engines.WEIGHTS + engines.COUPLE + few, "vee")

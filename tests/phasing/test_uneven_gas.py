@@ -21,7 +21,6 @@ from phasing import engines
 from smooth import smooth_value
 
 GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "70 bar"\nimep = "8 bar"\n'
-OPEN = 'throws = "open"\nfiring_order = "open"\nrotating_mass = "0.7 kg"\n'
 SPLIT = "bank_angle = { between = [60, 100] }\nsplit_pin_angle = { between = [0, 60] }\n"
 ALLOWED = 'intervals = { largest_deviation = "40 deg" }'
 MOUNT_FORCE = engines.MOUNTS + engines.MOUNT_FORCE
@@ -36,7 +35,7 @@ SCENES = {
 def scene(folder, name, rest=MOUNT_FORCE):
     """A star with its firing order, what may move of it, and its problem."""
     layout, cycle, count, order, angles = SCENES[name]
-    open_ = OPEN + (SPLIT if angles else "")
+    open_ = engines.OPEN + (SPLIT if angles else "")
     phasing = engines.problem(folder, count, cycle, open_, ALLOWED, GAS + rest, layout, 480).phasing
     geometry = angles or (None, None)
     places = phasing.layout(*geometry)

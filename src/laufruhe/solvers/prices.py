@@ -305,7 +305,7 @@ def affine_prices(
 
 
 def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) -> Slopes | None:
-    """All slopes of a norm at a design; None where they are not known, or too much of it vanishes."""
+    """Return all slopes of a norm at a design; None where they are not known, or too much of it vanishes."""
     rows = norm.rows(x)
     kinks = norm.norm.kinks(norm.grid, rows, norm.norm.subgradient(norm.grid, rows) if z is None else z)
     if kinks is None or len(kinks.vanishing) > MOST_VANISHING:

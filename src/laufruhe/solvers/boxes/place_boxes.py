@@ -71,7 +71,7 @@ class Relaxation:
         self._bends = [self._bends_of(place) for place in self.places]
 
     def _bends_of(self, place: Decision) -> Array:
-        """Where a bearing force bends as a place moves [m]: at all bearings of its shaft but the outermost."""
+        """Return the places at which a bearing force bends [m]: all bearings of the shaft but the outermost."""
         asked = {dependence(measure.channel, Kind.PLACE, self.problem) for measure in self.problem.measures}
         if Dependence.BENT not in asked:
             return np.zeros(0)
@@ -81,7 +81,7 @@ class Relaxation:
         ])  # fmt: skip
 
     def _nodes(self, lower: Array, upper: Array) -> list[Array]:
-        """Coordinates of the corners along every side of a box."""
+        """Return the coordinates of the corners along every side of a box [m]."""
         sides = zip(self._bends, lower, upper, strict=True)
         return [np.array([low, *bends[(bends > low) & (bends < high)], high]) for bends, low, high in sides]
 
@@ -213,7 +213,7 @@ def _corners(nodes: Sequence[Array], axes: Sequence[int]) -> tuple[dict[int, flo
 
 
 def _apart(sizes: NDArray[np.complex128], at: Array, middle: float, bends: Array) -> float:
-    """How far unbalances pull a place from its middle, weighed by their size."""
+    """Return the distance by which unbalances pull a place from its middle [m], times their size."""
     weights = np.abs(sizes)
     used = at[weights > UNUSED * weights.max(initial=0.0)]
     if used.size and ((bends > used.min()) & (bends < used.max())).any():
