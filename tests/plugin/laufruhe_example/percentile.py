@@ -60,7 +60,7 @@ class PercentilePart(Part):
         about = data["percentile"].attrs
         places = np.arange(data.sizes["case"], dtype=float)
         marks: list[p.Mark] = [p.Line(places, data["percentile"].values, p.colour(0, 1), width=0.0, marker="o")]
-        panel = p.Panel(marks, p.Axis("case"), p.Axis(f"{about['long_name']} [{about['units']}]"))
-        return p.Picture(
-            data.attrs["title"], f"Cases: {', '.join(map(str, data['case'].values))}.", [panel], p.credit(data)
-        )
+        names = list(zip(places.tolist(), map(str, data["case"].values), strict=True))
+        panel = p.Panel(marks, p.Axis(ticks=names), p.Axis(f"load [{about['units']}]"))
+        words = f"{about['long_name'][:1].upper()}{about['long_name'][1:]}, a dot for each case."
+        return p.Picture(data.attrs["title"], words, [panel], p.credit(data))
