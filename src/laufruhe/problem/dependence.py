@@ -135,7 +135,7 @@ def _row(line: str) -> tuple[str, dict[Kind, Dependence]]:
 
 def _with_added(own: Mapping[str, Mapping[Kind, Dependence]]) -> dict[str, Mapping[Kind, Dependence]]:
     """Return the table with the lines of extensions, which may speak of no channel but their own."""
-    found = dict(own)
+    found, without = dict(own), set(CHANNELS).difference(own)
     for extension in extensions():
         for line in extension.dependences:
             try:
@@ -143,10 +143,11 @@ def _with_added(own: Mapping[str, Mapping[Kind, Dependence]]) -> dict[str, Mappi
             except (KeyError, ValueError):
                 rule = f"{line!r} is no line of dependences; give a channel, two blanks and {len(_COLUMNS)} letters"
                 raise ModelError(f"extension '{extension.name}': {rule}") from None
-            if name in found or name not in CHANNELS:
+            if name not in without:
                 rule = f"'{name}' is no channel without dependences; leave its line out"
                 raise ModelError(f"extension '{extension.name}': {rule}")
             found[name] = row
+            without.remove(name)
     return found
 
 
