@@ -48,7 +48,7 @@ def every(browser: Browser, tmp_path_factory):
 
 @pytest.fixture
 def shown(every: Page):
-    every.evaluate("laufruheLive.page.then(page => page.set(page.given))")
+    every.evaluate("laufruheLive.page.then(page => (page.set(page.given), page.drawNow()))")
     return every
 
 
@@ -107,6 +107,25 @@ def test_a_typed_comma_is_a_decimal_sign(shown, typed, taken):
     field.press("Enter")
     assert shown.evaluate("laufruheLive.page.then(page => page.design()['web.mass'])") == pytest.approx(taken)
     expect(field).not_to_have_attribute("aria-invalid", "true")
+
+
+def test_a_redraw_keeps_the_text_of_a_field_that_is_being_typed_in(shown):
+    field = shown.locator('[data-number="web.mass"]')
+    field.fill("1.25")
+    shown.evaluate("laufruheLive.page.then(page => (page.setDesign({'web.mass': 0.5}), page.drawNow()))")
+    assert field.input_value() == "1.25"
+    field.press("Enter")
+    assert shown.evaluate("laufruheLive.page.then(page => page.design()['web.mass'])") == pytest.approx(1.25)
+
+
+def test_a_field_left_as_it_was_shows_the_design(shown):
+    field = shown.locator('[data-number="web.mass"]')
+    before = field.input_value()
+    field.fill("1.25")
+    field.fill(before)
+    shown.evaluate("laufruheLive.page.then(page => (page.setDesign({'web.mass': 0.5}), page.drawNow()))")
+    field.blur()
+    assert float(field.input_value()) == 0.5
 
 
 @pytest.mark.parametrize("typed", ["1,500", "1,2,3", "one", "", "1.2.3", "NaN", "0x10", "Infinity"])

@@ -17,7 +17,9 @@ class Slider {
     this.range.addEventListener("keydown", (event) => this.key(event, step, told));
     this.range.addEventListener("input", () => told(name, this.range.valueAsNumber / unit.factor, false));
     this.range.addEventListener("change", () => told(name, this.range.valueAsNumber / unit.factor, true));
+    this.number.addEventListener("input", () => { this.editing = true; });
     this.number.addEventListener("change", () => this.typed(told));
+    this.number.addEventListener("blur", () => { if (this.editing) this.write(); });
     this.rail = element("div", { class: "live-rail" }, this.range);
     this.marks = {};
     for (const [kind, value] of marks) this.setMark(kind, value);
@@ -53,6 +55,7 @@ class Slider {
 
   typed(told) {
     const { name, unit, lower, upper } = this.field, { value, why } = typed(this.number.value);
+    this.editing = false;
     this.number.setAttribute("aria-invalid", String(Boolean(why)));
     this.refuse(why ? `${name}: ${why}.` : "");
     if (why) return;
@@ -66,7 +69,13 @@ class Slider {
     this.value = value;
     this.range.value = value * unit.factor;
     this.range.setAttribute("aria-valuetext", figure(value, unit));
-    this.number.value = trimmed(value * unit.factor, 4);
+    if (!this.editing) this.write();
+  }
+
+  /** Write the value into the number field. A field in which somebody types keeps its text until then. */
+  write() {
+    this.editing = false;
+    this.number.value = trimmed(this.value * this.field.unit.factor, 4);
     this.number.removeAttribute("aria-invalid");
   }
 }
