@@ -15,7 +15,7 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import state
-from laufruhe.solvers.mounts.stars import _bounded, _method, _solved_fully
+from laufruhe.solvers.mounts.stars import _bounded, _method, _solved_fully, _stars
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.smooth.program import SmoothProgram
 from laufruhe.solvers.stars.design import StarDesign
@@ -86,6 +86,19 @@ def test_stars_left_out_leave_no_bound(tmp_path):
     result = solve(problem_of(tmp_path, *parts(), "[phasing]\nbest = 1\n"))
     assert result.certificate.lower_bound == 0.0
     assert "the best of 3 on the mounts as given" in result.certificate.method
+
+
+@pytest.mark.parametrize("best", [1, 2, 50])
+def test_stars_are_counted_and_as_many_as_are_asked_for_are_kept(best, tmp_path):
+    """Of four throws two each stand at 0 and 180 degrees, the first at 0: three ways, the best ones first."""
+    problem = problem_of(tmp_path, *parts(), f"[phasing]\nbest = {best}\n")
+    ranked, designs = _stars(problem, problem.phasing)
+    assert designs == math.comb(3, 1) == len(STARS)
+    throws = [tuple(round(math.degrees(angle)) for angle in star.throws) for star, _ in ranked]
+    assert len(throws) == len(set(throws)) == min(best, designs)
+    assert set(throws) <= {tuple(star) for star in STARS}
+    # on the mounts as given the star of the four-cylinder engine leaves no couple
+    assert throws[0] == (0, 180, 180, 0)
 
 
 def test_how_stars_were_decided_is_counted(tmp_path):

@@ -161,3 +161,12 @@ def test_roll_alone_is_slower_with_what_turns_counted_in():
 def test_what_turns_is_less_than_the_whole(inertia):
     with pytest.raises(ModelError, match="turning_inertia"):
         Block(100.0, ((6.0, 0, 0), (0, 8.0, 0), (0, 0, 8.0)), turning_inertia=inertia)
+
+
+@pytest.mark.parametrize("number", [math.nan, math.inf])
+@pytest.mark.parametrize("place", [(0, 0), (0, 1), (2, 2)])
+def test_an_inertia_of_one_unknown_number_is_refused(place, number):
+    tensor = np.diag([6.0, 8.0, 8.0])
+    tensor[place] = tensor[place[::-1]] = number
+    with pytest.raises(ModelError, match="inertia tensor"):
+        Block(100.0, tuple(map(tuple, tensor.tolist())))

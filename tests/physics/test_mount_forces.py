@@ -17,7 +17,7 @@ from laufruhe.errors import UncarriedLoadError
 from laufruhe.machine import Mount
 from laufruhe.machine.mount import Matrix3
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.physics.mount_forces import UNCARRIED_SHARE, RigidMounting, rigid_mounting
 from laufruhe.physics.wrench import WRENCH
 
 PLACE = st.floats(-1.0, 1.0).map(lambda x: round(x, 4))
@@ -259,3 +259,22 @@ class TestUncarried:
         c[1, 0], c[5, 0] = 1.0, 7.0
         with pytest.raises(UncarriedLoadError, match=r"order 2\.5 drives"):
             rigid_mounting(FOUR).forces(Spectrum(Fraction(1, 2), c))
+
+    @pytest.mark.parametrize("arm", [0.02, 1.0, 50.0])
+    @pytest.mark.parametrize("component", range(6))
+    def test_the_share_that_is_left_to_rounding_is_of_the_largest_load(self, arm: float, component: int) -> None:
+        """Moments count by the arm of the mounts, whatever their unit makes of them."""
+        scales = np.array([1.0, 1.0, 1.0, arm, arm, arm])
+        free = np.eye(6)[[component]]
+        mounting = RigidMounting(np.zeros((1, 3, 6)), free, arm)
+        for largest in range(6):
+            for share in (0.5, 2.0, 10.0):
+                scaled = np.zeros((1, 6), dtype=complex)
+                scaled[0, largest] = 100.0
+                scaled[0, component] = share * UNCARRIED_SHARE * 100.0 if largest != component else 100.0
+                wrench = Spectrum(Fraction(1), np.concatenate([0.0 * scaled, scaled * scales]))
+                if share < 1.0 and largest != component:
+                    mounting.check_carried(wrench)
+                else:
+                    with pytest.raises(UncarriedLoadError):
+                        mounting.check_carried(wrench)

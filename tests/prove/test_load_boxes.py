@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -96,3 +97,22 @@ def test_a_transmissibility_limit_takes_the_boxes_where_it_is_broken() -> None:
     broken = [ratio[(x >= a) & (x <= b)].min() > np.median(ratio) for a, b in itertools.pairwise(edges)]
     assert not np.any(np.isinf(bounds) & ~np.array(broken))
     assert np.isinf(bounds).sum() >= 5
+
+
+@pytest.mark.slow
+def test_all_boxes_are_divided_only_where_a_few_come_near() -> None:
+    """A tenth of them is looked at first: no more where that comes to less than is known."""
+    path = INPUTS / "one-stiffness-under-transmissibility.toml"
+    problem = laufruhe.load(path)
+    problem = replace(problem, search=replace(problem.search, boxes=40))
+    own = Own(tomllib.loads(path.read_text(encoding="utf-8")), 256)
+    ((low, high),) = own.box
+    designs = own.designs(np.linspace(low, high, 61)[:, None])
+    least = float(np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf).min())
+    few = load_bound(problem, least, 1e-4 * least, 2.0 * least)
+    assert few.boxes <= 10
+    assert few.bound < least * (1.0 - 1e-4)
+    for told in (0.0, 0.5 * few.bound):
+        found = load_bound(problem, least, 1e-4 * least, told)
+        assert found.boxes > few.boxes
+        assert found.bound > few.bound

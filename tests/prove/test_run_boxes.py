@@ -30,7 +30,7 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.box_dampers import pairs_of, roots
 from laufruhe.prove.mounts.box_norms import Under
 from laufruhe.prove.mounts.box_response import BoxModel
-from laufruhe.prove.mounts.box_runs import RunBoxes, bounds_runs
+from laufruhe.prove.mounts.box_runs import RunBoxes, _Look, bounds_runs
 from laufruhe.prove.mounts.run_matrices import RunMatrices
 from laufruhe.prove.mounts.run_motion import Steps, _force, equations
 from laufruhe.prove.mounts.subdivision import divided_bound
@@ -159,6 +159,27 @@ def test_a_smaller_box_has_no_worse_bound_and_is_known_to_its_cube(seed: int) ->
         assert bounds[-1] == pytest.approx(boxes.values(middle[0])[number], rel=1e-5)
         # squares are in the rest as well, as far as they are under
         assert found.rest[5] < 1.2e-2 * found.rest[4] + 1e-12 * bounds[-1]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_place_and_time_with_the_highest_bound_is_taken(seed: int) -> None:
+    """Against all places and times one by one."""
+    rng, (boxes, sides, places, times) = np.random.default_rng(seed), (3, 2, 4, 5)
+    pairs = ((0, 0), (0, 1), (1, 1))
+    size = rng.uniform(1.0, 4.0, (boxes, places, times))
+    slopes = rng.normal(size=(boxes, sides, places, times)) * rng.uniform(0.1, 2.0, (boxes, 1, places, times))
+    bent = rng.random((boxes, len(pairs), places, times))
+    rest = rng.random((boxes, places, times))
+    look = _Look.__new__(_Look)
+    look._of = SimpleNamespace(first=rng.normal(size=(boxes, sides, 2, 2)))
+    look._steps = SimpleNamespace(pairs=pairs)
+    found = look._best(size, slopes, bent, rest)
+    for box in range(boxes):
+        each = [
+            size[box, p, t] - sum(abs(slopes[box, :, p, t])) - sum(bent[box, :, p, t]) - rest[box, p, t]
+            for p in range(places) for t in range(times)
+        ]  # fmt: skip
+        assert least(found)[box] == pytest.approx(max(each), rel=1e-12)
 
 
 @pytest.mark.slow

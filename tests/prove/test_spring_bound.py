@@ -22,11 +22,12 @@ from laufruhe.prove.mounts.ranges import number_ranges
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bound
 from laufruhe.prove.springs import box
 from laufruhe.prove.springs import orders as orders_
-from laufruhe.prove.springs.bound import Multipliers, Program, Proposed
+from laufruhe.prove.springs.bound import Multipliers, Priced, Program, Proposed, pulls
 from laufruhe.prove.springs.conditions import conditions, of_stiffness
 from laufruhe.prove.springs.high_orders import HighOrder, _linear, _seen
 from laufruhe.prove.springs.lines import Felt
 from laufruhe.prove.springs.mirrored import mirrored_halves, mirrored_parts
+from laufruhe.prove.springs.modes import Shapes
 from laufruhe.prove.springs.open_mounts import OpenMounts, is_lifted, open_mounts
 from laufruhe.prove.springs.opened import own_axes
 from laufruhe.prove.springs.orders import Order
@@ -612,3 +613,30 @@ def test_forces_of_a_motion_are_linear_in_stiffness_and_not_over_what_places_all
             assert true <= over * (1.0 + 1e-9)
             assert over <= true * 1.0001 or mounts is PLACES
             assert over < 60.0 * true
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_products_that_are_not_those_of_the_means_pull(seed: int) -> None:
+    """Nothing pulls where all are; what those of s and those of w add is never taken off each other."""
+    rng, numbers, d = np.random.default_rng(seed), 3, 6
+    shapes = Shapes((), rng.normal(size=(4, 1 + numbers, d, d)), rng.normal(size=(2, 1 + numbers, d, d)))
+    found = Priced((), rng.random(4), rng.normal(size=2), np.zeros((numbers, d)), ())
+    s, z = rng.uniform(-1.0, 1.0, numbers), np.concatenate([[1.0], rng.normal(size=d - 1)])
+
+    def moments(own: float, crossed: float) -> np.ndarray:
+        plain, mixed = rng_of.normal(size=(d, d)), rng_of.normal(size=(numbers, d, d))
+        plain[0] = plain[:, 0] = 0.0
+        first = np.outer(z, z) + own * (plain + plain.T)
+        return np.concatenate([first[None], s[:, None, None] * first + crossed * (mixed + mixed.swapaxes(1, 2))])
+
+    pulled = []
+    for own, crossed in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)):
+        rng_of = np.random.default_rng(seed + 10)
+        pulled.append(pulls(shapes, found, s, moments(own, crossed)))
+    none, plain, mixed, both = pulled
+    for k in range(2):
+        assert np.all(none[k] < 1e-9)
+        np.testing.assert_allclose(both[k], plain[k] + mixed[k], rtol=1e-9, atol=1e-12)
+        assert np.all(mixed[k] > 0.0)
+    assert np.all(plain[0] < 1e-9)
+    assert np.all(plain[1] > 0.0)

@@ -28,6 +28,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import lengths
 from laufruhe.numerics.norms.norm import curvature, mean_square
 from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.problem.decision import Domain
 from laufruhe.problem.measure import Measure
 from laufruhe.prove.boxes.lead_swing import LeadSwing
 from laufruhe.prove.certificate import ROUNDING, Multipliers, minorant
@@ -132,8 +133,8 @@ class LeadBoxes:
                 tilts[:, s] += [z.ravel() @ each.reshape(z.size, -1) for each in (flat, steep)]
                 if measure.is_load:
                     rests[s] += self._left(measure, s, led, z, middle, float(half[s]))
-        cubic = float((np.abs(slopes) * self._ratios**2 * half**3).sum()) / 6.0
-        value = under.constant + self._cornered(under.gradient, slopes, tilts, half) - float(rests.sum()) - cubic
+        led = least_on_arcs(self.model.domains, self._ratios, half, under.gradient, slopes, tilts)
+        value = under.constant + led - float(rests.sum())
         at_middle = under.constant + self._least(under.gradient)
         shown = own + max(value, 0.0)
         none = value > ROUNDING * self._size(program, under.multipliers) if not program.terms else False
@@ -143,21 +144,6 @@ class LeadBoxes:
             rests + half * np.abs(slopes),
             tuple(broken),
         )
-
-    def _cornered(self, gradient: Array, slopes: Array, tilts: Array, half: Array) -> float:
-        """Least over the leads of a box of what is linear in leads and unbalances: those turn on arcs (P13)."""
-        arcs = self._ratios * half
-        if not self.model.domains:
-            return -float(np.abs(slopes) @ half)
-        if arcs.max() > WIDE:
-            return -math.inf
-        sides = [((math.cos(a), math.sin(a)), (math.cos(a), -math.sin(a)), (1.0 / math.cos(a), 0.0)) for a in arcs]
-        found = math.inf
-        for corner in itertools.product(*sides):
-            along, across = np.array(corner).T
-            by = across / self._ratios
-            found = min(found, float(by @ slopes) + self._least(gradient + (along - 1.0) @ tilts[0] + by @ tilts[1]))
-        return found
 
     @staticmethod
     def _size(program: AffineProblem, multipliers: Multipliers) -> float:
@@ -199,6 +185,30 @@ class LeadBoxes:
             most.append(curvature(own)[0])
             bends += _bends(own)
         return _Rest(math.sqrt(square), np.concatenate(most), tuple(bends))
+
+
+def least_on_arcs(
+    domains: Sequence[Domain], ratios: Array, half: Array, gradient: Array, slopes: Array, tilts: Array
+) -> float:
+    """Return a lower bound of what leads and unbalances make together in a box of leads (P13).
+
+    It is under d . slopes + x . (gradient + sum_s ((cos(n_s d_s) - 1) tilts[0, s] + sin(n_s d_s) / n_s tilts[1, s]))
+    for all leads |d_s| <= half_s [rad] and unbalances x of the domains; n_s are the ratios of the shafts.
+    """
+    if not domains:
+        return -float(np.abs(slopes) @ half)
+    arcs = ratios * half
+    if arcs.max() > WIDE:
+        return -math.inf
+    sides = [((math.cos(a), math.sin(a)), (math.cos(a), -math.sin(a)), (1.0 / math.cos(a), 0.0)) for a in arcs]
+    found = math.inf
+    for corner in itertools.product(*sides):
+        along, across = np.array(corner).T
+        by = across / ratios
+        turned = gradient + (along - 1.0) @ tilts[0] + by @ tilts[1]
+        found = min(found, float(by @ slopes) + sum(domain.least(turned) for domain in domains))
+    # d is sin(n d) / n but for the cube
+    return found - float((np.abs(slopes) * ratios**2 * half**3).sum()) / 6.0
 
 
 def _bends(signal: Spectrum) -> list[tuple[Array, Array, Array]]:
