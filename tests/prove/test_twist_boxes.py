@@ -69,6 +69,19 @@ def test_no_design_in_a_box_is_under_its_bound(name: str) -> None:
     assert min(ratio for size, ratio in tight if size == 0.001) > 0.95
 
 
+@pytest.mark.parametrize("name", CASES)
+def test_one_design_is_bounded_by_its_value(name: str) -> None:
+    """Small orders that are left out take little; one of two samples a wave adds nothing that samples may not have."""
+    problem = problem_of(name)
+    boxes = TwistBoxes(problem, evaluate(problem))
+    own = boxes.coordinates
+    for share in (0.2, 0.5, 0.8):
+        x = own.lower + share * (own.upper - own.lower)
+        (bound,), _ = boxes.bounds(x[None], x[None])
+        value = objective_value(problem, evaluate(problem, problem.design(own.decisions(x).tolist())))
+        assert -1e-12 <= 1.0 - bound / value <= 5e-7
+
+
 def test_boxes_of_a_limit_that_no_design_keeps() -> None:
     """Frequencies rise with stiffness and fall with inertia: what both ends of a box break, all of it breaks."""
     problem = problem_of("flywheel", constraints=[{"limit": "torsional frequencies", "outside": ["290 Hz", "400 Hz"]}])

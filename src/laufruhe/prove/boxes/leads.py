@@ -133,8 +133,8 @@ class LeadBoxes:
                 tilts[:, s] += [z.ravel() @ each.reshape(z.size, -1) for each in (flat, steep)]
                 if measure.is_load:
                     rests[s] += self._left(measure, s, led, z, middle, float(half[s]))
-        led = least_on_arcs(self.model.domains, self._ratios, half, under.gradient, slopes, tilts)
-        value = under.constant + led - float(rests.sum())
+        arcs = least_on_arcs(self.model.domains, self._ratios, half, under.gradient, slopes, tilts)
+        value = under.constant + arcs - float(rests.sum())
         at_middle = under.constant + self._least(under.gradient)
         shown = own + max(value, 0.0)
         none = value > ROUNDING * self._size(program, under.multipliers) if not program.terms else False

@@ -180,6 +180,8 @@ class TwistBoxes:
             size = (np.abs(np.einsum("hsd,hd->hs", flexible, torques.coefficients)) ** 2).sum(axis=1)
             kept |= size > LEAST_SHARE * size.sum()
         kept[0] = False
+        # an order with two samples a wave is read anywhere between nothing and its peak
+        kept[2 * np.arange(len(kept)) >= self._samples] = False
         orders = torques.orders[kept]
         chain = own.chain(middle)
         drives = np.zeros((len(orders), len(chain.discs) + len(chain.absorbers)), dtype=complex)
