@@ -19,7 +19,7 @@ from typing import Any, Literal
 from laufruhe.errors import ModelError
 
 GROUP = "laufruhe.extensions"
-Tables = Literal["norms", "channels", "layouts", "quantities", "study_kinds"]
+Tables = Literal["norms", "channels", "layouts", "quantities", "study_kinds", "commands"]
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,8 @@ class Extension:
         Objects of `laufruhe.files.quantities.Quantity`: decisions that several numbers of the file follow.
     study_kinds
         Subclasses of `laufruhe.studies.part.Part`.
+    commands
+        Objects of `typer.models.CommandInfo`; their modules are imported by `laufruhe --help`, so they import little.
     """
 
     name: str
@@ -52,10 +54,19 @@ class Extension:
     layouts: tuple[str, ...] = ()
     quantities: tuple[str, ...] = ()
     study_kinds: tuple[str, ...] = ()
+    commands: tuple[str, ...] = ()
 
 
-HOMES: Mapping[str, str] = {"replication": "replication"}
-"""Extension of this package that has a kind of study part, by the kind: whoever lacks it is told its name."""
+HOMES: Mapping[Tables, Mapping[str, str]] = {
+    "study_kinds": {"replication": "replication"},
+    "commands": {"page": "served_page"},
+}
+"""Extensions of this package by what they add to tables: whoever asks for it without the folder is told its name."""
+
+
+def lack(extension: str) -> tuple[str, str]:
+    """Return rule and remedy of what needs an extension of this package that is not there."""
+    return f"needs the extension '{extension}', which is not installed", "install laufruhe with all its folders"
 
 
 @cache

@@ -128,7 +128,7 @@ def test_names_of_files_cannot_command_a_screen(here: Path) -> None:
         assert "\x1b" not in page.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("command", ["check", "solve", "evaluate", "study", "explain", "trade", "page"])
+@pytest.mark.parametrize("command", ["check", "solve", "evaluate", "study", "explain", "trade"])
 def test_a_file_that_may_not_be_read_is_told_as_any_other_fault(
     here: Path, monkeypatch: pytest.MonkeyPatch, command: str
 ) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import laufruhe
-from laufruhe.extension import HOMES
+from laufruhe.extension import HOMES, Tables
 from problem_files import PROBLEMS
 
 SOURCE = Path(laufruhe.__file__).parent
@@ -40,7 +40,7 @@ def run(environment: dict[str, str], *words: str | Path) -> subprocess.Completed
 
 
 def test_every_home_is_there() -> None:
-    assert set(HOMES.values()) <= set(EXTENSIONS)
+    assert {home for homes in HOMES.values() for home in homes.values()} <= set(EXTENSIONS)
 
 
 @pytest.mark.slow
@@ -59,11 +59,13 @@ def test_the_core_runs_without_an_extension(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", HOMES)
-def test_a_file_that_needs_it_is_refused_by_its_name(kind: str, tmp_path: Path) -> None:
-    environment = without(HOMES[kind], tmp_path / "site")
-    (tmp_path / "study.toml").write_text(STUDY.format(kind), encoding="utf-8")
-    refused = run(environment, "-m", "laufruhe", "study", tmp_path / "study.toml")
+@pytest.mark.parametrize(("table", "name"), [(table, name) for table, homes in HOMES.items() for name in homes])
+def test_a_file_or_command_that_needs_it_is_refused_by_its_name(table: Tables, name: str, tmp_path: Path) -> None:
+    home = HOMES[table][name]
+    environment = without(home, tmp_path / "site")
+    (tmp_path / "study.toml").write_text(STUDY.format(name), encoding="utf-8")
+    words = {"study_kinds": ("study", tmp_path / "study.toml"), "commands": (name, PROBLEMS / f"{MAIN}.toml")}
+    refused = run(environment, "-m", "laufruhe", *words[table])
     assert refused.returncode == 2
     (line,) = refused.stderr.strip().splitlines()
-    assert f"needs the extension '{HOMES[kind]}'" in line
+    assert f"needs the extension '{home}'" in line

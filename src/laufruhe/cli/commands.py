@@ -8,12 +8,15 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from functools import cached_property
 from itertools import takewhile
 from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
+from typer.main import get_command_from_info
+from typer.models import CommandInfo
 
 from laufruhe import __version__
 from laufruhe.cli import options as o
@@ -35,18 +38,43 @@ from laufruhe.cli.screen import (
 )
 from laufruhe.cli.supervised import is_interrupted, listen, supervised
 from laufruhe.errors import refused
+from laufruhe.extension import HOMES, extended, lack
 from laufruhe.numerics.cores import ONE_THREAD
 
 
 class _Commands(TyperGroup):
-    """Says of an option of a command that it stands behind it."""
+    """Commands of the core and of extensions; an option of a command stands behind it."""
+
+    @cached_property
+    def _further(self) -> dict[str, Any]:
+        every = extended("commands", CommandInfo, app.registered_commands, _name)
+        return {
+            name: get_command_from_info(one, pretty_exceptions_short=False, rich_markup_mode=None)
+            for name, one in every.items()
+            if name not in self.commands
+        }
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands, those of extensions last."""
+        return [*super().list_commands(ctx), *self._further]
+
+    def get_command(self, ctx: Any, name: str) -> Any:
+        """Return the command of this name; those of extensions are imported for a name that the core has not."""
+        return super().get_command(ctx, name) or self._further.get(name)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the command that is typed, or name the extension that it needs."""
+        if args[0] in HOMES["commands"] and self.get_command(ctx, args[0]) is None:
+            raise refused(args[0], "", *lack(HOMES["commands"][args[0]]))
+        return super().resolve_command(ctx, args)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """As typer, which knows such an option before the command as none at all."""
         before = [arg.partition("=")[0] for arg in takewhile(lambda arg: arg.startswith("-"), args)]
         own = {option for param in self.get_params(ctx) for option in param.opts}
         for option in (option for option in before if option not in own):
-            takers = [name for name, one in self.commands.items() if any(option in param.opts for param in one.params)]
+            every = {**self.commands, **self._further}
+            takers = [name for name, one in every.items() if any(option in param.opts for param in one.params)]
             if takers:
                 command = next((word for word in args if word in takers), takers[0])
                 remedy = f"write it there, as in: laufruhe {command} ... {option}"
@@ -65,6 +93,10 @@ class _Commands(TyperGroup):
             return super().invoke(ctx)
 
 
+def _name(command: CommandInfo) -> str:
+    return command.name or getattr(command.callback, "__name__", "")
+
+
 app = typer.Typer(
     name="laufruhe",
     cls=_Commands,
@@ -78,11 +110,7 @@ app = typer.Typer(
 )
 
 
-def _example(*lines: str) -> str:
-    return "\b\n" + "\n".join([f"Example{'s' * (len(lines) > 1)}:", *(f"  {line}" for line in lines)])
-
-
-@app.command(epilog=_example("laufruhe init", "laufruhe init mine.toml --from vw-ea827-2-0"))
+@app.command(epilog=o.examples("laufruhe init", "laufruhe init mine.toml --from vw-ea827-2-0"))
 def init(
     file: o.FileArgument = Path("problem.toml"),
     name: o.FromOption = None,
@@ -97,7 +125,7 @@ def init(
         typer.echo(begun(file, name), nl=False)
 
 
-@app.command(epilog=_example("laufruhe examples", "laufruhe examples tractor-single tractor-sweeps --to mine"))
+@app.command(epilog=o.examples("laufruhe examples", "laufruhe examples tractor-single tractor-sweeps --to mine"))
 def examples(
     names: o.NamesArgument = None,
     to: o.ToOption = Path(),
@@ -109,7 +137,7 @@ def examples(
         typer.echo(copied(names, to) if names else listed(), nl=False)
 
 
-@app.command(epilog=_example("laufruhe engines", "laufruhe engines bmw-b48"))
+@app.command(epilog=o.examples("laufruhe engines", "laufruhe engines bmw-b48"))
 def engines(
     names: o.KeysArgument = None,
 ) -> None:
@@ -121,7 +149,7 @@ def engines(
 
 
 @app.command(
-    epilog=_example("laufruhe solve problem.toml", "laufruhe solve problem.toml --time-limit 60 --json result.json")
+    epilog=o.examples("laufruhe solve problem.toml", "laufruhe solve problem.toml --time-limit 60 --json result.json")
 )
 def solve(
     problem: o.ProblemArgument,
@@ -151,7 +179,7 @@ def solve(
         run(Request("solve", problem, json, out, kinds, ask, animate, tolerance, series), solved)
 
 
-@app.command(epilog=_example("laufruhe evaluate problem.toml --series --json -"))
+@app.command(epilog=o.examples("laufruhe evaluate problem.toml --series --json -"))
 def evaluate(
     problem: o.ProblemArgument,
     json: o.JsonOption = None,
@@ -175,25 +203,7 @@ def evaluate(
         run(Request("evaluate", problem, json, out, kinds, ask, animate, series=series), stated)
 
 
-@app.command(epilog=_example("laufruhe page problem.toml", "laufruhe page problem.toml --no-browser --port 8600"))
-def page(
-    problem: o.FileOnDisk,
-    port: o.PortOption = None,
-    no_browser: o.NoBrowserOption = False,
-    time_limit: o.SearchOption = 20.0,
-    ends_after: o.ForOption = None,
-) -> None:
-    """Serve a page of the problem on this machine.
-
-    Sliders for what is open, for limits, speed and load, crank and mounts; the optimum follows.
-    """
-    with exit_statuses(problem, "the page is no longer served"):
-        from laufruhe.cli.page import served
-
-        served(problem, port, time_limit, ends_after, not no_browser)
-
-
-@app.command(epilog=_example("laufruhe study tractor-sweeps.toml --jobs 4"))
+@app.command(epilog=o.examples("laufruhe study tractor-sweeps.toml --jobs 4"))
 def study(
     problem: o.StudyArgument,
     json: o.StudyJsonOption = None,
@@ -221,7 +231,7 @@ def study(
         hand_out(*found)
 
 
-@app.command(epilog=_example("laufruhe check problem.toml"))
+@app.command(epilog=o.examples("laufruhe check problem.toml"))
 def check(
     problem: o.EitherArgument,
     json: o.JsonOption = None,
@@ -242,7 +252,7 @@ def check(
         hand_out(*checked(problem))
 
 
-@app.command(epilog=_example("laufruhe explain problem.toml --tolerance 1e-2"))
+@app.command(epilog=o.examples("laufruhe explain problem.toml --tolerance 1e-2"))
 def explain(
     problem: o.ProblemArgument,
     json: o.JsonOption = None,
@@ -257,7 +267,7 @@ def explain(
         hand_out(*explained(problem, share_below_one("--tolerance", tolerance)))
 
 
-@app.command(epilog=_example("laufruhe trade problem.toml"))
+@app.command(epilog=o.examples("laufruhe trade problem.toml"))
 def trade(
     problems: o.Problems,
     json: o.JsonOption = None,

@@ -10,6 +10,11 @@ from typing import Annotated
 import typer
 
 
+def examples(*lines: str) -> str:
+    """Return what stands at the end of a command's help."""
+    return "\b\n" + "\n".join([f"Example{'s' * (len(lines) > 1)}:", *(f"  {line}" for line in lines)])
+
+
 def _completed(kinds: str) -> Callable[[str], list[str]]:
     """Names that a shell may complete: of engines, of ready problems, or both."""
 
@@ -23,8 +28,6 @@ def _completed(kinds: str) -> Callable[[str], list[str]]:
     return names
 
 
-ON_DISK = "Problem file (TOML)."
-FileOnDisk = Annotated[Path, typer.Argument(metavar="PROBLEM", help=ON_DISK, show_default=False, readable=False)]
 FILE = "Problem file (TOML); - reads standard input."
 ProblemArgument = Annotated[Path, typer.Argument(metavar="PROBLEM", help=FILE, show_default=False, readable=False)]
 EITHER = "Problem or study file (TOML); - reads standard input."
@@ -98,11 +101,3 @@ VerboseOption = Annotated[bool, typer.Option("--verbose", "-v", help=VERBOSE)]
 Problems = Annotated[
     list[Path], typer.Argument(metavar="PROBLEM...", help="Problem files.", show_default=False, readable=False)
 ]
-PORT = "Port to serve at.  [default: 8537, or one that is free]"
-PortOption = Annotated[int | None, typer.Option("--port", metavar="N", help=PORT)]
-NO_BROWSER = "Open no browser; print the address only."
-NoBrowserOption = Annotated[bool, typer.Option("--no-browser", help=NO_BROWSER)]
-SEARCH = "Seconds that a whole solve may take, once sliders rest."
-SearchOption = Annotated[float, typer.Option("--time-limit", metavar="SECONDS", help=SEARCH)]
-FOR = "End by itself after SECONDS."
-ForOption = Annotated[float | None, typer.Option("--for", metavar="SECONDS", help=FOR)]

@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from laufruhe import units
 from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, printed
-from laufruhe.extension import HOMES
+from laufruhe.extension import HOMES, lack
 from laufruhe.files.fields import FORMS, Number, Open
 from laufruhe.files.toml_text import toml_key
 
@@ -153,9 +153,8 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], home: s
     if kind in ("literal_error", "union_tag_invalid"):
         allowed = str(detail["ctx"].get("expected") or detail["ctx"].get("expected_tags"))
         value = detail["ctx"].get("tag", detail["input"])
-        if kind == "union_tag_invalid" and value in HOMES:
-            return Complaint(where, short(value), f"needs the extension '{HOMES[value]}', which is not installed",
-                             "install laufruhe with all its folders")  # fmt: skip
+        if kind == "union_tag_invalid" and value in HOMES["study_kinds"]:
+            return Complaint(where, short(value), *lack(HOMES["study_kinds"][value]))
         words = allowed.replace("' or '", "', '").replace("'", "").split(", ")
         # of two or three all are told: the nearest in letters need not be the one that is meant
         remedy = nearest(str(value), words) if len(words) > _FEW else "use one of: " + ", ".join(words)

@@ -8,11 +8,11 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from laufruhe import units
+from laufruhe.extensions.served_page.asked import CRANK, OBJECTIVE, STAR
 from laufruhe.files import edits
 from laufruhe.files.asked import SIDES, limit_name
 from laufruhe.files.complaints import Refused
 from laufruhe.problem.problem import Problem
-from laufruhe.server.asked import CRANK, OBJECTIVE, STAR
 
 _OF_ENGINE = {
     "rod_ratio": ("Rod ratio", 0.4, 1.6),

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from laufruhe.errors import InputError
+from laufruhe.extensions.served_page.asked import STAR, Edit
+from laufruhe.extensions.served_page.controls import as_typed
 from laufruhe.files.complaints import Refused
 from laufruhe.present.numbers import figure
-from laufruhe.server.asked import STAR, Edit
-from laufruhe.server.controls import as_typed
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import RankedOrder, RankedStar
 

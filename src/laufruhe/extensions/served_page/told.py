@@ -8,12 +8,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from laufruhe.extensions.served_page.claims import Claim, Kind, is_broken
 from laufruhe.present.numbers import figure, price_of
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.report.strict_json import finite
-from laufruhe.server.claims import Claim, Kind, is_broken
 from laufruhe.solvers.conclusion import decision_values
 from laufruhe.solvers.values import LimitValue
 

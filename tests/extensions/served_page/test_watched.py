@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from laufruhe.errors import InputError
-from laufruhe.server.watched import Watched
+from laufruhe.extensions.served_page.watched import Watched
 from problem_files import FOUR, MOUNTS, PROBLEMS, written
 
 TEXT = FOUR + '[[operating_points]]\nspeed = "2500 rpm"\n' + MOUNTS
-INPUTS = Path(__file__).parents[1] / "claims" / "inputs"
+INPUTS = Path(__file__).parent / "inputs"
 PATIENCE = 120.0
 
 

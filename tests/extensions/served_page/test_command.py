@@ -18,7 +18,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from laufruhe.cli import app
-from laufruhe.server.guard import TOKEN
+from laufruhe.extensions.served_page.guard import TOKEN
 from problem_files import PROBLEMS
 
 LANCHESTER = PROBLEMS / "tractor-four-lanchester.toml"

@@ -14,7 +14,7 @@ from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-from laufruhe.server.guard import HEADERS, HOST, TOKEN, Guard
+from laufruhe.extensions.served_page.guard import HEADERS, HOST, TOKEN, Guard
 
 MOST_BYTES, MOST_HEAD, MOST_AT_ONCE = 64_000, 32_000, 32
 """Bytes of a request's body and of what stands before it; connections at once."""

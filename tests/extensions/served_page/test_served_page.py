@@ -21,11 +21,13 @@ from problem_files import PROBLEMS, changed
 
 pytestmark = pytest.mark.slow
 # on a slow machine too a search is not cut short
-RUN = "import laufruhe.server.serving as own; own.FOLLOWED = 600.0; from laufruhe.cli import main; main()"
+RUN = (
+    "import laufruhe.extensions.served_page.serving as own; own.FOLLOWED = 600.0; from laufruhe.cli import main; main()"
+)
 TEXT = (PROBLEMS / "tractor-four-lanchester.toml").read_text(encoding="utf-8")
 TEXT += '\n[[constraints]]\nlimit = "maximum mount force"\nmax = "1500 N"\n'
 MASS, FORCE = "constraints.1.max", "constraints.2.max"
-INPUTS = Path(__file__).parents[1] / "claims" / "inputs"
+INPUTS = Path(__file__).parent / "inputs"
 
 
 CLAIMS = """() => {

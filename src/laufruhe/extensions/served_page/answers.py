@@ -12,6 +12,20 @@ from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
 from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, SolverError, refused
+from laufruhe.extensions.served_page import told
+from laufruhe.extensions.served_page.asked import CRANK, LATER, STAR, Asked, Edit
+from laufruhe.extensions.served_page.claims import (
+    Simpler,
+    breaks_words,
+    conflict_claim,
+    given_claim,
+    preview_claim,
+    settled_claim,
+)
+from laufruhe.extensions.served_page.controls import as_json, as_typed, controls_of, offered_by
+from laufruhe.extensions.served_page.front import Front, partners, places
+from laufruhe.extensions.served_page.held import held_by, ranking_of
+from laufruhe.extensions.served_page.scenes import scene_of
 from laufruhe.files import edits
 from laufruhe.files.complaints import in_file
 from laufruhe.files.reader import load_tables
@@ -23,13 +37,6 @@ from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report.web_page import inlined
-from laufruhe.server import told
-from laufruhe.server.asked import CRANK, LATER, STAR, Asked, Edit
-from laufruhe.server.claims import Simpler, breaks_words, conflict_claim, given_claim, preview_claim, settled_claim
-from laufruhe.server.controls import as_json, as_typed, controls_of, offered_by
-from laufruhe.server.front import Front, partners, places
-from laufruhe.server.held import held_by, ranking_of
-from laufruhe.server.scenes import scene_of
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import decision_values, limit_values
 from laufruhe.solvers.result import Result

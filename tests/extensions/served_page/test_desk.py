@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from laufruhe.server.desk import Desk, Late, Superseded
+from laufruhe.extensions.served_page.desk import Desk, Late, Superseded
 
 # nobody waits as long for what has to happen
 LONG = 600.0

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from laufruhe.extensions.served_page.following import Follower, can_follow
 from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.solvers import solve
-from laufruhe.solvers.following import Follower, can_follow
 from problem_files import PROBLEMS
 
 

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 import laufruhe
+from laufruhe.extensions.served_page import answers
+from laufruhe.extensions.served_page.answers import Source
+from laufruhe.extensions.served_page.asked import Asked, Edit
 from laufruhe.files.complaints import Refused
 from laufruhe.files.reader import load, tables_of
-from laufruhe.server import answers
-from laufruhe.server.answers import Source
-from laufruhe.server.asked import Asked, Edit
 from laufruhe.solvers.result import Status
 from problem_files import PROBLEMS
 from ready import solved

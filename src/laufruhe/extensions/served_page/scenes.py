@@ -10,6 +10,10 @@ from dataclasses import replace
 from typing import Any
 
 from laufruhe.errors import ModelError
+from laufruhe.extensions.served_page.claims import Simpler, listed
+from laufruhe.extensions.served_page.drawing import drawing_of
+from laufruhe.extensions.served_page.following import Followed, Follower, can_follow
+from laufruhe.extensions.served_page.front import partners
 from laufruhe.files.asked import EDGES
 from laufruhe.live import live_model
 from laufruhe.problem.decision import Kind
@@ -19,11 +23,7 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.tolerance import NO_TOLERANCES
-from laufruhe.server.claims import Simpler, listed
-from laufruhe.server.drawing import drawing_of
-from laufruhe.server.front import partners
 from laufruhe.solvers.conclusion import decision_values, limit_values
-from laufruhe.solvers.following import Followed, Follower, can_follow
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import LimitValue
 

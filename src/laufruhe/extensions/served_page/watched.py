@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from laufruhe.errors import InputError, refused
+from laufruhe.extensions.served_page.answers import Source
 from laufruhe.files.complaints import key_path
 from laufruhe.files.nested import texts_in
 from laufruhe.files.reader import load_tables, tables_of
-from laufruhe.server.answers import Source
 
 EVERY = 0.4
 """Seconds between two looks."""

@@ -12,9 +12,9 @@ from contextlib import closing, suppress
 
 import pytest
 
-from laufruhe.server import transport
-from laufruhe.server.guard import HEADERS, TOKEN
-from laufruhe.server.transport import MOST_AT_ONCE, MOST_BYTES, Answer, Server
+from laufruhe.extensions.served_page import transport
+from laufruhe.extensions.served_page.guard import HEADERS, TOKEN
+from laufruhe.extensions.served_page.transport import MOST_AT_ONCE, MOST_BYTES, Answer, Server
 
 SECRET = "the problem"
 PATIENCE = 60.0

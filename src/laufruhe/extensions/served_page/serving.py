@@ -15,15 +15,15 @@ from pathlib import Path
 from typing import Any, ParamSpec
 
 from laufruhe.errors import Complaint, SolverError, printed, refused
+from laufruhe.extensions.served_page import answers
+from laufruhe.extensions.served_page.asked import Asked
+from laufruhe.extensions.served_page.desk import Desk, Superseded
+from laufruhe.extensions.served_page.front import POINTS
+from laufruhe.extensions.served_page.transport import Answer, Server
+from laufruhe.extensions.served_page.watched import Watched
 from laufruhe.files.complaints import Refused
 from laufruhe.live import page_assets
 from laufruhe.present.pictures import PICTURES
-from laufruhe.server import answers
-from laufruhe.server.asked import Asked
-from laufruhe.server.desk import Desk, Superseded
-from laufruhe.server.front import POINTS
-from laufruhe.server.transport import Answer, Server
-from laufruhe.server.watched import Watched
 
 P = ParamSpec("P")
 
@@ -172,7 +172,7 @@ def _wrong(complaint: Complaint) -> Answer:
 
 def _files() -> dict[str, str]:
     """Everything that is handed out: the page's own files, and those of a live report."""
-    folder = files("laufruhe.server") / "static"
+    folder = files("laufruhe.extensions.served_page") / "static"
     own = {f.name: f.read_text(encoding="utf-8") for f in folder.iterdir() if f.name.endswith((".html", ".js", ".css"))}
     return {**own, **page_assets()}
 

@@ -8,11 +8,11 @@ from contextlib import suppress
 from dataclasses import replace
 
 from laufruhe.errors import ModelError
+from laufruhe.extensions.served_page.following import Followed, Follower, can_follow
 from laufruhe.files.complaints import Refused
 from laufruhe.files.scene import QuantityTable, Scene
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.following import Followed, Follower, can_follow
 
 POINTS = 25
 _USUAL = ("maximum mount force", "mean mount force", "rms shaking force", "rms rocking couple", "counterweight mass",

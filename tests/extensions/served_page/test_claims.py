@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 
+from laufruhe.extensions.served_page import answers, scenes
+from laufruhe.extensions.served_page.answers import Source
+from laufruhe.extensions.served_page.asked import Asked, Edit
+from laufruhe.extensions.served_page.claims import Simpler, conflict_claim, is_broken
 from laufruhe.files.reader import load, tables_of
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.server import answers
-from laufruhe.server.answers import Source
-from laufruhe.server.asked import Asked, Edit
-from laufruhe.server.claims import Simpler, conflict_claim, is_broken
 from laufruhe.solvers.values import LimitValue
 from problem_files import PROBLEMS
 
@@ -200,7 +200,7 @@ def test_no_ready_problem_claims_more_than_an_estimate_while_it_is_followed() ->
 def test_the_exact_model_is_asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The value, all limits and the drawing of a design come from one evaluation."""
     asked = []
-    monkeypatch.setattr("laufruhe.server.scenes.evaluate", lambda *given: asked.append(given) or evaluate(*given))
+    monkeypatch.setattr(scenes, "evaluate", lambda *given: asked.append(given) or evaluate(*given))
     path = INPUTS / "few-angles-below-any-design.toml"
     json.loads(answers.follow(Source(tables_of(path), path), Asked()))
     assert len(asked) == 1
