@@ -34,6 +34,8 @@ HEAVY = {
     "zarr",
 }
 LATE_ROOMS = ("", "cli")
+COMMAND = "command"
+"""Module of an extension that has its command."""
 # Modules whose objects answer for themselves: nobody outside asks which one it is.
 NORMS, CHANNELS = "laufruhe.numerics.norms", "laufruhe.problem.channels"
 LAYOUT_ROOM = "laufruhe.machine"
@@ -170,7 +172,7 @@ def late_imports(known: Trees) -> set[str]:
     return {
         f"{module} -> {name}"
         for module, tree in known.items()
-        if room(module) not in LATE_ROOMS
+        if room(module) not in LATE_ROOMS and module.rpartition(".")[2] != COMMAND
         for _, function in functions(tree)
         for node in statements(function)
         for name in imported(node, module, known)
