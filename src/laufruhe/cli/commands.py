@@ -15,7 +15,7 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 from typer.core import TyperGroup
-from typer.main import get_command_from_info
+from typer.main import get_command_from_info, get_command_name
 from typer.models import CommandInfo
 
 from laufruhe import __version__
@@ -94,7 +94,7 @@ class _Commands(TyperGroup):
 
 
 def _name(command: CommandInfo) -> str:
-    return command.name or getattr(command.callback, "__name__", "")
+    return command.name or get_command_name(command.callback.__name__)  # type: ignore[union-attr]
 
 
 app = typer.Typer(
