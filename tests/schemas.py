@@ -18,7 +18,7 @@ from pydantic import BaseModel
 from laufruhe.files import problem_file, ready
 from laufruhe.files.catalogue import KEY, engines
 from laufruhe.files.fields import ANYWHERE, without_open
-from laufruhe.files.problem_file import ProblemFile
+from laufruhe.files.problem_file import file_model
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.studies.reader import StudyFile
 
@@ -147,7 +147,7 @@ def _of(schema: Mapping[str, Any], one: Mapping[str, Any], depth: int) -> Any:
 
 def schema() -> str:
     """The schema of problem files as the models have it now."""
-    return _text(_schema(ProblemFile))
+    return _text(_schema(file_model()))
 
 
 def _schema(model: type[BaseModel], kept: Callable[[Any], Any] = lambda found: found) -> dict[str, Any]:

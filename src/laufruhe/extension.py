@@ -1,4 +1,4 @@
-"""Extensions: what they add to the tables of norms, channels, layouts, quantities and study kinds.
+"""Extensions: what they add to the tables of norms, channels, layouts, quantities, keys and study kinds.
 
 Those of this package are the folders of `laufruhe.extensions`; the core runs without each of them. Another installed
 package names an `Extension` as an entry point of the group `laufruhe.extensions`. Objects are imported when the table
@@ -19,7 +19,7 @@ from typing import Any, Literal
 from laufruhe.errors import ModelError
 
 GROUP = "laufruhe.extensions"
-Tables = Literal["norms", "channels", "layouts", "quantities", "study_kinds", "commands"]
+Tables = Literal["norms", "channels", "layouts", "quantities", "study_kinds", "commands", "keys"]
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,8 @@ class Extension:
         Subclasses of `laufruhe.studies.part.Part`.
     commands
         Objects of `typer.models.CommandInfo`; their modules are imported by `laufruhe --help`, so they import little.
+    keys
+        Objects of `laufruhe.files.problem_file.Key`: tables of a problem file.
     """
 
     name: str
@@ -55,11 +57,13 @@ class Extension:
     quantities: tuple[str, ...] = ()
     study_kinds: tuple[str, ...] = ()
     commands: tuple[str, ...] = ()
+    keys: tuple[str, ...] = ()
 
 
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {"replication": "replication"},
     "commands": {"page": "served_page"},
+    "keys": {"torsion": "torsion"},
 }
 """Extensions of this package by what they add to tables: whoever asks for it without the folder is told its name."""
 

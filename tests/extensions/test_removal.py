@@ -64,7 +64,13 @@ def test_a_file_or_command_that_needs_it_is_refused_by_its_name(table: Tables, n
     home = HOMES[table][name]
     environment = without(home, tmp_path / "site")
     (tmp_path / "study.toml").write_text(STUDY.format(name), encoding="utf-8")
-    words = {"study_kinds": ("study", tmp_path / "study.toml"), "commands": (name, PROBLEMS / f"{MAIN}.toml")}
+    problem = PROBLEMS / f"{MAIN}.toml"
+    (tmp_path / "problem.toml").write_text(f"{problem.read_text(encoding='utf-8')}\n[{name}]\n", encoding="utf-8")
+    words = {
+        "study_kinds": ("study", tmp_path / "study.toml"),
+        "commands": (name, problem),
+        "keys": ("solve", tmp_path / "problem.toml"),
+    }
     refused = run(environment, "-m", "laufruhe", *words[table])
     assert refused.returncode == 2
     (line,) = refused.stderr.strip().splitlines()

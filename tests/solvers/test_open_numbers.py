@@ -17,7 +17,7 @@ from files.test_reader import complaint_about
 from laufruhe.errors import InputError, ModelError
 from laufruhe.files.model_walk import number_at
 from laufruhe.files.nested import inside, put
-from laufruhe.files.problem_file import ProblemFile
+from laufruhe.files.problem_file import file_model
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from problem_files import PROBLEMS, changed, loaded, written
@@ -203,7 +203,7 @@ def _every_number(name: str) -> Iterator[tuple[dict[str, Any], tuple[str | int, 
     """Yield the tables of a ready problem with one number open about where it stands, and its address, for each."""
     tables = tables_of(PROBLEMS / f"{name}.toml")
     for place, node in inside(tables):
-        number = None if isinstance(node, dict | list | bool) else number_at(ProblemFile, place)
+        number = None if isinstance(node, dict | list | bool) else number_at(file_model(), place)
         match = None if number is None else re.fullmatch(r"\s*([-+.\deE]+)(\D*.*)", str(node))
         if match is not None:
             value, unit = float(match[1]), match[2] if isinstance(node, str) else ""

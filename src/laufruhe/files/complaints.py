@@ -137,6 +137,8 @@ def _home(key: str, model: type[BaseModel]) -> str:
 
 def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], home: str) -> Complaint:
     kind, where = detail["type"], key_path(loc)
+    if kind == "extra_forbidden" and len(loc) == 1 and loc[0] in HOMES["keys"]:
+        return Complaint(where, "", *lack(HOMES["keys"][str(loc[0])]))
     if kind == "extra_forbidden":
         keys = [field.alias or name for table in tables[:1] for name, field in table.model_fields.items()]
         of_unit = 'a unit stands beside its number, as in "120 mm"'

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 from laufruhe import units
 from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.nested import at, put
-from laufruhe.files.problem_file import ProblemFile
+from laufruhe.files.problem_file import extension_keys, file_model
 from laufruhe.files.rotors import name_of_unbalance
 from laufruhe.files.study_tables import keys_of
 
@@ -121,7 +121,7 @@ def keys_by_name(tables: Mapping[str, Any], name: str) -> Keys:
         found = _below(at(tables, keys), name.removeprefix(f"{label}.").split("."))
         if found is not None:
             return (*keys, *found)
-    if first in ProblemFile.model_fields and rest and (first in tables or first not in {label for label, _ in named}):
+    if first in file_model().model_fields and rest and (first in tables or first not in {label for label, _ in named}):
         parent, _, last = name.rpartition(".")
         keys = keys_of(dict(tables), parent)
         here = at(tables, keys)
@@ -150,29 +150,15 @@ def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
         yield shaft.get("name", ""), ("engine", "shafts", k)
     if "rim" in tables.get("flywheel", {}):
         yield "flywheel", ("flywheel", "rim")
-    yield from _twisting(tables.get("torsion", {}))
+    for name, key in extension_keys().items():
+        if name in tables:
+            yield from key.numbers(tables[name])
     for k, geared in enumerate(tables.get("geared_inertias", ())):
         yield geared.get("name", ""), ("geared_inertias", k)
     for k, bearing in enumerate(tables.get("main_bearings", ())):
         yield bearing.get("name", str(k + 1)), ("main_bearings", k)
     for k, place in enumerate(tables.get("mounts", {}).get("places", ())):
         yield place.get("name", str(k + 1)), ("mounts", "places", k)
-
-
-def _twisting(torsion: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
-    """Absorbers, discs, and under the name of a disc or of the crank its shaft and the first piece of that."""
-    for kind in ("absorbers", "discs"):
-        for k, told in enumerate(torsion.get(kind, ())):
-            keys: Keys = ("torsion", kind, k)
-            yield f"torsion.{told.get('name')}", keys
-            yield from _sections(f"torsion.{told.get('name')}", (*keys, "shaft"), told.get("shaft"))
-    yield from _sections("torsion.crank", ("torsion", "crank"), torsion.get("crank"))
-
-
-def _sections(label: str, keys: Keys, shaft: Mapping[str, Any] | None) -> Iterator[tuple[str, Keys]]:
-    if shaft:
-        yield from ((label, (*keys, "pieces", 0)) for _ in shaft.get("pieces", ())[:1])
-        yield label, keys
 
 
 def _below(here: Mapping[str, Any], words: list[str]) -> Keys | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Annotated
 
 from pydantic import Field
@@ -11,8 +10,7 @@ from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, one_of
 from laufruhe.files.fields import Open, Table
-from laufruhe.machine import Arms, Engine, Flywheel, Rim
-from laufruhe.physics.reduced_inertia import inertia_of_discs
+from laufruhe.machine import Arms, Flywheel, Rim
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
 
 
@@ -49,8 +47,6 @@ class FlywheelTable(Table):
 
 
 _SECTION = ("mean_diameter", "width", "height")
-# share by which the inertia of discs may differ from what is told of all that turns: numbers are written rounded
-_ROUNDED = 0.01
 
 
 def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tuple[Flywheel | None, list[Decision]]:
@@ -98,25 +94,3 @@ def _rim(table: RimTable) -> Rim:
         own = table.arms
         arms = Arms(own.count, (own.at_rim[0], own.at_rim[1]), (own.at_hub[0], own.at_hub[1]), own.hub_diameter)
     return Rim(diameter.start, width.start, height.start, table.density, table.whole, arms)
-
-
-def check_told_alike(engine: Engine, table: FlywheelTable | None, decisions: Sequence[Decision]) -> None:
-    """Refuse an inertia of all that turns that the discs of [torsion] contradict (V14)."""
-    wheel, chain = engine.flywheel, engine.torsion
-    if wheel is None or chain is None:
-        return
-    where = "flywheel" if table is not None else "fidelity.crank_inertia"
-    discs = {(disc.name, "inertia") for disc in chain.discs}
-    for own in decisions:
-        if own.kind is Kind.FLYWHEEL:
-            rule = "is open, and the discs of [torsion] tell the inertia of all that turns"
-            raise Refused(own.name, None, rule, "leave [flywheel] out, and open a disc")
-        if any(key in discs for key in own.keys(Kind.TORSION)):
-            raise Refused(where, None, f"gives an inertia that follows from {own.name}, which is open", "leave it out")
-    told, least = wheel.inertia, inertia_of_discs(chain, engine.slider_cranks)
-    most = least + sum(absorber.inertia for absorber in chain.absorbers)
-    if not least * (1.0 - _ROUNDED) <= told <= most * (1.0 + _ROUNDED):
-        of_discs = units.shown(least, "kg m^2")
-        rule = f"differs from the {of_discs} that the discs of [torsion] have without pistons and rods"
-        remedy = "leave [flywheel] out, and it follows from them" if table is not None else "let them agree"
-        raise Refused(where, units.shown(told, "kg m^2"), rule, remedy)

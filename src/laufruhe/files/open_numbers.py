@@ -14,7 +14,7 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, key_path, number_read
 from laufruhe.files.model_walk import annotations_at, number_at, tables_on
 from laufruhe.files.nested import Place, at, inside, put
-from laufruhe.files.problem_file import ProblemFile
+from laufruhe.files.problem_file import file_model
 from laufruhe.files.rotors import FACTORS
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.problem.decision import AddressDrive, Decision
@@ -53,9 +53,9 @@ def without_open(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Decis
     """Return the tables with the start of every open number that no key reads itself, and the decisions about these."""
     found, decisions = dict(tables), []
     for place, node in inside(tables):
-        if not isinstance(node, dict) or "between" not in node or not annotations_at(ProblemFile, place):
+        if not isinstance(node, dict) or "between" not in node or not annotations_at(file_model(), place):
             continue
-        number = number_at(ProblemFile, place)
+        number = number_at(file_model(), place)
         if number is not None and number.openable and not _is_fixed_there(tables, place):
             continue
         own = _read(tables, place, number, node)
@@ -66,7 +66,7 @@ def without_open(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Decis
 
 def _read(tables: Mapping[str, Any], place: Place, number: f.Number | None, node: dict[str, Any]) -> OpenNumber:
     where = key_path(place)
-    closed = [table.closed for table in tables_on(ProblemFile, place) if table.closed]
+    closed = [table.closed for table in tables_on(file_model(), place) if table.closed]
     if number is not None and number.closed:
         closed = [number.closed]
     if closed:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field
+from pydantic import Field, create_model
 
+from laufruhe.extension import extended
 from laufruhe.files import fields as f
 from laufruhe.files.asked import ConstraintTable, ObjectiveTable
 from laufruhe.files.assembly import AssemblyTable
@@ -19,6 +24,7 @@ from laufruhe.files.gas import GasTable
 from laufruhe.files.geared import GearedInertiaTable
 from laufruhe.files.load_cases import LoadCaseTable
 from laufruhe.files.mounts import BlockTable, MountsTable
+from laufruhe.files.nested import Place
 from laufruhe.files.operating_points import OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
 from laufruhe.files.quantities import QuantitiesTable
@@ -26,9 +32,52 @@ from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
 from laufruhe.files.run_up import RunUpTable
 from laufruhe.files.running_gear import RunningGearTable
 from laufruhe.files.tolerances import RobustTable, TolerancesTable
-from laufruhe.files.torsion import TorsionTable
+from laufruhe.machine.layouts import Throw
+from laufruhe.problem.problem import Problem
 
 SCHEMA = "laufruhe.schema.json"
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a problem file gives beside the table of an extension.
+
+    Attributes
+    ----------
+    file
+        All its tables.
+    throws
+        Throws of the crank.
+    folder
+        Where the file stands.
+    """
+
+    file: ProblemFile
+    throws: Sequence[Throw]
+    folder: Path
+
+
+@dataclass(frozen=True)
+class Key:
+    """A table of a problem file that an extension adds.
+
+    Attributes
+    ----------
+    name
+        Key of the table in the file.
+    annotation
+        Type of its value: a subclass of `Table`, or a list of one.
+    read
+        Return the problem with what the table adds. Engine, operating points and decisions of the core are in it;
+        objective and limits follow.
+    numbers
+        Return the labels of parts of the table in results, and the places of these parts in the file.
+    """
+
+    name: str
+    annotation: Any
+    read: Callable[[Any, Problem, Given], Problem]
+    numbers: Callable[[Any], Iterable[tuple[str, Place]]] = lambda _: ()
 
 
 class SearchTable(Table):
@@ -65,7 +114,6 @@ class ProblemFile(Table):
     load_cases: list[LoadCaseTable] = Field(default_factory=list)
     main_bearings: list[MainBearingTable] = Field(default_factory=list)
     running_gear: RunningGearTable | None = None
-    torsion: TorsionTable | None = None
     flywheel: FlywheelTable | None = None
     geared_inertias: list[GearedInertiaTable] = Field(default_factory=list)
     counterweights: list[CounterweightTable] = Field(default_factory=list)
@@ -85,3 +133,16 @@ class ProblemFile(Table):
         """What stands here that needs a single objective only."""
         given = [key for key in ("assembly", "robust") if getattr(self, key) is not None]
         return [*given, *(["fidelity.kinematics"] if self.fidelity.kinematics == "auto" else [])]
+
+
+@cache
+def extension_keys() -> Mapping[str, Key]:
+    """Return the tables that extensions add, by their names."""
+    return extended("keys", Key, ())
+
+
+@cache
+def file_model() -> type[ProblemFile]:
+    """Return the model of a problem file with the tables of extensions."""
+    added: dict[str, Any] = {key.name: (key.annotation | None, None) for key in extension_keys().values()}
+    return create_model("ProblemFile", __base__=ProblemFile, __doc__=ProblemFile.__doc__, __module__=__name__, **added)

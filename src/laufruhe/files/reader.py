@@ -24,7 +24,7 @@ from laufruhe.files.catalogue import with_catalogue
 from laufruhe.files.complaints import Refused, beside, complaints_of, in_file, key_path
 from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
 from laufruhe.files.fidelity import at_fidelity
-from laufruhe.files.flywheel import check_told_alike, flywheel_of
+from laufruhe.files.flywheel import flywheel_of
 from laufruhe.files.friction import Brake
 from laufruhe.files.gas import gas_of, needs_bore
 from laufruhe.files.geared import geared_of
@@ -35,7 +35,7 @@ from laufruhe.files.open_numbers import without_open
 from laufruhe.files.open_parts import check_factors, leads_of, piston_masses
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
-from laufruhe.files.problem_file import ProblemFile
+from laufruhe.files.problem_file import Given, ProblemFile, extension_keys, file_model
 from laufruhe.files.quantities import followed
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.run_up import run_of
@@ -44,7 +44,6 @@ from laufruhe.files.scene import Scene
 from laufruhe.files.tolerances import over_of, parted, tolerances_of, with_numbers
 from laufruhe.files.toml_depth import line_deeper_than
 from laufruhe.files.toml_faults import toml_complaint
-from laufruhe.files.torsion import torsion_of
 from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.layouts import throw_rotors
@@ -98,7 +97,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
         with in_file(path):
             plain, written = parted(tables)
             closed, numbers = without_open(plain)
-            file = ProblemFile.model_validate(followed(closed))
+            file = file_model().model_validate(followed(closed))
             problem = _of_file(file, path)
 
             def finished(own: Problem, candidate: Candidate | None) -> Problem:
@@ -115,7 +114,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
             _check_followed(problem)
             return replace(problem, origin=_Origin(tables, path))
     except ValidationError as error:
-        raise InputError(str(path), complaints_of(error, ProblemFile)) from None
+        raise InputError(str(path), complaints_of(error, file_model())) from None
     except ModelError as error:
         raise InputError(str(path), (Complaint.of(error, "engine"),)) from None
 
@@ -201,12 +200,12 @@ class _Rebuilt:
     def __call__(self, changes: Mapping[Place, str | float]) -> Drawing:
         """As built."""
         try:
-            found = _of_file(ProblemFile.model_validate(followed(with_numbers(self._plainly, changes))), self.path)
+            found = _of_file(file_model().model_validate(followed(with_numbers(self._plainly, changes))), self.path)
             if self.candidate is not None and found.phasing is not None:
                 found = found.phasing.realise(self.candidate)
         except (ValidationError, Refused, ModelError) as error:
             at = ", ".join(f"{key_path(place)} = {value}" for place, value in changes.items())
-            told = complaints_of(error, ProblemFile) if isinstance(error, ValidationError) else (error,)
+            told = complaints_of(error, file_model()) if isinstance(error, ValidationError) else (error,)
             why = " and ".join(map(str, told))
             raise ModelError(f"this engine cannot be built, {at}: {why}; narrow its bounds or tolerances") from None
         return Drawing(found.engine, found.points, found.decisions, found.mount_numbers)
@@ -308,29 +307,22 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     balancer_shafts(file.balancer_shafts, collected)
     found, cycle = mounts_of(file.mounts, file.block, path.parent), cycle_of(table)
     rotors, (wheel, of_wheel) = tuple(collected.rotors), flywheel_of(file.flywheel, file.fidelity.own("crank_inertia"))
-    chain, of_chain = torsion_of(file.torsion, cylinders, throws)
     brake = _brake(file, cylinders, cycle, path.parent)
     points = operating_points(told, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)
     run = run_of(file.run_up, found.block, found.mounts, [point.name for point in points])
     geared, of_geared = geared_of(file.geared_inertias)
     engine = Engine(
-        file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, chain, wheel, run, gear, geared,
+        file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, None, wheel, run, gear, geared,
         load_cases_of(file.load_cases, found.block),
     )  # fmt: skip
     of_sizes = _sizes(file, table, told_bearings, bearings, gear)
-    check_told_alike(engine, file.flywheel, (*of_wheel, *of_chain))
     loads = (*piston_masses(table, cylinders, file.counterweights), *leads_of(table), *collected.decisions, *of_geared)
-    scene, decisions = Scene(engine, points), (*loads, *found.decisions, *of_wheel, *of_chain, *of_sizes)
-    ranks = objectives_of(file.objective, scene, file.single)
     problem = Problem(
         name=printed(path.stem),
         title=file.title,
         engine=engine,
         points=points,
-        decisions=decisions,
-        objective=ranks[0].terms if ranks else (),
-        ranks=ranks if len(ranks) > 1 else (),
-        limits=limits_of(file.constraints, scene),
+        decisions=(*loads, *found.decisions, *of_wheel, *of_sizes),
         source=file.source,
         assumptions=(*file.assumptions, *(brake.said if brake else ())),
         tolerance=file.tolerance,
@@ -339,7 +331,20 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         fires_together=table.fires_together,
         assembly=assembly_of(file.assembly, engine, path.parent),
     )
-    return at_fidelity(replace(problem, friction=tuple(brake.tests if brake else ())), file.fidelity)
+    given = Given(file, throws, path.parent)
+    for name, key in extension_keys().items():
+        if (own := getattr(file, name)) is not None:
+            problem = key.read(own, problem, given)
+    scene = Scene(problem.engine, points)
+    ranks = objectives_of(file.objective, scene, file.single)
+    problem = replace(
+        problem,
+        objective=ranks[0].terms if ranks else (),
+        ranks=ranks if len(ranks) > 1 else (),
+        limits=limits_of(file.constraints, scene),
+        friction=tuple(brake.tests if brake else ()),
+    )
+    return at_fidelity(problem, file.fidelity)
 
 
 def _sizes(

@@ -18,7 +18,7 @@ from laufruhe.files.asked import SIDES, limit_name
 from laufruhe.files.complaints import Refused, measured, nearest
 from laufruhe.files.fields import Name, Table, refusal
 from laufruhe.files.model_walk import number_at
-from laufruhe.files.problem_file import ProblemFile
+from laufruhe.files.problem_file import file_model
 
 MOST_POINTS = 100_000
 _DIGITS = 12
@@ -149,7 +149,7 @@ def _options(here: Any) -> dict[str, Any]:
 
 def field_at(where: str) -> f.Number | None:
     """How the number at a path is read; None where text, a list or a choice stands there."""
-    return number_at(ProblemFile, parts_of(where))
+    return number_at(file_model(), parts_of(where))
 
 
 @dataclass(frozen=True)

@@ -3,25 +3,37 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
-from typing import Literal, TypeVar
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
 from pydantic import Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, blamed_on, nearest, one_of
-from laufruhe.files.fields import Name, Open, Table
+from laufruhe.files.fields import Name, Number, OneOrEach, Open, Table
+from laufruhe.files.nested import Place
+from laufruhe.files.problem_file import Given, Key
 from laufruhe.machine import CRANKSHAFT, Absorber, Disc, Section, SliderCrank, Torsion
 from laufruhe.machine.layouts import Throw
 from laufruhe.machine.torsion import STEEL, stiffness_of
-from laufruhe.physics.reduced_inertia import reduced_inertia
+from laufruhe.physics.reduced_inertia import inertia_of_discs, reduced_inertia
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
+from laufruhe.problem.problem import Problem
 
 T = TypeVar("T")
 
 # that a response over speed takes seconds for
 MOST_DISCS = 60
+# share by which the inertia of discs may differ from what is given of all that turns: numbers are written rounded
+_ROUNDED = 0.01
+Inertias: TypeAlias = Annotated[list[float], OneOrEach(Annotated[float, Number("kg m^2", least=0.0)])]
+TorsionalDamping: TypeAlias = Annotated[float, Number("N m s/rad", least=0.0)]
+TorsionalDampings: TypeAlias = Annotated[list[float], OneOrEach(TorsionalDamping)]
+OpenTorsionalStiffness: TypeAlias = Annotated[float | Open, Number("N m/rad", above=0.0, openable=True)]
+OpenTorsionalDamping: TypeAlias = Annotated[float | Open, Number("N m s/rad", least=0.0, openable=True)]
+TorsionalStiffnesses: TypeAlias = Annotated[list[float | Open], OneOrEach(OpenTorsionalStiffness)]
 
 
 class PieceTable(Table):
@@ -40,20 +52,20 @@ class SectionTable(Table):
         "Diameter of the weakest section, needed for a stress; by default that of the pieces."
     )
     bore: f.NonNegativeLength = 0.0
-    damping: f.TorsionalDamping = 0.0
+    damping: TorsionalDamping = 0.0
     loss_factor: f.LossFactor | None = None
 
 
 class ShaftTable(SectionTable):
     """A shaft between two discs: its stiffness, or what it follows from."""
 
-    stiffness: f.OpenTorsionalStiffness | None = None
+    stiffness: OpenTorsionalStiffness | None = None
 
 
 class CrankTable(SectionTable):
     """From throw to throw."""
 
-    stiffness: f.TorsionalStiffnesses | None = None
+    stiffness: TorsionalStiffnesses | None = None
 
 
 class DiscTable(Table):
@@ -62,7 +74,7 @@ class DiscTable(Table):
     name: Name
     end: Literal["front", "rear"]
     inertia: f.OpenInertia
-    damping: f.TorsionalDamping = f.told("Viscous damping against the block.", 0.0)
+    damping: TorsionalDamping = f.told("Viscous damping against the block.", 0.0)
     shaft: ShaftTable = f.needed("Shaft from this disc to the next one towards the throws.")
 
 
@@ -72,8 +84,8 @@ class AbsorberTable(Table):
     name: Name
     on: str = f.needed("Name of its disc, or throw 1, throw 2 ...")
     inertia: f.OpenInertia
-    damping: f.OpenTorsionalDamping = 0.0
-    stiffness: f.OpenTorsionalStiffness | None = None
+    damping: OpenTorsionalDamping = 0.0
+    stiffness: OpenTorsionalStiffness | None = None
     loss_factor: f.LossFactor = 0.0
     order: f.Positive | None = f.told("Order to which a pendulum is tuned.")
     damping_ratio: f.NonNegative = 0.0
@@ -82,10 +94,10 @@ class AbsorberTable(Table):
 class TorsionTable(Table):
     """Discs and shafts of the torsional system of the crankshaft."""
 
-    throw_inertia: f.Inertias = f.needed(
+    throw_inertia: Inertias = f.needed(
         "Moment of inertia of a throw: pin, webs and counterweights, without rod and piston."
     )
-    cylinder_damping: f.TorsionalDampings = f.told("Viscous damping of every throw against the block.", [0.0])
+    cylinder_damping: TorsionalDampings = f.told("Viscous damping of every throw against the block.", [0.0])
     loss_factor: f.LossFactor = f.told("Hysteretic loss factor of every shaft that has none of its own.", 0.0)
     shear_modulus: f.PositivePressure = STEEL
     speeds: f.Pair[f.Speed] | None = f.told(
@@ -111,12 +123,18 @@ class _Opened:
         return given.start
 
 
-def torsion_of(
-    table: TorsionTable | None, parts: Sequence[SliderCrank], throws: Sequence[Throw]
-) -> tuple[Torsion | None, list[Decision]]:
-    """The chain from front to rear, and what of it is decided; None where nothing is said of it."""
-    if table is None:
-        return None, []
+def _read(table: TorsionTable, problem: Problem, given: Given) -> Problem:
+    """Return the problem with the chain, and with what of it is open."""
+    chain, decisions = _chain(table, problem.engine.slider_cranks, given.throws)
+    _check_inertia(chain, decisions, problem, "fidelity.crank_inertia" if given.file.flywheel is None else "flywheel")
+    engine = replace(problem.engine, torsion=chain)
+    return replace(problem, engine=engine, decisions=(*problem.decisions, *decisions))
+
+
+def _chain(
+    table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]
+) -> tuple[Torsion, list[Decision]]:
+    """Return the chain from front to rear, and what of it is open."""
     for part in parts:
         if part.shaft != CRANKSHAFT:
             rule = f"is of one crankshaft, and {part.name} works on shaft '{part.shaft.name}'"
@@ -251,3 +269,43 @@ def _for_each(values: Sequence[T], count: int, where: str, what: str) -> list[T]
     if len(values) not in (1, count):
         raise Refused(where, None, f"has {len(values)} numbers for {count} {what}", "give one, or one for each")
     return list(values) * count if len(values) == 1 else list(values)
+
+
+def _check_inertia(chain: Torsion, decisions: Sequence[Decision], problem: Problem, where: str) -> None:
+    """Refuse an inertia of all that turns that the discs contradict (V14)."""
+    wheel = problem.engine.flywheel
+    if wheel is None:
+        return
+    discs = {(disc.name, "inertia") for disc in chain.discs}
+    for own in (*problem.decisions, *decisions):
+        if own.kind is Kind.FLYWHEEL:
+            rule = "is open, and the discs of [torsion] tell the inertia of all that turns"
+            raise Refused(own.name, None, rule, "leave [flywheel] out, and open a disc")
+        if any(key in discs for key in own.keys(Kind.TORSION)):
+            raise Refused(where, None, f"gives an inertia that follows from {own.name}, which is open", "leave it out")
+    told, least = wheel.inertia, inertia_of_discs(chain, problem.engine.slider_cranks)
+    most = least + sum(absorber.inertia for absorber in chain.absorbers)
+    if not least * (1.0 - _ROUNDED) <= told <= most * (1.0 + _ROUNDED):
+        of_discs = units.shown(least, "kg m^2")
+        rule = f"differs from the {of_discs} that the discs of [torsion] have without pistons and rods"
+        remedy = "leave [flywheel] out, and it follows from them" if where == "flywheel" else "let them agree"
+        raise Refused(where, units.shown(told, "kg m^2"), rule, remedy)
+
+
+def _numbers(table: Mapping[str, Any]) -> Iterator[tuple[str, Place]]:
+    """Yield absorbers and discs, and under the name of a disc or of the crank its shaft and the first piece of that."""
+    for kind in ("absorbers", "discs"):
+        for k, one in enumerate(table.get(kind, ())):
+            label, place = f"torsion.{one.get('name')}", ("torsion", kind, k)
+            yield label, place
+            yield from _shaft_numbers(label, (*place, "shaft"), one.get("shaft"))
+    yield from _shaft_numbers("torsion.crank", ("torsion", "crank"), table.get("crank"))
+
+
+def _shaft_numbers(label: str, place: Place, shaft: Mapping[str, Any] | None) -> Iterator[tuple[str, Place]]:
+    if shaft:
+        yield from ((label, (*place, "pieces", 0)) for _ in shaft.get("pieces", ())[:1])
+        yield label, place
+
+
+KEY = Key("torsion", TorsionTable, _read, _numbers)
