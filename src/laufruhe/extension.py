@@ -61,7 +61,7 @@ class Extension:
 
 
 HOMES: Mapping[Tables, Mapping[str, str]] = {
-    "study_kinds": {"replication": "replication"},
+    "study_kinds": {"economics": "economics", "replication": "replication"},
     "commands": {"page": "served_page"},
     "keys": {"torsion": "torsion"},
 }

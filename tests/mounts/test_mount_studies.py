@@ -104,16 +104,6 @@ def test_balancing_that_cannot_change_the_objective_is_refused(tmp_path: Path, k
         computed(path)
 
 
-def test_economics_of_a_sag_says_that_it_is_no_load(tmp_path: Path) -> None:
-    six = changed(ENGINE, ("[0, 180, 180, 0]", "[0, 120, 240, 240, 120, 0]"))
-    (tmp_path / "six.toml").write_text(six + BLOCK + MOUNTS + SAG)
-    builds = 'mass_limits = ["0 kg", "1 kg"]\n[[study.parts.builds]]\nname = "b"\nshafts = ["left"]\n'
-    more = builds + '[[study.parts.more_cylinders]]\nname = "six"\nproblem = "six.toml"\n'
-    path = study(tmp_path, "economics", more, problem=SAG + SHAFT)
-    with pytest.raises(InputError, match="objective: is static sag, which is no load, so shafts have nothing to lower"):
-        computed(path)
-
-
 def test_equal_power_does_not_rebuild_a_block_on_springs(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="the rules of equal power do not cover a block and its springs"):
         computed(study(tmp_path, "layout comparison", in_case="equal_power_to = 2"))

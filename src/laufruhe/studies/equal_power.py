@@ -45,29 +45,6 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
     )
 
 
-def check_comparable(problem: Problem, reference: Problem) -> None:
-    """`ModelError` where rebuilding by number of cylinders does not give the reference's power (eqs. 14-17)."""
-    own, other = _power_of(problem), _power_of(reference)
-    differ = [what for what in own if own[what] != other[what]]
-    if differ:
-        raise ModelError(
-            f"'{problem.name}' and '{reference.name}' differ in {' and '.join(differ)}, so their numbers of cylinders "
-            "do not tell their power; give both the same"
-        )
-
-
-def _power_of(problem: Problem) -> dict[str, object]:
-    """What the power of one cylinder hangs on."""
-    parts = problem.engine.slider_cranks
-    return {
-        "cycle": problem.engine.cycle,
-        "bore": {part.bore for part in parts},
-        "stroke": {part.crank_radius for part in parts},
-        "speed": [point.speed for point in problem.points],
-        "gas": [point.gas for point in problem.points],
-    }
-
-
 def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
     k, m = scale.length, scale.mass
     return replace(

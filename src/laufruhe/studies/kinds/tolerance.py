@@ -285,7 +285,7 @@ def verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
 
     It promises nothing where tolerances hardly move the mean mount force: engines built
     without any could not be told from nineteen of twenty built with them (W1 of
-    `laufruhe.studies.worth`).
+    docs/findings/economics.md).
     """
     found = []
     why = f"W1: under {100.0 * NEGLIGIBLE:.0f} % at 95 of 100 engines built"

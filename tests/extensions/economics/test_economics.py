@@ -1,4 +1,4 @@
-"""Fronts of shaft mass, equal power rebuilt, and which shafts are worth building."""
+"""Fronts of shaft mass, and which shafts are worth building."""
 
 from __future__ import annotations
 
@@ -12,49 +12,20 @@ import xarray as xr
 
 from laufruhe import load
 from laufruhe.errors import ModelError, SolverError
+from laufruhe.extensions.economics.part import Economics, check_comparable
+from laufruhe.extensions.economics.worth import NEXT, PLAIN, SHAFTS, Judgement, best, front, verdicts, worths
 from laufruhe.files.study_tables import CaseTable
-from laufruhe.machine.similarity import equal_power_scale
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.report.study_report import _flat
 from laufruhe.solvers import solve
-from laufruhe.studies.equal_power import at_equal_power, check_comparable
-from laufruhe.studies.kinds.economics import Economics
 from laufruhe.studies.scenes import Point, Scenes, with_shafts
-from laufruhe.studies.worth import NEXT, PLAIN, SHAFTS, Judgement, best, front, verdicts, worths
 from problem_files import PROBLEMS
 
 FOUR = PROBLEMS / "tractor-four-lanchester-and-moment.toml"
 LIMITS = (0.0, 0.5, 1.0, 2.0, 4.0)
-
-
-def test_rebuilt_engine_has_the_forces_of_eq_23() -> None:
-    """Evaluated anew, forces follow 1/z: gas and inertia alike (eq. 23)."""
-    for name in ("tractor-two.toml", "tractor-three.toml", "tractor-six.toml", "vee-six-60.toml"):
-        problem = load(PROBLEMS / name)
-        rebuilt = at_equal_power(problem, 4)
-        force = equal_power_scale(len(problem.engine.slider_cranks), 4).force
-        expected = force * objective_value(problem, evaluate(problem))
-        assert objective_value(rebuilt, evaluate(rebuilt)) == pytest.approx(expected, rel=1e-9)
-
-
-def test_rebuilt_optimum_scales_too() -> None:
-    """Bounds and gains were rebuilt with the engine, so the optimum is the same design."""
-    problem = load(PROBLEMS / "tractor-three.toml")
-    first, second = solve(problem), solve(at_equal_power(problem, 4))
-    assert first.objective is not None
-    assert second.objective is not None
-    assert second.objective.value == pytest.approx(first.objective.value * 4.0 / 3.0, rel=1e-4)
-
-
-def test_equal_power_refuses_unlike_cylinders() -> None:
-    problem = load(PROBLEMS / "tractor-two.toml")
-    a, b = problem.engine.slider_cranks
-    engine = replace(problem.engine, slider_cranks=(a, replace(b, crank_radius=0.9 * b.crank_radius)))
-    with pytest.raises(ModelError, match="bore or stroke"):
-        at_equal_power(replace(problem, engine=engine), 4)
 
 
 @pytest.mark.parametrize(("other", "what"), [("tractor-four-lanchester", "gas"), ("two-stroke-three", "cycle and gas")])
@@ -278,8 +249,3 @@ def _made_up(force: float, following: float, says: str = "") -> xr.Dataset:
             "claimed_where": ("build", [""] * 3),
         },
     )
-
-
-def test_unknown_shafts_are_refused() -> None:
-    with pytest.raises(ModelError, match="no balancer shaft"):
-        with_shafts(load(FOUR), ("third",))

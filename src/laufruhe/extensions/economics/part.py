@@ -1,4 +1,4 @@
-"""Least force against number and mass of shafts, beside engines with more cylinders at equal power (eqs. 14-23)."""
+"""The study kind `economics`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import xarray as xr
 from pydantic import Field, field_validator, model_validator
 
 from laufruhe.errors import ModelError, SolverError
+from laufruhe.extensions.economics.worth import NEXT, PLAIN, SHAFTS, FrontPoint, Judgement, front, verdicts, worths
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import nearest
 from laufruhe.files.fields import Name, Table
@@ -19,11 +20,9 @@ from laufruhe.present.numbers import percent
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.static_load import with_alternating_loads
 from laufruhe.studies import picture as p
-from laufruhe.studies.equal_power import check_comparable
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes, shafts_of
 from laufruhe.studies.text import NOTHING, Rows, Text, number, said
-from laufruhe.studies.worth import NEXT, PLAIN, SHAFTS, FrontPoint, Judgement, front, verdicts, worths
 
 SAME = 1e-4
 """Relative difference of forces below which proofs cannot tell designs apart."""
@@ -238,6 +237,28 @@ def _rebuilt(case: CaseTable, whole: Problem, scenes: Scenes) -> Point:
     with scenes.blamed(Point(case), "more_cylinders"):
         check_comparable(given, whole)
     return Point(case.model_copy(update={"equal_power_to": cylinders}), shafts=())
+
+
+def check_comparable(problem: Problem, reference: Problem) -> None:
+    """Raise `ModelError` where the number of cylinders does not tell the reference's power (eqs. 14-17)."""
+    own, other = _power_of(problem), _power_of(reference)
+    differ = [what for what in own if own[what] != other[what]]
+    if differ:
+        raise ModelError(
+            f"'{problem.name}' and '{reference.name}' differ in {' and '.join(differ)}, so their numbers of cylinders "
+            "do not tell their power; give both the same"
+        )
+
+
+def _power_of(problem: Problem) -> dict[str, object]:
+    parts = problem.engine.slider_cranks
+    return {
+        "cycle": problem.engine.cycle,
+        "bore": {part.bore for part in parts},
+        "stroke": {part.crank_radius for part in parts},
+        "speed": [point.speed for point in problem.points],
+        "gas": [point.gas for point in problem.points],
+    }
 
 
 def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
