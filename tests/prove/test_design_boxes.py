@@ -162,7 +162,20 @@ def test_multipliers_of_a_corner_that_keeps_no_limits_call_it_bad(seed: int) -> 
     tight = replace(given, limits=tuple((0.3 * most, norm) for most, norm in given.limits))
     x, multipliers = best_at(tight)
     assert any(norm.value(x) > most * 1.01 for most, norm in tight.limits)
-    assert lower_bound(tight, multipliers).value > 1.3 * tight.objective(x) > 0.0
+    # by once the value of these unbalances
+    assert lower_bound(tight, multipliers).value > 1.99 * tight.objective(x) > 0.0
+
+
+def test_a_corner_is_proven_as_closely_whatever_the_weights() -> None:
+    problem = joint(780017)
+    ((_, mounts),) = boxes_of(problem, np.random.default_rng(1), 1, 0.5)
+    given, gaps = MountedLoads(problem).at(mounts), []
+    for times in (1e-6, 1.0, 1e6):
+        weighted = replace(given, terms=tuple((times * weight, norm) for weight, norm in given.terms))
+        x, multipliers = best_at(weighted)
+        gaps.append(1.0 - lower_bound(weighted, multipliers).value / weighted.objective(x))
+    assert gaps == pytest.approx([gaps[1]] * 3, rel=1e-3)
+    assert 0.0 <= gaps[1] < 1e-5
 
 
 @pytest.mark.parametrize("seed", first_fast((780004, 780001, 780000), 2))

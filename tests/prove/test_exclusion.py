@@ -72,6 +72,18 @@ def test_the_least_excess_is_never_over_that_of_a_linear_program() -> None:
     assert np.mean(tight) > 0.8
 
 
+def test_three_limits_exclude_a_box_that_no_two_of_them_do() -> None:
+    """Every two leave a side along which both are kept; (n1 + n2) / 2 is mixed with n3 until no side is left."""
+    over, n = 0.1, np.array([[1.0, 0.0], [-1.0, 1.0], [0.0, -1.0]])
+
+    def excess(which: list[int]) -> float:
+        limits = [(np.array([over]), n[k : k + 1]) for k in which]
+        return float(BoxLines(np.zeros(1), np.zeros((1, 2)), limits).excess[0])
+
+    assert excess([0, 1, 2]) == pytest.approx(over)
+    assert all(excess(pair) < 0.0 for pair in ([0, 1], [0, 2], [1, 2]))
+
+
 @pytest.mark.parametrize("seed", first_fast([3, 1, 6], 0, 1))
 def test_no_design_of_a_box_breaks_limits_by_less(seed: int) -> None:
     """Boxes of several sizes: what is told of the largest excess is under that of every design, and near to some."""
