@@ -215,16 +215,22 @@ def lap_orders(cycle: Cycle, layout: Layout, throws: Sequence[float]) -> Iterato
     An order says no more than that a cylinder fires at its first dead centre after the one
     before it: firings that wait for a later one, or come two at once, have no order.
     """
-    cylinders = range(len(layout.positions))
-    turns = _dead_centres(layout, tuple(throws))
-    relative = [(t - turns[0]) % 1.0 for t in turns]
-    relative = [0.0 if t > 1.0 - SAME_TURN else t for t in relative]
-    laps = itertools.product(range(cycle.turns), repeat=len(relative) - 1)
-    for chosen in itertools.islice(laps, ORDERS_LOOKED_AT):
-        whole = [relative[0], *(t + lap for t, lap in zip(relative[1:], chosen, strict=True))]
-        order = sorted(cylinders, key=lambda k: whole[k])
-        if all(SAME_TURN < whole[b] - whole[a] <= 1.0 + SAME_TURN for a, b in itertools.pairwise(order)):
-            yield tuple(k + 1 for k in order)
+    turns = np.array(_dead_centres(layout, tuple(throws)))
+    relative = (turns - turns[0]) % 1.0
+    relative[relative > 1.0 - SAME_TURN] = 0.0
+    others, start, size = len(relative) - 1, 0, 64
+    looked_at = min(cycle.turns**others, ORDERS_LOOKED_AT)
+    # numbers to the base of the turns, a digit for each cylinder but the first
+    worth = np.array([min(cycle.turns**k, looked_at) for k in reversed(range(others))], dtype=np.intp)
+    while start < looked_at:
+        numbers = np.arange(start, min(start + size, looked_at))
+        whole = np.tile(relative, (len(numbers), 1))
+        whole[:, 1:] += numbers[:, None] // worth % cycle.turns
+        orders = np.argsort(whole, axis=1, kind="stable")
+        steps = np.diff(np.take_along_axis(whole, orders, axis=1), axis=1)
+        for order in orders[np.all((steps > SAME_TURN) & (steps <= 1.0 + SAME_TURN), axis=1)]:
+            yield tuple((order + 1).tolist())
+        start, size = start + size, min(2 * size, 4096)
 
 
 def intervals_of(cycle: Cycle, turns: Sequence[float]) -> tuple[float, ...]:
