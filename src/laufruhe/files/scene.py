@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Literal, TypeVar
 
@@ -13,46 +13,11 @@ from laufruhe.files.complaints import Refused, blamed_on, nearest
 from laufruhe.files.fields import Open, Table
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine.clearances import shafts_of
-from laufruhe.problem.channels import Channel, Needs
+from laufruhe.problem.channels import Channel
 from laufruhe.problem.measure import MEASURES, Measure, counted_parts, counted_rotors, radius_of
 
 T = TypeVar("T")
 Motion = Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]
-_NEEDS: Mapping[Needs, tuple[Callable[[Engine], object], str, str]] = {
-    Needs.NOTHING: (lambda _: True, "", ""),
-    Needs.MOUNTS: (lambda e: e.mounts, "needs mounts", "add [mounts], or ask for a shaking force"),
-    Needs.ELASTIC: (lambda e: e.block, "needs elastic mounts", 'add [mounts] with kind = "elastic", and [block]'),
-    Needs.BEARINGS: (lambda e: e.bearings, "needs main bearings", "list them in [[main_bearings]]"),
-    Needs.TORSION: (lambda e: e.torsion, "needs the discs and shafts of the crankshaft", "add [torsion]"),
-    Needs.DIAMETERS: (
-        lambda e: e.torsion and any(section.diameter is not None for section in e.torsion.sections),
-        "needs the diameter of a shaft",
-        "give one in [torsion]",
-    ),
-    Needs.FLYWHEEL: (
-        lambda e: e.flywheel or e.torsion,
-        "needs a flywheel",
-        "add [flywheel] with an inertia or a rim, [torsion], or fidelity.crank_inertia",
-    ),
-    Needs.ROTORS: (
-        lambda e: any(not part.has_rod for part in e.slider_cranks),
-        "needs the rotors of a rotary engine",
-        'take layout = "rotary"',
-    ),
-    Needs.RIM: (lambda e: e.flywheel and e.flywheel.rim, "needs the rim of a flywheel", "add [flywheel.rim]"),
-    Needs.RUN: (
-        lambda e: e.run,
-        "needs elastic mounts that an engine is run up on",
-        "add [run_up] and [mounts] of kind elastic",
-    ),
-    Needs.CASES: (lambda e: e.load_cases, "needs load cases", "add [[load_cases]], and [mounts] of kind elastic"),
-    Needs.ARMS: (
-        lambda e: e.flywheel and e.flywheel.rim and e.flywheel.rim.arms,
-        "needs the arms of a flywheel",
-        "add [flywheel.rim.arms]",
-    ),
-}
-"""What an engine has to have for a channel, and what is said of one that has not."""
 PLACES = {
     "mounts": "mount",
     "bearings": "main bearing",
@@ -104,9 +69,8 @@ class Scene:
             raise Refused(where, name, "is no quantity", nearest(name, list(MEASURES)))
         channel, norm = MEASURES[name]
         at, of = where.rsplit(".", 1)[0], getattr(table, "of", None)
-        has, rule, remedy = _NEEDS[channel.needs]
-        if not has(self.engine):
-            raise Refused(where, name, rule, remedy)
+        if not channel.needs.of(self.engine):
+            raise Refused(where, name, f"needs {channel.needs.what}", channel.needs.remedy)
         with blamed_on(where):
             channel.check_sizes(self.engine, self.points[0])
         self._check_stiffness(channel, name, where)

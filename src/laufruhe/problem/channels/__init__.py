@@ -37,6 +37,7 @@ from laufruhe.problem.channels.kinds import (
     LoadChannel,
     MassChannel,
     MountChannel,
+    Need,
     Needs,
     NumberChannel,
     PlaceChannel,
@@ -123,7 +124,7 @@ def _on_block(name: str, unit: str, part: slice, lever: int | None = None) -> Lo
     return LoadChannel(name, unit, signal=signal, part=part, feels_gas=lever is None, lever=lever, of_wrench=True)
 
 
-def _on_mounts(name: str, unit: str, needs: Needs, signal: Callable[[PointLoads], Spectrum | None]) -> LoadChannel:
+def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads], Spectrum | None]) -> LoadChannel:
     def found(loads: PointLoads) -> Spectrum:
         spectrum = signal(loads)
         if spectrum is None:

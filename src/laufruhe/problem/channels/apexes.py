@@ -7,7 +7,13 @@ from dataclasses import dataclass
 
 from laufruhe.machine.rotary import RotaryUnit
 from laufruhe.problem.asking import Answered, Asked
-from laufruhe.problem.channels.kinds import Needs, NumberChannel
+from laufruhe.problem.channels.kinds import Need, NumberChannel
+
+ROTORS = Need(
+    lambda engine: any(not part.has_rod for part in engine.slider_cranks),
+    "the rotors of a rotary engine",
+    'take layout = "rotary"',
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -15,7 +21,7 @@ class ApexChannel(NumberChannel):
     """The most of any apex at the operating points that count."""
 
     keys: tuple[str, ...] = ("operating_points",)
-    needs: Needs = Needs.ROTORS
+    needs: Need = ROTORS
     minimised: bool = False
     of_loads: bool = False
 

@@ -9,7 +9,7 @@ from laufruhe.machine import Flywheel
 from laufruhe.physics.irregularity import Swing, swing_of
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.problem.asking import Answered, Asked
-from laufruhe.problem.channels.kinds import Needs, NumberChannel, OfWheel
+from laufruhe.problem.channels.kinds import Need, Needs, NumberChannel, OfWheel
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +21,7 @@ class FlywheelChannel(NumberChannel):
 
 def _found(
     name: str, unit: str, number: Callable[[Flywheel, Swing], float], keys: tuple[str, ...] = (),
-    needs: Needs = Needs.FLYWHEEL, rises: bool = True, of_torque: bool = False,
+    needs: Need = Needs.FLYWHEEL, rises: bool = True, of_torque: bool = False,
 ) -> FlywheelChannel:  # fmt: skip
     """The largest of a number of the flywheel over the operating points that count."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
-from enum import StrEnum
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -43,21 +42,51 @@ def of_what_moves(name: str, signal: Callable[[Engine, PointLoads], Spectrum]) -
     return found
 
 
-class Needs(StrEnum):
-    """What an engine must have before a channel means anything."""
+@dataclass(frozen=True, eq=False)
+class Need:
+    """What an engine must have before a channel means anything.
 
-    NOTHING = ""
-    MOUNTS = "mounts"
-    ELASTIC = "elastic mounts"
-    BEARINGS = "main bearings"
-    TORSION = "discs and shafts of the crankshaft"
-    DIAMETERS = "a shaft with a diameter"
-    FLYWHEEL = "flywheel"
-    RIM = "rim"
-    ARMS = "arms"
-    RUN = "run-up"
-    CASES = "load cases"
-    ROTORS = "rotors of a rotary engine"
+    Attributes
+    ----------
+    of
+        Return this part of an engine; what is false is not there.
+    what, remedy
+        As a file without it is told.
+    """
+
+    of: Callable[[Engine], object]
+    what: str
+    remedy: str
+
+
+class Needs:
+    """What channels of the core need."""
+
+    NOTHING = Need(lambda _: True, "", "")
+    MOUNTS = Need(lambda e: e.mounts, "mounts", "add [mounts], or ask for a shaking force")
+    ELASTIC = Need(lambda e: e.block, "elastic mounts", 'add [mounts] with kind = "elastic", and [block]')
+    BEARINGS = Need(lambda e: e.bearings, "main bearings", "list them in [[main_bearings]]")
+    TORSION = Need(lambda e: e.torsion, "the discs and shafts of the crankshaft", "add [torsion]")
+    DIAMETERS = Need(
+        lambda e: e.torsion and any(section.diameter is not None for section in e.torsion.sections),
+        "the diameter of a shaft",
+        "give one in [torsion]",
+    )
+    FLYWHEEL = Need(
+        lambda e: e.flywheel or e.torsion,
+        "a flywheel",
+        "add [flywheel] with an inertia or a rim, [torsion], or fidelity.crank_inertia",
+    )
+    RIM = Need(lambda e: e.flywheel and e.flywheel.rim, "the rim of a flywheel", "add [flywheel.rim]")
+    ARMS = Need(
+        lambda e: e.flywheel and e.flywheel.rim and e.flywheel.rim.arms,
+        "the arms of a flywheel",
+        "add [flywheel.rim.arms]",
+    )
+    RUN = Need(
+        lambda e: e.run, "elastic mounts that an engine is run up on", "add [run_up] and [mounts] of kind elastic"
+    )
+    CASES = Need(lambda e: e.load_cases, "load cases", "add [[load_cases]], and [mounts] of kind elastic")
 
 
 _KNOWN: dict[str, Channel] = {}
@@ -117,7 +146,7 @@ class Channel:
     name: str
     unit: str
     keys: tuple[str, ...] = ()
-    needs: Needs = Needs.NOTHING
+    needs: Need = Needs.NOTHING
     sides: tuple[str, ...] = ("max",)
     minimised: bool = True
     size: Callable[[Engine], float] = lambda _: 0.0
@@ -243,7 +272,7 @@ class TwistChannel(LoadChannel):
     """A load that makes the crankshaft twist: of when every cylinder fires, and of no unbalance."""
 
     keys: tuple[str, ...] = AT_SECTIONS
-    needs: Needs = Needs.TORSION
+    needs: Need = Needs.TORSION
     feels_unbalances: ClassVar[bool] = False
 
 
@@ -281,7 +310,7 @@ class SizeChannel(NumberChannel):
 class MountChannel(NumberChannel):
     """A block on its mounts."""
 
-    needs: Needs = Needs.ELASTIC
+    needs: Need = Needs.ELASTIC
     is_mounting: ClassVar[bool] = True
 
 
@@ -289,7 +318,7 @@ class MountChannel(NumberChannel):
 class TorsionChannel(NumberChannel):
     """Numbers of the discs and shafts of the crankshaft."""
 
-    needs: Needs = Needs.TORSION
+    needs: Need = Needs.TORSION
     minimised: bool = False
 
 

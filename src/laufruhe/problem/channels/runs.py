@@ -11,14 +11,14 @@ from laufruhe.physics.linear_run import Response
 from laufruhe.physics.run_up import RunUp
 from laufruhe.physics.runs import point_of, runs_of
 from laufruhe.problem.asking import Answered, Asked
-from laufruhe.problem.channels.kinds import Needs, NumberChannel
+from laufruhe.problem.channels.kinds import Need, Needs, NumberChannel
 
 
 @dataclass(frozen=True, eq=False)
 class RunChannel(NumberChannel):
     """The most of a number in run-up and shut-down, integrated in time."""
 
-    needs: Needs = Needs.RUN
+    needs: Need = Needs.RUN
     of_loads: bool = False
     is_checked: ClassVar[bool] = True
 

@@ -18,6 +18,7 @@ from laufruhe.problem.channels.kinds import (
     IN_CYLINDERS,
     OF_BEARINGS,
     LoadChannel,
+    Need,
     Needs,
     SizeChannel,
     of_what_moves,
@@ -37,7 +38,7 @@ def _names_of_sides(engine: Engine) -> Sequence[str]:
     return [f"{part.name} {side}" for part in engine.slider_cranks for side in ("front", "rear")]
 
 
-Where: TypeAlias = tuple[tuple[str, ...], Needs, Callable[[Engine], Sequence[str]]]
+Where: TypeAlias = tuple[tuple[str, ...], Need, Callable[[Engine], Sequence[str]]]
 """Keys that narrow a load, what it needs, and the names of its places."""
 IN_EACH_CYLINDER: Where = (IN_CYLINDERS, Needs.NOTHING, _names_of_cylinders)
 AT_EACH_CRANK_PIN: Where = (AT_CYLINDERS, Needs.NOTHING, _names_of_cylinders)
@@ -69,7 +70,7 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spect
 
 
 def _number(
-    name: str, unit: str, needs: Needs, sides: tuple[str, ...], of_engine: Callable[[Engine], float]
+    name: str, unit: str, needs: Need, sides: tuple[str, ...], of_engine: Callable[[Engine], float]
 ) -> SizeChannel:
     def values(_: Asked, evaluation: Answered) -> Sequence[float]:
         return (of_engine(evaluation.engine),)

@@ -9,7 +9,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics import torsion
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.asking import Answered, Asked
-from laufruhe.problem.channels.kinds import Needs, TorsionChannel, TwistChannel, of_what_moves
+from laufruhe.problem.channels.kinds import Need, Needs, TorsionChannel, TwistChannel, of_what_moves
 from laufruhe.problem.loads import PointLoads
 
 HIGHEST = 12.0
@@ -26,7 +26,7 @@ def _names_of_stressed(engine: Engine) -> Sequence[str]:
 
 def _of_shafts(
     name: str, unit: str, signal: Callable[[Engine, OperatingPoint, Fidelity], Spectrum], factors: torsion.Factors,
-    places: Callable[[Engine], Sequence[str]] = _names_of_sections, needs: Needs = Needs.TORSION,
+    places: Callable[[Engine], Sequence[str]] = _names_of_sections, needs: Need = Needs.TORSION,
 ) -> TwistChannel:  # fmt: skip
     found = of_what_moves(
         name, lambda moving, at: signal(moving, at.point, at.fidelity).each(lambda values: values[:, :, None])
