@@ -19,7 +19,7 @@ from typing import Any, Literal
 from laufruhe.errors import ModelError
 
 GROUP = "laufruhe.extensions"
-Tables = Literal["norms", "channels", "layouts", "quantities", "study_kinds", "commands", "keys"]
+Tables = Literal["norms", "channels", "layouts", "quantities", "study_kinds", "commands", "keys", "reductions"]
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,8 @@ class Extension:
         Objects of `laufruhe.machine.layouts.LayoutKind`.
     quantities
         Objects of `laufruhe.files.quantities.Quantity`: decisions that several numbers of the file follow.
+    reductions
+        Objects of `laufruhe.solvers.methods.Reduction`, each with the one that it stands before.
     study_kinds
         Subclasses of `laufruhe.studies.part.Part`.
     commands
@@ -55,13 +57,14 @@ class Extension:
     dependences: tuple[str, ...] = ()
     layouts: tuple[str, ...] = ()
     quantities: tuple[str, ...] = ()
+    reductions: tuple[str, ...] = ()
     study_kinds: tuple[str, ...] = ()
     commands: tuple[str, ...] = ()
     keys: tuple[str, ...] = ()
 
 
 HOMES: Mapping[Tables, Mapping[str, str]] = {
-    "study_kinds": {"economics": "economics", "replication": "replication"},
+    "study_kinds": {"economics": "economics", "replication": "replication", "tolerance": "robust"},
     "commands": {"page": "served_page"},
     "keys": {"torsion": "torsion"},
 }

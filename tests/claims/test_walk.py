@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,7 +23,6 @@ from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import MEASURES, Measure
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import Over
 from laufruhe.prove.certificate import Certificate, Proof
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve, walk
@@ -33,7 +30,6 @@ from laufruhe.solvers.conclusion import decision_values, state
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.conclusion import with_star
 from laufruhe.solvers.stars.ranking import candidates_of, ranked_star, ranking_result
-from laufruhe.solvers.tolerances import assembly
 from problem_files import PROBLEMS
 from ready import solved
 
@@ -165,35 +161,6 @@ def test_throws_are_walked_from_the_star_that_is_told_and_from_no_other() -> Non
         start = walk._start(without)
         assert start.candidate is None
         assert walk._Walk(without, start)._angles() == walk._Walk(without, start)._stars() == []
-
-
-@pytest.fixture
-def pruned_assemblies(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Parts of the assemblies that may hold a better one are left out, and the others are kept."""
-    right = assembly._Search.parts
-
-    def turned(self: Any, taken: Any) -> Iterator[Any]:
-        for part in right(self, taken):
-            yield Over(self.enough) if isinstance(part, tuple) and part[0] < self.enough else part
-
-    monkeypatch.setattr(assembly._Search, "parts", turned)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("pruned_assemblies")
-def test_an_assembly_that_was_pruned_is_found_out() -> None:
-    found = solve(load(PROBLEMS / "selective-assembly.toml"))
-    best = solved("selective-assembly")
-    assert best.objective is not None
-    assert is_withheld(found, best.objective.value)
-    assert found.assembly is not None
-    # the places told are those of the design
-    chosen = tuple(zip(*([p - 1 for p in place.parts] for place in found.assembly.places), strict=True))
-    assert found.problem.assembly is not None
-    engine = assembly.assembled(found.problem.engine, found.problem.assembly.lots, chosen)
-    value = objective_value(found.problem, evaluate(found.problem, engine))
-    assert found.objective is not None
-    assert value == pytest.approx(found.objective.value, rel=1e-12)
 
 
 # --- channels and norms that nobody knows

@@ -58,6 +58,6 @@ def test_no_ready_problem_is_refused_or_left_without_a_bound() -> None:
     for path in READY:
         problem = laufruhe.load(path)
         refuse(problem)
-        if problem.assembly is None and "number" not in {d.kind.name.lower() for d in problem.decisions}:
+        if not problem.extras and "number" not in {d.kind.name.lower() for d in problem.decisions}:
             chosen = next(method for method in METHODS if method.suits(problem))
             assert chosen is not METHODS[-1], path.stem

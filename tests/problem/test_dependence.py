@@ -39,7 +39,7 @@ def _random(problem: Problem, rng: np.random.Generator) -> Problem:
     points = tuple(replace(point, speed=point.speed * float(rng.uniform(0.7, 1.1))) for point in problem.points)
     fidelity = replace(problem.fidelity, samples=360)
     found = replace(problem, engine=replace(engine, rotors=rotors), points=points, fidelity=fidelity)
-    return replace(found, ranks=(), over=None, assembly=None)
+    return replace(found, ranks=(), extras=())
 
 
 def _values(decision: Decision, shares: np.ndarray) -> complex | float:

@@ -11,12 +11,12 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 from laufruhe.errors import InputError
+from laufruhe.extensions.robust.study import verdicts
 from laufruhe.plots.picture import draw
 from laufruhe.report.document import Document
 from laufruhe.report.study_report import told as blocks_of
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.free_forces import printed_agree
-from laufruhe.studies.kinds.tolerance import verdicts
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
 from problem_files import PROBLEMS, written

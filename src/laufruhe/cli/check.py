@@ -22,7 +22,7 @@ def checked(path: Path) -> tuple[str, Callable[[], str]]:
     """What a problem leaves open, and what makes JSON of the design as given."""
     problem = load(path)
     doubt(problem, path)
-    drawing = problem if problem.over is None else problem.changed(over=None)
+    drawing = problem.drawing
     # a load that no mount carries, or a gas cycle that cannot be met, shows only here
     given = evaluate_start(drawing)
     objective_value(drawing, given)

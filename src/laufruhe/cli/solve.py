@@ -69,8 +69,8 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         copy = json_file(request.json, [request.problem], places)
         open_numbers = len(problem.decisions)
         what = "stars and firing orders" if problem.phasing is not None else counted(open_numbers, "open number")
-        what = "which parts go where" if problem.assembly else what
-        say(f"deciding {what}" if open_numbers or problem.phasing is not None or problem.assembly else "evaluating")
+        what = " and ".join(name for extra in problem.extras for name in extra.open_names) or what
+        say(f"deciding {what}" if problem.open_names else "evaluating")
         result = answer(problem, Watched(say, problem.objective_unit or ""))
         drawn = drawing(request.ask, result, stage, request.kinds)
         # what writes is imported while pictures are drawn

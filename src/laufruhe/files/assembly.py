@@ -24,10 +24,10 @@ class AssemblyTable(Table):
     mass_unit: str = f.told("Unit of the masses in these files.", "g")
 
 
-def assembly_of(table: AssemblyTable | None, engine: Engine, folder: Path) -> Assembly | None:
-    """Lots of the files beside the problem file."""
+def assembly_of(table: AssemblyTable | None, engine: Engine, folder: Path) -> tuple[Assembly, ...]:
+    """Return the lots of the files beside the problem file."""
     if table is None:
-        return None
+        return ()
     unit = measured(f"1 {table.mass_unit}", "kg", "assembly.mass_unit", table.mass_unit)
     lots = []
     for key, columns in COLUMNS.items():
@@ -50,4 +50,4 @@ def assembly_of(table: AssemblyTable | None, engine: Engine, folder: Path) -> As
         if type(part) is not SliderCrank or least <= 0.0:
             rule = "needs plain cylinders whose reciprocating mass is above all differences of the parts"
             raise Refused("assembly", None, rule, "correct the masses, or leave it out")
-    return Assembly(tuple(lots))
+    return (Assembly(tuple(lots)),)

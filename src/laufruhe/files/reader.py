@@ -49,10 +49,11 @@ from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.machine.running_gear import RunningGear
 from laufruhe.problem.decision import Decision
+from laufruhe.problem.drawing import Drawing
+from laufruhe.problem.drawing import Path as Place
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem, Search
-from laufruhe.problem.tolerance import Drawing, Tolerances
-from laufruhe.problem.tolerance import Path as Place
+from laufruhe.problem.tolerance import Robust, Tolerances
 
 DEEPEST, MOST_ENTRIES, MOST_BYTES = 16, 1000, 1_000_000
 """Of a file: tables within tables, entries of one list or table, and bytes."""
@@ -103,10 +104,9 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
             def finished(own: Problem, candidate: Candidate | None) -> Problem:
                 rebuild = _Rebuilt(closed, path, candidate)
                 each = tolerances_of(written, file.tolerances, own, closed)
-                return replace(
-                    own, decisions=(*own.decisions, *numbers), rebuild=rebuild, tolerances=Tolerances(each, rebuild),
-                    over=over_of(file.robust, each),
-                )  # fmt: skip
+                over = over_of(file.robust, each)
+                extras = own.extras if over is None else (*own.extras, Robust(Tolerances(each), over))
+                return replace(own, decisions=(*own.decisions, *numbers), rebuild=rebuild, extras=extras)
 
             if numbers or written or file.tolerances is not None or file.robust is not None:
                 problem = _of_every_star(problem, finished)
@@ -329,7 +329,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         mount_numbers=found.numbers,
         search=Search(**file.search.model_dump()),
         fires_together=table.fires_together,
-        assembly=assembly_of(file.assembly, engine, path.parent),
+        extras=assembly_of(file.assembly, engine, path.parent),
     )
     given = Given(file, throws, path.parent)
     for name, key in extension_keys().items():

@@ -18,6 +18,7 @@ from laufruhe.files.nested import put
 from laufruhe.files.rotors import name_of_unbalance
 from laufruhe.machine import Engine, Rotor
 from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
+from laufruhe.problem.drawing import Path
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.tolerance import (
     AddedDrive,
@@ -26,7 +27,6 @@ from laufruhe.problem.tolerance import (
     FileDrive,
     Law,
     Over,
-    Path,
     PistonDrive,
     Scope,
     ShareDrive,

@@ -57,7 +57,7 @@ def live_model(problem: Problem, result: Result, is_served: bool = False) -> Liv
     file = f"{problem.name}.toml"
     bare = LiveModel(
         problem.name, problem.title, file, tuple(point.name for point in problem.points), problem.engine.cycle.turns,
-        objective=replace(result.problem, over=None).objective_name, unit=result.problem.objective_unit or "",
+        objective=result.problem.drawing.objective_name, unit=result.problem.objective_unit or "",
     )  # fmt: skip
     values = decided(result.problem, {entry.name: entry.value for entry in result.decisions})
     how = HERE if is_served else HOW.format(file=file)
@@ -89,7 +89,7 @@ def _moving(problem: Problem, values: Mapping[str, Value]) -> Problem:
     """The drawing, all but what loads are affine in fixed as it was decided."""
     fixed = [decision for decision in problem.decisions if not decision.is_affine]
     held = problem.held([values[decision.name] for decision in fixed], fixed)
-    return replace(held, phasing=None, over=None)
+    return replace(held, phasing=None, extras=())
 
 
 def _filled(
@@ -222,7 +222,7 @@ def _design(name: str, x: Array, moving: Problem, domains: Sequence[Domain], ask
 
 def _reference(result: Result) -> Reference | None:
     """Return what the objective is compared with as it is shown; None where another one was bounded."""
-    if result.problem.over is not None or not result.decisions:
+    if result.problem.extras or not result.decisions:
         return None
     certificate, objective = result.certificate, result.objective
     if certificate is None or objective is None or certificate.kind is Proof.NONE:
@@ -240,7 +240,6 @@ def _still(problem: Problem, how: str) -> Iterator[tuple[str, str]]:
     for decision in problem.decisions:
         if not decision.is_affine:
             yield decision.name, f"no slider here, because forces do not follow in proportion; {how}"
-    lots = problem.assembly.lots if problem.assembly is not None else ()
-    yield from ((f"the {lot.kind} of every cylinder", "parts are chosen and not slid") for lot in lots)
-    if problem.over is not None:
-        yield problem.objective_name, "shown of the drawing, without its tolerances, so no optimum stands beside it"
+    for extra in problem.extras:
+        why = f"shown of the drawing, without {extra.words}, so no optimum stands beside it"
+        yield from ((name, why) for name in extra.open_names or (problem.objective_name,))

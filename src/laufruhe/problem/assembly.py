@@ -5,11 +5,13 @@ from __future__ import annotations
 import cmath
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
+from laufruhe.problem.extra import Extra
 from laufruhe.problem.tolerance import AddedDrive
 
 Chosen = tuple[tuple[int, ...], ...]
@@ -39,10 +41,16 @@ class Lot:
 
 
 @dataclass(frozen=True)
-class Assembly:
+class Assembly(Extra):
     """Lots of parts, of each of which every cylinder takes one."""
 
     lots: tuple[Lot, ...]
+    words: ClassVar[str] = "the choice of parts"
+
+    @property
+    def open_names(self) -> tuple[str, ...]:
+        """Names of what is chosen."""
+        return tuple(f"the {lot.kind} of every cylinder" for lot in self.lots)
 
 
 def assembled(engine: Engine, lots: Sequence[Lot], chosen: Chosen) -> Engine:

@@ -6,7 +6,7 @@ import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias
+from typing import Any, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +15,15 @@ from laufruhe.errors import Complaint, ModelError, counted, wrong_call
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.willans import FrictionTest
-from laufruhe.problem.assembly import Assembly
 from laufruhe.problem.decision import Decision, Kind, Numbers, moved_numbers
+from laufruhe.problem.drawing import Beside, Rebuild, no_file
+from laufruhe.problem.extra import Extra
 from laufruhe.problem.measure import Limit, Measure, Rank, Term
 from laufruhe.problem.phasing import PhasingOf
 from laufruhe.problem.plausibility import doubts
 from laufruhe.problem.sets import Value
-from laufruhe.problem.tolerance import NO_TOLERANCES, Beside, Drawing, Over, Rebuild, Tolerances, no_file
+
+E = TypeVar("E", bound=Extra)
 
 
 @dataclass(frozen=True)
@@ -111,12 +113,8 @@ class Problem:
         How searches go about what is not convex.
     phasing
         What of throws, firing order and the choice of shafts is open; None if nothing is.
-    tolerances
-        How far built engines stand from the drawing.
-    over
-        Of which of them what is minimised and limited is taken; None for the drawing.
-    assembly
-        Measured parts to choose among for every cylinder.
+    extras
+        What extensions ask beyond the drawing, one of a class.
     ranks
         All objectives in order where there are several, `objective` the first of them; else none.
     origin
@@ -145,9 +143,7 @@ class Problem:
     mount_numbers: tuple[tuple[float, ...], ...] = ()
     search: Search = Search()
     phasing: Phasing | None = None
-    tolerances: Tolerances = NO_TOLERANCES
-    over: Over | None = None
-    assembly: Assembly | None = None
+    extras: tuple[Extra, ...] = ()
     origin: Origin | None = field(default=None, compare=False, repr=False)
     sharply: bool = False
     ranks: tuple[Rank, ...] = ()
@@ -169,10 +165,23 @@ class Problem:
         numbers = {"mount": engine.mounts, "operating point": self.points, "limit": self.limits}
         parts = [self.name, counted(len(engine.cylinders), "cylinder"), str(engine.cycle)]
         parts += [counted(len(each), name) for name, each in numbers.items()]
-        names = list(self.phasing.open_names) if self.phasing is not None else []
-        names += [decision.name + (" and angle" if decision.set.width > 1 else "") for decision in self.decisions]
-        names += [f"the {lot.kind} of every cylinder" for lot in self.assembly.lots] if self.assembly else []
-        return ", ".join(parts) + "; open: " + (", ".join(names) or "nothing")
+        return ", ".join(parts) + "; open: " + (", ".join(self.open_names) or "nothing")
+
+    @property
+    def open_names(self) -> tuple[str, ...]:
+        """Names of what is open."""
+        names = self.phasing.open_names if self.phasing is not None else ()
+        numbers = (decision.name + (" and angle" if decision.set.width > 1 else "") for decision in self.decisions)
+        return (*names, *numbers, *(name for extra in self.extras for name in extra.open_names))
+
+    def extra(self, kind: type[E]) -> E | None:
+        """Return what an extension asks of a class; None where it asks nothing."""
+        return next((one for one in self.extras if isinstance(one, kind)), None)
+
+    @property
+    def drawing(self) -> Problem:
+        """The problem without what extensions ask beyond it."""
+        return self.changed(extras=()) if self.extras else self
 
     @property
     def doubts(self) -> tuple[Complaint, ...]:
@@ -264,9 +273,9 @@ class Problem:
         name = " + ".join(f"{term.weight:g} x {term.measure.name}" for term in terms)
         if len(terms) == 1 and terms[0].weight == 1.0:
             name = terms[0].measure.name
-        if self.over is None or not terms:
-            return name
-        return self.over.named(name, self.tolerances.is_affine)
+        for extra in self.extras if terms else ():
+            name = extra.objective_name(name)
+        return name
 
     @property
     def objective_unit(self) -> str | None:
@@ -326,18 +335,6 @@ class Problem:
         """The same problem at another fidelity."""
         return self.changed(fidelity=fidelity)
 
-    def built(self, errors: Any) -> Problem:
-        """The problem of engines with these errors, shape (columns,), none of which is left to chance (R2)."""
-        numbers = [decision.name for decision in self.decisions if decision.address_drives]
-        if numbers:
-            raise ModelError(f"tolerances are of one drawing, and {', '.join(numbers)} is open; fix it first")
-        given = Drawing(self.engine, self.points, self.decisions, self.mount_numbers)
-        found = self.tolerances.built(given, errors)
-        return replace(
-            self, engine=found.engine, points=found.points, decisions=found.decisions,
-            mount_numbers=found.mount_numbers, tolerances=NO_TOLERANCES, over=None,
-        )  # fmt: skip
-
     def held(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Problem:
         """Return the problem with decisions, all of them unless some are named, held at these values.
 
@@ -376,10 +373,9 @@ class Problem:
         # measures know operating points by name, and a name may be the speed that is open
         points = tuple(replace(new, name=own.name) for new, own in zip(found.points, self.points, strict=True))
         decisions = tuple(d if d.address_drives else replace(known[d.name], set=d.set) for d in self.decisions)
-        tolerances = replace(self.tolerances, rebuild=Beside(self.tolerances.rebuild, changes))
         return replace(
             self, engine=found.engine, points=points, mount_numbers=found.mount_numbers, decisions=decisions,
-            rebuild=Beside(self.rebuild, changes), tolerances=tolerances,
+            rebuild=Beside(self.rebuild, changes),
         )  # fmt: skip
 
     def design(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Engine:

@@ -7,21 +7,20 @@ evaluates, bounds or decides a drawing does the same for a built engine (R2).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 from itertools import pairwise
-from typing import ClassVar, Protocol, TypeAlias
+from typing import ClassVar, Protocol
 
 import numpy as np
 
-from laufruhe.errors import ModelError
-from laufruhe.machine import CRANKSHAFT, Engine, OperatingPoint, Role, Rotor, Shaft
+from laufruhe.machine import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.decision import Decision, RotorDrive
-
-Path: TypeAlias = tuple[str | int, ...]
+from laufruhe.problem.decision import RotorDrive
+from laufruhe.problem.drawing import Drawing, Path, Rebuild, no_file
+from laufruhe.problem.extra import Extra
+from laufruhe.problem.problem import Problem
 
 SIGMAS = 3.0
 """Standard deviations of a normal law that the tolerance is; what lies beyond is not built in."""
@@ -39,32 +38,6 @@ class Scope(StrEnum):
 
     PIECE = "piece"
     BATCH = "batch"
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """What of a problem errors move."""
-
-    engine: Engine
-    points: tuple[OperatingPoint, ...]
-    decisions: tuple[Decision, ...]
-    mount_numbers: tuple[tuple[float, ...], ...]
-
-
-Rebuild: TypeAlias = Callable[[Mapping[Path, str | float]], Drawing]
-"""The drawing of a problem file with other numbers at some of its places."""
-
-
-@dataclass(frozen=True)
-class Beside:
-    """A rebuild in which some numbers stand at other values already."""
-
-    rebuild: Rebuild
-    changes: Mapping[Path, str | float]
-
-    def __call__(self, changes: Mapping[Path, str | float]) -> Drawing:
-        """Return the drawing with further numbers changed."""
-        return self.rebuild({**self.changes, **changes})
 
 
 class ErrorDrive(Protocol):
@@ -265,11 +238,6 @@ class Over:
         return f"{measure}, worst case" if is_affine else f"{measure}, worst of {self.engines} drawn engines"
 
 
-def no_file(changes: Mapping[Path, str | float]) -> Drawing:
-    """Of a problem that was not read from a file."""
-    raise ModelError(f"{', '.join(map(str, changes))} is a number of a problem file, and there is none")
-
-
 @dataclass(frozen=True)
 class Tolerances:
     """All tolerances of a problem, their errors side by side in one vector.
@@ -278,12 +246,9 @@ class Tolerances:
     ----------
     each
         In the order of the file.
-    rebuild
-        The problem of the file with other numbers in place of some.
     """
 
     each: tuple[Tolerance, ...]
-    rebuild: Rebuild = no_file
 
     @property
     def acting(self) -> Tolerances:
@@ -335,8 +300,8 @@ class Tolerances:
         half = self.draw(random, -(-count // 2))
         return np.concatenate([half, -half])
 
-    def built(self, drawing: Drawing, errors: Array) -> Drawing:
-        """What engines with these errors are, shape (columns,)."""
+    def built(self, drawing: Drawing, errors: Array, rebuild: Rebuild = no_file) -> Drawing:
+        """Return the drawing of engines with these errors, shape (columns,); numbers of a file draw it anew."""
         moves: list[tuple[ErrorDrive, complex]] = []
         at = iter(self.columns)
         for tolerance in self.each:
@@ -345,10 +310,56 @@ class Tolerances:
                 value = complex(own[0], own[1] if error.width > 1 else 0.0)
                 moves += [(drive, value) for drive in error.drives if value != 0.0]
         written = {v.path: v.written(e) for v, e in moves if isinstance(v, FileDrive)}
-        drawing = self.rebuild(written) if written else drawing
+        drawing = rebuild(written) if written else drawing
         for drive, value in moves:
             drawing = drive.moved(drawing, value)
         return drawing
 
 
-NO_TOLERANCES = Tolerances(())
+@dataclass(frozen=True)
+class Robust(Extra):
+    """Take what is minimised and limited of built engines.
+
+    Attributes
+    ----------
+    tolerances
+        How far they stand from the drawing.
+    over
+        Which of them count.
+    """
+
+    tolerances: Tolerances
+    over: Over
+    words: ClassVar[str] = "tolerances"
+
+    def objective_name(self, name: str) -> str:
+        """Return the name of what is minimised, with the engines that it is of."""
+        return self.over.named(name, self.tolerances.is_affine)
+
+
+def robust_of(problem: Problem) -> Robust:
+    """Return what a problem asks of built engines."""
+    found = problem.extra(Robust)
+    assert found is not None
+    return found
+
+
+def tolerances_of(problem: Problem) -> Tolerances:
+    """Return how far built engines of a problem stand from its drawing."""
+    return robust_of(problem).tolerances
+
+
+def with_tolerances(problem: Problem, tolerances: Tolerances) -> Problem:
+    """Return a problem of built engines with other tolerances."""
+    return replace(problem, extras=(replace(robust_of(problem), tolerances=tolerances),))
+
+
+def built(problem: Problem, errors: Array, tolerances: Tolerances | None = None) -> Problem:
+    """Return the problem of engines with these errors, shape (columns,), none of which is left to chance (R2)."""
+    own = tolerances_of(problem) if tolerances is None else tolerances
+    given = Drawing(problem.engine, problem.points, problem.decisions, problem.mount_numbers)
+    found = own.built(given, errors, problem.rebuild)
+    return replace(
+        problem, engine=found.engine, points=found.points, decisions=found.decisions,
+        mount_numbers=found.mount_numbers, extras=(),
+    )  # fmt: skip

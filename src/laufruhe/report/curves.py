@@ -38,7 +38,8 @@ from laufruhe.present.twins import KINDS, is_twin, parts_of
 from laufruhe.problem.curves import STEPS
 from laufruhe.report.sheet import Cells, Sheet, Sheets
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.tolerances.result import SHARES
+from laufruhe.solvers.tolerances.assembly_result import AssemblyResult
+from laufruhe.solvers.tolerances.result import SHARES, RobustResult
 
 DIRECTIONS = 180
 """In which wear is told."""
@@ -127,11 +128,11 @@ def _uneven_firing(result: Result) -> Sheet:
 def _shares(result: Result) -> Sheet:
     """Share of engines built, or of assemblies, that stay below a value."""
     unit, columns = objective_unit(result) or "-", dict[str, list[float]]()
-    if result.robust is not None:
-        columns["best drawing"] = list(result.robust.nominal.quantiles)
-        columns["decided"] = list(result.robust.robust.quantiles)
-    if result.assembly is not None:
-        columns["assemblies at random"] = list(result.assembly.quantiles)
+    if isinstance(result.details, RobustResult):
+        columns["best drawing"] = list(result.details.nominal.quantiles)
+        columns["decided"] = list(result.details.robust.quantiles)
+    if isinstance(result.details, AssemblyResult):
+        columns["assemblies at random"] = list(result.details.quantiles)
     rows = [[100.0 * share, *values] for share, *values in zip(SHARES, *columns.values(), strict=True)]
     return Sheet(["below [%]", *(f"{name} [{unit}]" for name in columns)], rows)
 
@@ -259,7 +260,7 @@ CURVES: Sheets = {
     "twist-modes": (is_twisted, _twist_modes),
     "critical-speeds": (is_twisted, _critical_speeds),
     "uneven-firing": (has_ranking, _uneven_firing),
-    "shares": (lambda result: result.robust or result.assembly, _shares),
+    "shares": (lambda result: result.details, _shares),
     "willans": (lambda result: result.problem.friction, _willans),
     "bearings-on-crank": (has_bearings, _on_crank),
     "wear": (has_bearings, _wear),

@@ -72,8 +72,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         **({"torsion": _torsion(result)} if is_twisted(result) else {}),
         **_running(result),
         **_phasing(result),
-        **_robust(result),
-        **_assembly(result),
+        **({} if result.details is None else result.details.record()),
         **_ranks(result),
         **_reached(result),
         "fidelity": {
@@ -298,25 +297,6 @@ def _star(star: RankedStar) -> Record:
     return {**_of(star, names), "firing_orders": orders}
 
 
-def _robust(result: Result) -> Record:
-    """`robust` where built engines were decided for: two designs under tolerance, and the price of each tolerance."""
-    found = result.robust
-    if found is None:
-        return {}
-    names = "exact share scenarios divisions engines seed exceeding exceeding_at_most"
-    designs = {"best_drawing": found.nominal, "decided": found.robust}
-    return {
-        "robust": {
-            "over": "worst case" if found.over.share is None else found.over.share,
-            **_of(found, names),
-            **{key: {**_of(d, "drawing worst share low high quantiles"),
-                     "decisions": {name: {"value": value, "unit": unit} for name, value, unit in d.decisions}}
-               for key, d in designs.items()},
-            "tolerances": [_of(t, "name size unit law scope errors price saving") for t in found.tolerances],
-        }
-    }  # fmt: skip
-
-
 def _ranks(result: Result) -> Record:
     """`free_decisions`, and `objectives` where several were minimised in order: what each leaves equal."""
     names = "name unit initial least lower_bound gap final limit price"
@@ -339,14 +319,3 @@ def _reached(result: Result) -> Record:
 
 def _values(found: Reached | Nearest) -> Record:
     return {"decisions": {d.name: _of(d, "value unit") for d in found.decisions}}
-
-
-def _assembly(result: Result) -> Record:
-    """`assembly` where measured parts were chosen: the part of every lot in each cylinder, counted from one."""
-    found = result.assembly
-    if found is None:
-        return {}
-    places = [
-        {"cylinder": place.cylinder, **dict(zip(found.kinds, place.parts, strict=True))} for place in found.places
-    ]
-    return {"assembly": {**_of(found, "assemblies looked_at random quantiles worst mean_parts"), "places": places}}

@@ -261,7 +261,7 @@ def state(problem: Problem, to_start_from: bool = False) -> Result:
         Whether it is only where a search starts, so that it may stand on a resonance.
     """
     started = time.perf_counter()
-    problem = problem if problem.over is None else problem.changed(over=None)
+    problem = problem.drawing
     evaluation = evaluate_start(problem) if to_start_from else evaluate(problem)
     open_of = problem.phasing
     why = none_of_given(open_of, open_of.throws) if open_of is not None and open_of.throws is not None else ""

@@ -18,7 +18,7 @@ from laufruhe.numerics.progress import tell
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
-from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Reach
 from laufruhe.solvers.conclusion import concluded, judged, values_of
@@ -97,25 +97,11 @@ def _in_turns(program: LocalProgram, best: Array, decide: Decide) -> Array:
     return best
 
 
-def refuse_uneven(phasing: Phasing) -> None:
-    """Refuse throws that leave the even steps where every star is decided as a problem of its own."""
-    if phasing.continuous or phasing.throw_bounds is not None:
-        rule = "[robust] decides cranks that fire evenly"
-        raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out, or leave [robust] out")
-
-
 def solve_star_by_star(problem: Problem, decide: Decide) -> Result:
     """Decide each star that fires evenly, with each set of shafts, as a problem of its own; of many, some drawn."""
     phasing = problem.phasing
     assert phasing is not None
-    refuse_uneven(phasing)
     stars = every_star(phasing)
     if not stars:
         return no_star(problem, none_fires(phasing)[0])
-    found = by_each_order(problem, phasing, stars, lambda own, _: decide(replace(own, phasing=None)), MOST_STARS)
-    if problem.over is None or found.objective is None:
-        return found
-    # of engines as built the design as given is told as they are too
-    given = decide(replace(problem, phasing=None, decisions=())).objective
-    initial = found.objective.initial if given is None else given.value
-    return replace(found, objective=replace(found.objective, initial=initial))
+    return by_each_order(problem, phasing, stars, lambda own, _: decide(replace(own, phasing=None)), MOST_STARS)

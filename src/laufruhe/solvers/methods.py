@@ -7,10 +7,11 @@ import time
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 from laufruhe.errors import ModelError, SolverError
+from laufruhe.extension import extended
 from laufruhe.load_models.run_look import asks_runs
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.norms import Norm
@@ -347,20 +348,10 @@ def refuse(problem: Problem) -> None:
     ModelError
         If nothing is minimised of what is open, or what is asked is not decided together.
     """
-    if problem.ranks:
-        for rank in problem.ranks:
-            refuse(problem.changed(ranks=(), objective=rank.terms))
-    elif problem.assembly is not None:
-        called("laufruhe.solvers.tolerances.assembly:refuse", problem)
-    elif problem.over is not None and problem.phasing is not None:
-        called("laufruhe.solvers.general:refuse_uneven", problem.phasing)
-    elif problem.over is not None:
-        called("laufruhe.solvers.tolerances.robust:refuse", problem)
-    else:
-        _refuse_of_drawing(problem)
-
-
-def _refuse_of_drawing(problem: Problem) -> None:
+    own = next((one for one in reductions() if one.refuse is not None and one.applies(problem)), None)
+    if own is not None and own.refuse is not None:
+        own.refuse(problem)
+        return
     kinds = kinds_of(problem)
     if problem.mount_decisions and (problem.fidelity.mounts, problem.fidelity.modes) != ("frequency", None):
         raise ModelError("fidelity.mounts or fidelity.modes would change with the mounts that are open; leave it out")
@@ -371,12 +362,12 @@ def _refuse_of_drawing(problem: Problem) -> None:
         raise ModelError(f"{words} is open and nothing is minimised; add [objective] or [mounts]")
 
 
-def _decided(problem: Problem, reductions: Sequence[Reduction] | None = None) -> Result:
+def _decided(problem: Problem, left: Sequence[Reduction] | None = None) -> Result:
     """Decide a problem by the first of some reductions that applies, or by the first method that suits it."""
-    left = REDUCTIONS if reductions is None else reductions
+    left = reductions() if left is None else left
     for k, reduction in enumerate(left):
         if reduction.applies(problem):
-            return reduction.solve(problem, _decided, partial(_decided, reductions=left[k + 1 :]))
+            return reduction.solve(problem, _decided, partial(_decided, left=left[k + 1 :]))
     return _by_method(problem)
 
 
@@ -393,6 +384,11 @@ def _by_method(problem: Problem) -> Result:
         return method.decided(problem)
     other, fewer = closing
     return solve_relaxed(problem, fewer, other.decided, method.decided)
+
+
+def _refuse_any_rank(problem: Problem) -> None:
+    for rank in problem.ranks:
+        refuse(problem.changed(ranks=(), objective=rank.terms))
 
 
 def _fixed_limits(problem: Problem) -> list[Limit]:
@@ -441,28 +437,38 @@ class Reduction:
         Return whether it decides a problem.
     solve
         Decide it; the first callable decides a simpler problem by all reductions, the second by those that follow.
+    refuse
+        Raise `ModelError` for what it does not decide, before anything is solved; None where methods say it.
+    before
+        Name of the reduction that one of an extension stands before; else it is the last.
     """
 
     name: str
     applies: Callable[[Problem], bool]
     solve: Callable[[Problem, Decide, Decide], Result]
+    refuse: Callable[[Problem], None] | None = None
+    before: str = ""
 
 
 REDUCTIONS: tuple[Reduction, ...] = (
     Reduction("more angles where few read otherwise", lambda _: True, lambda p, _, rest: solve_told(p, rest)),
-    Reduction("ranks, one after another", lambda p: bool(p.ranks), lambda p, decide, _: solve_in_order(p, decide)),
-    Reduction("assembly", lambda p: p.assembly is not None,
-              lambda p, *_: _by("tolerances.assembly:solve_assembly", p)),
-    Reduction("star by star, with tolerances", lambda p: p.over is not None and p.phasing is not None,
-              lambda p, decide, _: _by("general:solve_star_by_star", p, decide)),
-    Reduction("tolerances", lambda p: p.over is not None,
-              lambda p, decide, _: _by("tolerances.robust:solve_robust", p, decide)),
+    Reduction("ranks, one after another", lambda p: bool(p.ranks), lambda p, decide, _: solve_in_order(p, decide),
+              _refuse_any_rank),
     Reduction("limits that nothing open moves", lambda p: bool(_fixed_limits(p)), _without_fixed_limits),
     Reduction("run-ups", lambda p: asks_runs(p) and bool(kinds_of(p)) and Kind.NUMBER not in kinds_of(p),
               lambda p, decide, _: _by("runs:solve_runs", p, kinds_of(p), decide)),
     Reduction("an objective that nothing open moves", _is_settled, _as_given),
 )  # fmt: skip
-"""Reductions in the order in which they are looked for; methods decide what none of them applies to."""
+"""Reductions of the core in the order in which they are looked for."""
+
+
+@cache
+def reductions() -> tuple[Reduction, ...]:
+    """Return all reductions in the order in which they are looked for; methods decide what none of them applies to."""
+    found = list(REDUCTIONS)
+    for one in list(extended("reductions", Reduction, REDUCTIONS).values())[len(REDUCTIONS) :]:
+        found.insert(next((k for k, other in enumerate(found) if other.name == one.before), len(found)), one)
+    return tuple(found)
 
 
 def _closing(problem: Problem, kinds: frozenset[Kind], method: Method) -> tuple[Method, Problem] | None:

@@ -76,9 +76,9 @@ def with_reachable(found: Result, problem: Problem, kinds: Collection[Kind], too
     asked = [limit for limit in problem.limits if limit.name in wanted]
     # what the nearest design breaks most is looked at first
     asked.sort(key=lambda limit: found.nearest is None or limit.name != found.nearest.name)
-    if not asked or problem.assembly is not None:
+    if not asked or any(extra.open_names for extra in problem.extras):
         return found
-    drawn = problem.over is None and not problem.ranks
+    drawn = not problem.extras and not problem.ranks
     solve, answers = partial(_surely, solve, problem) if drawn else solve, []
     # a limit of time that was asked for counts alone
     seconds = None if math.isfinite(left()) else max(LEAST_SECONDS, took)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from laufruhe.errors import ModelError
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
@@ -18,8 +18,6 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Certificate
 from laufruhe.solvers.prices import Price
 from laufruhe.solvers.stars.ranking import PhasingResult
-from laufruhe.solvers.tolerances.assembly_result import AssemblyResult
-from laufruhe.solvers.tolerances.result import RobustResult
 from laufruhe.solvers.values import (
     DecisionRange,
     DecisionValue,
@@ -95,6 +93,19 @@ class Told:
         return f"<strong>{lines[0]}</strong><ul>" + "".join(f"<li>{line}</li>" for line in lines[1:]) + "</ul>"
 
 
+class Details:
+    """What an extension tells of a result beside the design."""
+
+    @property
+    def measured(self) -> Evaluation | None:
+        """Evaluation that the objective is of; None for that of the design."""
+        return None
+
+    def record(self) -> dict[str, Any]:
+        """Return its part of `result.json`, in SI."""
+        return {}
+
+
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Result(Told):
     """A design, what was proven of it, and everything a report shows.
@@ -119,10 +130,8 @@ class Result(Told):
         Seconds by what they were spent on.
     phasing
         Ranking of stars and firing orders, where these were open.
-    robust
-        Designs under tolerance, where built engines were decided for.
-    assembly
-        Which part goes where, where parts were chosen.
+    details
+        What the extension that decided tells beside the design.
     ranks
         Of several objectives in order, where there are.
     reached
@@ -139,8 +148,7 @@ class Result(Told):
     error: Callable[[], float] = float
     timing: dict[str, float] = field(default_factory=dict)
     phasing: PhasingResult | None = None
-    robust: RobustResult | None = None
-    assembly: AssemblyResult | None = None
+    details: Details | None = None
     ranks: tuple[RankValue, ...] = ()
     reached: tuple[Reached, ...] = ()
     nearest: Nearest | None = None
@@ -153,8 +161,9 @@ class Result(Told):
 
     @property
     def measured(self) -> Evaluation:
-        """What the objective is of: the design, or the worst engine found that is built to it."""
-        return self.final if self.robust is None else self.robust.worst_engine
+        """Evaluation that the objective is of: the design, or what its details name."""
+        other = None if self.details is None else self.details.measured
+        return self.final if other is None else other
 
     @cached_property
     def error_estimate(self) -> float:

@@ -52,13 +52,13 @@ def _as_many_tell(result: Result) -> Result:
     if told is None or proof is None or not result.status.has_design:
         return result
     value = told.value - _misread(problem, result.measured)
-    final = result.final if result.robust else finely(result.final)
+    final = finely(result.final) if result.measured is result.final else result.final
     nothing = nothing_of(problem, final.engine)
     gap = gap_of(value, proof.lower_bound, nothing)
     doubt = sum(term.weight * missed(term.measure, final) for term in problem.objective)
     check_bound(proof.method, proof.lower_bound, value, nothing + doubt)
     weaker = Proof.WITHIN_GAP if proof.kind is Proof.GLOBAL else proof.kind
-    met = told_excess(problem, result.final) <= KEPT or result.robust is not None
+    met = told_excess(problem, result.final) <= KEPT or result.measured is not result.final
     kind = Proof.NONE if not met else Proof.GLOBAL if gap <= problem.tolerance else weaker
     status = Status.FAILED if not met else Status.OPTIMAL if kind is Proof.GLOBAL else Status.FEASIBLE
     return replace(
@@ -66,7 +66,7 @@ def _as_many_tell(result: Result) -> Result:
         status=status,
         objective=replace(told, value=value),
         certificate=replace(proof, kind=kind, gap=gap),
-        limits=result.limits if result.robust else limit_values(problem, final, result.prices, value),
+        limits=limit_values(problem, final, result.prices, value) if result.measured is result.final else result.limits,
         final=final,
         message=result.message if met else broken_message(problem, final),
     )

@@ -19,7 +19,6 @@ from laufruhe.errors import BoundError, LaufruheError
 from laufruhe.fidelity.error_bounds import missed, relative
 from laufruhe.machine.firing import firing_turns, from_one, intervals_of, lap_orders
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.assembly import Chosen, assembled
 from laufruhe.problem.decision import Domain, columns_of, domains_of, vector_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
@@ -33,7 +32,6 @@ from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.conclusion import phase_decisions
 from laufruhe.solvers.stars.ranking import candidates_of, ranked_star
 from laufruhe.solvers.told_limits import told_excess
-from laufruhe.solvers.tolerances.assembly_result import Place
 from laufruhe.solvers.values import ObjectiveValue, RankValue
 from laufruhe.solvers.withheld import without_proof
 
@@ -56,19 +54,16 @@ class Stand:
     Attributes
     ----------
     problem
-        With its star, or with its parts.
+        With its star.
     values
         Of the decisions.
     candidate
         Star and firing order; None where neither is open.
-    chosen
-        Parts of every cylinder; empty where none are chosen.
     """
 
     problem: Problem
     values: tuple[Value, ...]
     candidate: Candidate | None = None
-    chosen: Chosen = ()
 
 
 Move = Callable[[Stand, float], Stand | None]
@@ -114,7 +109,7 @@ def walked(problem: Problem, found: Result, spent: float) -> Result:
     is_none = found.status is Status.INFEASIBLE
     bound = found.certificate.lower_bound if found.certificate is not None else 0.0
     claims = bool(found.limits) and problem.phasing is None if is_none else found.status.has_design and bound > 0.0
-    if not claims or problem.over is not None:
+    if not claims or problem.extras:
         return found
     start = _start(found)
     # a step may lead onto a resonance
@@ -128,10 +123,6 @@ def walked(problem: Problem, found: Result, spent: float) -> Result:
 def _start(found: Result) -> Stand:
     """The decided design, or the one given where none was decided."""
     problem = found.problem
-    if found.assembly is not None and problem.assembly is not None:
-        parts = [[part - 1 for part in place.parts] for place in found.assembly.places]
-        chosen = tuple(zip(*parts, strict=True))
-        return _of_parts(problem, chosen)
     values = tuple(values_of(problem, found))
     if problem.phasing is not None and found.phasing is not None:
         candidate = next(iter(candidates_of(problem.phasing, found.phasing.ranking[:1])), None)
@@ -148,7 +139,7 @@ class _Walk:
         self.errors = errors if len(errors) == len(self.limits) else [0.0] * len(self.limits)
         self.random = np.random.default_rng(SEED)
         self.start, self.is_none, self.final = start, found.status is Status.INFEASIBLE, found.final
-        self.drawing, self.phasing = found.problem, found.problem.phasing
+        self.phasing = found.problem.phasing
 
     def run(self, seconds: float) -> Visit | None:
         """Return the best design that surely keeps the limits; None where no step found a better one."""
@@ -224,7 +215,7 @@ class _Walk:
 
     def _choices(self) -> Generator[tuple[Move, float], bool, None]:
         """Neighbours of what is chosen from finitely many, until none of them is better."""
-        moves = [*self._stars(), *self._parts()]
+        moves = self._stars()
         failed = 0
         for k in itertools.cycle(self.random.permutation(len(moves))):
             failed = 0 if (yield moves[k], 1.0) else failed + 1
@@ -246,18 +237,6 @@ class _Walk:
         if phasing.firing_order is None:
             moves += [_fired(phasing, k) for k in range(ORDERS)]
         return [*moves, *(_built(phasing, built) for built in phasing.shafts.allowed if phasing.shafts.optional)]
-
-    def _parts(self) -> list[Move]:
-        """Parts of two cylinders changed for each other, and parts that no cylinder has."""
-        if self.drawing.assembly is None or not self.start.chosen:
-            return []
-        cylinders = range(len(self.start.chosen[0]))
-        moves: list[Move] = []
-        for lot, own in enumerate(self.drawing.assembly.lots):
-            moves += [_exchanged(self.drawing, lot, *pair) for pair in itertools.combinations(cylinders, 2)]
-            spare = range(len(own.masses) - len(cylinders))
-            moves += [_spare(self.drawing, lot, k, number) for k in cylinders for number in spare]
-        return moves
 
 
 def _timer(seconds: float) -> Callable[[], bool]:
@@ -410,36 +389,6 @@ def _realised(phasing: Phasing, stand: Stand, candidate: Candidate) -> Stand | N
     return Stand(problem, tuple(_value(domain, x) for domain in domains), candidate)
 
 
-# --- moves of parts
-
-
-def _of_parts(drawing: Problem, chosen: Chosen) -> Stand:
-    assert drawing.assembly is not None
-    engine = assembled(drawing.engine, drawing.assembly.lots, chosen)
-    return Stand(replace(drawing, engine=engine), (), None, chosen)
-
-
-def _exchanged(drawing: Problem, lot: int, i: int, j: int) -> Move:
-    def move(stand: Stand, _: float) -> Stand:
-        parts = list(stand.chosen[lot])
-        parts[i], parts[j] = parts[j], parts[i]
-        return _of_parts(drawing, (*stand.chosen[:lot], tuple(parts), *stand.chosen[lot + 1 :]))
-
-    return move
-
-
-def _spare(drawing: Problem, lot: int, k: int, number: int) -> Move:
-    """Take a part that no cylinder has."""
-
-    def move(stand: Stand, _: float) -> Stand:
-        parts = list(stand.chosen[lot])
-        assert drawing.assembly is not None
-        parts[k] = [p for p in range(len(drawing.assembly.lots[lot].masses)) if p not in parts][number]
-        return _of_parts(drawing, (*stand.chosen[:lot], tuple(parts), *stand.chosen[lot + 1 :]))
-
-    return move
-
-
 # --- what a walk shows
 
 
@@ -459,23 +408,14 @@ def _is_shown(found: Result, witness: Visit, bound: float | None) -> bool:
 def _withheld(problem: Problem, found: Result, witness: Visit, bound: float) -> Result:
     """The design of the walk, of which nothing is proven."""
     stand, candidate, own = witness.stand, witness.stand.candidate, found.problem
-    shown = own if stand.chosen else replace(stand.problem, phasing=own.phasing)
+    shown = replace(stand.problem, phasing=own.phasing)
     design = Design(shown, stand.values, witness.evaluation, witness.value, witness.excess)
-    decisions, details, assembly = decided(design), found.phasing, found.assembly
+    decisions, details = decided(design), found.phasing
     if details is not None and candidate is not None and own.phasing is not None:
         decisions = (*phase_decisions(problem, own.phasing, candidate), *decisions)
         if candidate != next(iter(candidates_of(own.phasing, details.ranking[:1])), None):
             first = ranked_star(own.phasing, candidate, None, witness.value, 0.0, False)
             details = replace(details, ranking=(first, *details.ranking))
-    if assembly is not None and own.assembly is not None:
-        lots = own.assembly.lots
-        masses = [[lot.masses[part] for part in parts] for lot, parts in zip(lots, stand.chosen, strict=True)]
-        numbers = zip(*stand.chosen, strict=True)
-        places = tuple(
-            Place(place.cylinder, tuple(part + 1 for part in parts), own_masses)
-            for place, parts, own_masses in zip(assembly.places, numbers, zip(*masses, strict=True), strict=True)
-        )
-        assembly = replace(assembly, places=places)
     moved = replace(
         found,
         problem=shown,
@@ -488,7 +428,6 @@ def _withheld(problem: Problem, found: Result, witness: Visit, bound: float) -> 
         message="",
         error=partial(error_of, shown, witness.evaluation),
         phasing=details,
-        assembly=assembly,
         ranks=_reached(found, witness),
         nearest=None,
     )

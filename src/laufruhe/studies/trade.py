@@ -158,14 +158,13 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
 
 def traded_part(problem: Problem) -> Problem:
     """What of a problem a trade takes: the drawing, by the first of several objectives."""
-    return problem.changed(ranks=(), over=None, assembly=None)
+    return problem.changed(ranks=(), extras=())
 
 
 def _left_out(problem: Problem) -> tuple[str, ...]:
     told = {
         f"Of {len(problem.ranks)} objectives in order the first is traded.": len(problem.ranks) > 1,
-        "Traded is the drawing: errors of built engines are left out.": problem.over is not None,
-        "Traded is the engine as given: no parts are chosen.": problem.assembly is not None,
+        **{f"Traded is the drawing, without {extra.words}.": True for extra in problem.extras},
     }
     return tuple(line for line, holds in told.items() if holds)
 

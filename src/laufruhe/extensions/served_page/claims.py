@@ -165,7 +165,7 @@ def settled_claim(position: int, result: Result) -> Claim:
     least = f"no design has less than {figure(certificate.lower_bound, objective.unit, 5)}"
     is_proven = result.status is Status.OPTIMAL and not breaks
     # a page shows the drawing, with the parts that it names
-    is_drawn = result.problem.over is None and result.problem.assembly is None
+    is_drawn = not result.problem.extras
     reference = "the proven optimum" if is_proven else "the best design found"
     return Claim(
         Kind.PROVEN if is_proven else Kind.FOUND,

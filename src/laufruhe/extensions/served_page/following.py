@@ -61,7 +61,7 @@ def can_follow(problem: Problem) -> bool:
     """Whether all that is open is what loads are affine in, of the drawing, and a norm of theirs is minimised."""
     kinds = {decision.kind for decision in problem.decisions}
     told = bool(problem.objective) and not any(term.measure.channel.is_number for term in problem.objective)
-    alone = problem.over is None and problem.assembly is None and problem.phasing is None
+    alone = not problem.extras and problem.phasing is None
     # limits on run-ups wait, and are named; what else is not known to be affine is followed by no program and no bound
     asked = [measure for measure in problem.measures if not measure.channel.is_checked]
     affine = all(is_affine(measure.channel, kinds, problem) for measure in asked)

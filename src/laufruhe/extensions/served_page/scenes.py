@@ -22,7 +22,6 @@ from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.tolerance import NO_TOLERANCES
 from laufruhe.solvers.conclusion import decision_values, limit_values
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import LimitValue
@@ -52,7 +51,7 @@ class Scene:
     def __init__(self, problem: Problem, key: str) -> None:
         self.key, self.whole = key, problem
         self.problem = problem if can_follow(problem) else replace(
-            problem, phasing=None, over=None, assembly=None, tolerances=NO_TOLERANCES, decisions=problem.unbalances
+            problem, phasing=None, extras=(), decisions=problem.unbalances
         )  # fmt: skip
         self.given = evaluate_start(self.problem)
         self.follower: Follower | None = None
@@ -112,8 +111,7 @@ class Scene:
             still.add(Kind.STAR)
         unread = [limit.name for limit in self.problem.limits if not self._reads(limit)]
         left_out = [
-            *(["tolerances"] if whole.over is not None else []),
-            *(["the choice of parts"] if whole.assembly is not None else []),
+            *(extra.words for extra in whole.extras),
             *(["later objectives"] if whole.ranks else []),
             *([f"the limit{'s' if len(unread) > 1 else ''} on {listed(unread)}"] if unread else []),
         ]

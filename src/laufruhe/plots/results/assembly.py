@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 from laufruhe.plots.style import AFTER, BEFORE, SKY, entry, headed, page, styled
 from laufruhe.plots.words import INK, label_of
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.tolerances.assembly_result import AssemblyResult
 from laufruhe.solvers.tolerances.result import SHARES
 
 MEAN, WIDE = (0, (1, 2)), 6.4
@@ -14,14 +15,14 @@ MEAN, WIDE = (0, (1, 2)), 6.4
 
 def applies(result: Result) -> bool:
     """Where measured parts were chosen."""
-    return result.assembly is not None
+    return isinstance(result.details, AssemblyResult)
 
 
 @styled()
 def figure(result: Result) -> Figure:
     """Share of assemblies that stay below, and where the best one, the given one and mean parts stand."""
-    found, objective = result.assembly, result.objective
-    if found is None or objective is None:
+    found, objective = result.details, result.objective
+    if not isinstance(found, AssemblyResult) or objective is None:
         raise ValueError("no parts were chosen")
     drawn = page(1, 1, (WIDE, 3.0))
     axes = drawn.panels[0]

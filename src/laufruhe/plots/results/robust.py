@@ -18,14 +18,14 @@ MOST_TOLERANCES, WIDE = 8, 6.4
 
 def applies(result: Result) -> bool:
     """Where built engines were decided for."""
-    return result.robust is not None
+    return isinstance(result.details, RobustResult)
 
 
 @styled()
 def figure(result: Result) -> Figure:
     """What share of engines stays below, design by design, over bars of what tolerances cost."""
-    found, unit = result.robust, objective_unit(result)
-    if found is None:
+    found, unit = result.details, objective_unit(result)
+    if not isinstance(found, RobustResult):
         raise ValueError("nothing was decided for built engines")
     drawn = page(2, 1, (WIDE, 2.5), gap=0.7)
     first, second = drawn.panels
@@ -34,7 +34,7 @@ def figure(result: Result) -> Figure:
         first.axvline(design.drawing, color=colour, linewidth=1.2, linestyle=DRAWN)
         first.axvline(design.worst, color=colour, linewidth=1.4, linestyle=WORST)
     first.axhline(100.0 * found.share, color=FAINT, linewidth=0.7, linestyle=DRAWN)
-    name = result.problem.changed(over=None).objective_name
+    name = result.problem.drawing.objective_name
     first.set(ylim=(0.0, 104.0), ylabel="engines below [%]", xlabel=label_of(name, unit, WIDE))
     _bars(second, found, unit)
     worst = "worst case, which no engine exceeds" if found.exact else "worst engine drawn"

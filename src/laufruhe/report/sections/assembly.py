@@ -11,8 +11,8 @@ from laufruhe.solvers.tolerances.assembly_result import AssemblyResult, Place
 
 def tables(result: Result) -> list[Grid]:
     """A row a cylinder, with the number of each part in the order of its file."""
-    found, unit = result.assembly, objective_unit(result)
-    if found is None:
+    found, unit = result.details, objective_unit(result)
+    if not isinstance(found, AssemblyResult):
         return []
     head = ["cylinder"]
     for kind in found.kinds:

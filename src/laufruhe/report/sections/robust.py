@@ -11,8 +11,8 @@ from laufruhe.solvers.tolerances.result import CONFIDENCE, BuiltDesign, PricedTo
 
 def tables(result: Result) -> list[Grid]:
     """Two designs, and a row a tolerance."""
-    found, unit = result.robust, objective_unit(result)
-    if found is None:
+    found, unit = result.details, objective_unit(result)
+    if not isinstance(found, RobustResult):
         return []
     worst = "worst case" if found.exact else "worst drawn"
     below, sure = f"{100.0 * found.share:g} % of engines below", f"{100.0 * CONFIDENCE:g} % sure"

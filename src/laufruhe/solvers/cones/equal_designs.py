@@ -79,7 +79,7 @@ def free_decisions(found: Result) -> tuple[DecisionRange, ...] | None:
     """
     problem = replace(found.problem, phasing=None)
     of_numbers = any(_has_no_cones(measure) for measure in problem.measures)
-    plain = problem.over is None and problem.assembly is None and not problem.ranks and not of_numbers
+    plain = not problem.extras and not problem.ranks and not of_numbers
     affine = all(decision.is_affine for decision in problem.decisions)
     if not (plain and affine and 0 < len(problem.decisions) <= MOST_OPEN) or passed():
         return None

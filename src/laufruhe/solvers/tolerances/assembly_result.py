@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+from laufruhe.solvers.result import Details
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class AssemblyResult:
+class AssemblyResult(Details):
     """The best assembly beside others [SI].
 
     Attributes
@@ -50,3 +53,9 @@ class AssemblyResult:
     worst: float
     mean_parts: float
     random: int
+
+    def record(self) -> dict[str, Any]:
+        """Return `assembly`: the part of every lot in each cylinder, counted from one."""
+        told = {name: getattr(self, name) for name in ["assemblies", "looked_at", "random", "worst", "mean_parts"]}
+        places = [{"cylinder": one.cylinder, **dict(zip(self.kinds, one.parts, strict=True))} for one in self.places]
+        return {"assembly": {**told, "quantiles": list(self.quantiles), "places": places}}

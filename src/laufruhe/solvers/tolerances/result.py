@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.tolerance import Over
+from laufruhe.solvers.result import Details
 
 SHARE = 0.95
 """Of built engines whose value every comparison shows, where no other share is asked for."""
@@ -67,7 +69,7 @@ class PricedTolerance:
 
 
 @dataclass(frozen=True)
-class RobustResult:
+class RobustResult(Details):
     """Two designs under the same tolerances, and which tolerance to narrow first.
 
     Attributes
@@ -107,3 +109,20 @@ class RobustResult:
     worst_engine: Evaluation
     exceeding: int
     exceeding_at_most: float
+
+    @property
+    def measured(self) -> Evaluation:
+        """Evaluation that the objective is of."""
+        return self.worst_engine
+
+    def record(self) -> dict[str, Any]:
+        """Return `robust`: two designs under tolerance, and the price of each tolerance."""
+        names = "exact share scenarios divisions engines seed exceeding exceeding_at_most"
+        designs = {"best_drawing": self.nominal, "decided": self.robust}
+        told: dict[str, Any] = {"over": "worst case" if self.over.share is None else self.over.share}
+        told |= {name: getattr(self, name) for name in names.split()}
+        for key, design in designs.items():
+            decisions = {name: {"value": value, "unit": unit} for name, value, unit in design.decisions}
+            told[key] = {name: getattr(design, name) for name in ["drawing", "worst", "share", "low", "high"]}
+            told[key] |= {"quantiles": list(design.quantiles), "decisions": decisions}
+        return {"robust": {**told, "tolerances": [asdict(tolerance) for tolerance in self.tolerances]}}

@@ -12,17 +12,18 @@ import pytest
 from scipy.optimize import minimize
 
 from laufruhe.errors import ModelError
+from laufruhe.extensions.robust.adversaries import EveryError, Found
+from laufruhe.extensions.robust.built_engines import BuiltEngines, values_of
+from laufruhe.extensions.robust.worst_least import SMALL, Least, _kept, _Program
 from laufruhe.files.reader import load
-from laufruhe.load_models.built_engines import BuiltEngines, values_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.tolerance import Over, Tolerances
+from laufruhe.problem.tolerance import Over, Robust, Tolerances, built, tolerances_of, with_tolerances
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import KEPT, unbalances_of
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.tolerances.adversaries import EveryError, Found
-from laufruhe.solvers.tolerances.robust import SMALL, Least, _kept, _Program
+from laufruhe.solvers.tolerances.result import RobustResult
 from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft
 
 ENGINE = (
@@ -81,28 +82,28 @@ def worst(found: Result) -> float:
 
 def test_worst_case_is_proven(result: Result) -> None:
     assert result.certificate is not None
-    assert result.robust is not None
+    assert isinstance(result.details, RobustResult)
     assert result.certificate.kind is Proof.GLOBAL
     assert result.certificate.kkt_residual < 1e-2
-    assert result.robust.exact
-    assert result.robust.robust.worst == worst(result)
-    assert result.robust.robust.worst < result.robust.nominal.worst
+    assert result.details.exact
+    assert result.details.robust.worst == worst(result)
+    assert result.details.robust.worst < result.details.nominal.worst
     # the best drawing is the best drawing
-    assert result.robust.nominal.drawing <= result.robust.robust.drawing
+    assert result.details.nominal.drawing <= result.details.robust.drawing
 
 
 def test_no_built_engine_exceeds_the_worst_case(problem: Problem, result: Result) -> None:
     """By rows of all engines at once, and some of them by the exact model alone."""
     values = turned([d.value for d in result.decisions])
-    built = BuiltEngines(problem, values, problem.fidelity.samples)
-    errors = problem.tolerances.draw(np.random.default_rng(99), 10_000)
+    engines = BuiltEngines(problem, values, problem.fidelity.samples)
+    errors = tolerances_of(problem).draw(np.random.default_rng(99), 10_000)
     corners = np.array([[*ends, 1.0, 0.0, 0.0, 1.0] for ends in itertools.product((-1.0, 1.0), repeat=6)])
     many = np.concatenate([errors, corners])
-    found = values_of(built.terms, many)
+    found = values_of(engines.terms, many)
     assert found.max() <= worst(result) * (1.0 + 1e-12)
     assert found.max() > 0.97 * worst(result)
     for k in (*range(0, 10_000, 2_000), int(np.argmax(found))):
-        own = problem.built(many[k])
+        own = built(problem, many[k])
         assert objective_value(own, evaluate(own, own.design(values))) == pytest.approx(found[k], rel=1e-10)
 
 
@@ -124,8 +125,8 @@ def test_no_other_design_is_better(read: Callable[[str], Problem]) -> None:
 
 
 def test_no_tolerance_is_the_drawing(read: Callable[[str], Problem], problem: Problem) -> None:
-    none = replace(problem, tolerances=scaled(problem.tolerances, 0.0))
-    drawing = solve(problem.changed(over=None))
+    none = with_tolerances(problem, scaled(tolerances_of(problem), 0.0))
+    drawing = solve(problem.drawing)
     assert worst(solve(none)) == pytest.approx(worst(drawing), rel=1e-9)
     written = read(TEXT.replace("± 2 %", "± 0 %").replace("± 10 %", "± 0 %") + ROBUST)
     assert worst(solve(written)) == pytest.approx(worst(drawing), rel=1e-9)
@@ -136,8 +137,8 @@ def scaled(tolerances: Tolerances, factor: float) -> Tolerances:
 
 
 def test_more_tolerance_is_never_better(problem: Problem, result: Result) -> None:
-    half = worst(solve(replace(problem, tolerances=scaled(problem.tolerances, 0.5))))
-    drawing = worst(solve(problem.changed(over=None)))
+    half = worst(solve(with_tolerances(problem, scaled(tolerances_of(problem), 0.5))))
+    drawing = worst(solve(problem.drawing))
     assert drawing < half * (1.0 + 1e-4)
     assert half < worst(result) * (1.0 + 1e-4)
 
@@ -145,11 +146,11 @@ def test_more_tolerance_is_never_better(problem: Problem, result: Result) -> Non
 @pytest.mark.slow
 def test_prices_are_slopes(problem: Problem, result: Result) -> None:
     """Against other optima: every tolerance a little wider and a little narrower."""
-    assert result.robust is not None
+    assert isinstance(result.details, RobustResult)
     fine = replace(problem, tolerance=3e-6)
-    for told in result.robust.tolerances[1:2]:
+    for told in result.details.tolerances[1:2]:
         wide, narrow = (
-            worst(solve(replace(fine, tolerances=problem.tolerances.scaled(told.name, 1.0 + step))))
+            worst(solve(with_tolerances(fine, tolerances_of(problem).scaled(told.name, 1.0 + step))))
             for step in (0.02, -0.02)
         )
         assert told.saving == pytest.approx((wide - narrow) / 0.04, rel=5e-3)
@@ -157,23 +158,23 @@ def test_prices_are_slopes(problem: Problem, result: Result) -> None:
 
 
 def test_share_of_engines(problem: Problem, result: Result) -> None:
-    shared = solve(replace(problem, over=Over(0.95, 400, 3)))
+    shared = solve(replace(problem, extras=(Robust(tolerances_of(problem), Over(0.95, 400, 3)),)))
     assert shared.certificate is not None
-    assert shared.robust is not None
+    assert isinstance(shared.details, RobustResult)
     assert shared.certificate.kind in (Proof.LOCAL, Proof.GLOBAL)
     assert shared.certificate.lower_bound <= worst(shared) < worst(result)
-    told = shared.robust
+    told = shared.details
     # another sample agrees with the one that decided
     assert told.robust.low <= told.robust.share <= told.robust.high
     assert told.robust.share == pytest.approx(worst(shared), rel=0.02)
     assert told.exceeding_at_most < 0.08
     # and no neighbour is better in the sample that decided
-    errors = problem.tolerances.mirrored(np.random.default_rng(3), 400)
+    errors = tolerances_of(problem).mirrored(np.random.default_rng(3), 400)
     values = [d.value for d in shared.decisions]
 
     def level(x: list[float]) -> float:
-        built = BuiltEngines(problem, turned(x), problem.fidelity.samples)
-        return float(np.sort(values_of(built.terms, errors))[379])
+        engines = BuiltEngines(problem, turned(x), problem.fidelity.samples)
+        return float(np.sort(values_of(engines.terms, errors))[379])
 
     assert level(values) == pytest.approx(worst(shared), rel=1e-9)
     for k, step in itertools.product(range(2), (-2e-3, 2e-3)):
@@ -186,7 +187,7 @@ def limited(read: Callable[[str], Problem], most: float) -> tuple[Problem, _Prog
     limit = f'[[constraints]]\nlimit = "maximum shaking force"\nmax = "{most} N"\n'
     problem = read(TEXT + ROBUST + limit)
     program = _Program(problem, 0.0)
-    program.add([np.zeros(problem.tolerances.count)])
+    program.add([np.zeros(tolerances_of(problem).count)])
     return problem, program
 
 
@@ -226,9 +227,6 @@ def test_a_design_keeps_limits_by_what_is_proven(read: Callable[[str], Problem])
 
 def test_limits_are_kept_by_every_engine(read: Callable[[str], Problem]) -> None:
     limit = '[[constraints]]\nlimit = "maximum shaking force"\nmax = "{}"\noperating_points = ["2500 rpm"]\n'
-    free = read(TEXT + ROBUST)
-    built = BuiltEngines(free, turned([d.value for d in solve(free).decisions]), 48)
-    assert built.drawn is not None
     tight = read((TEXT + ROBUST + limit.format("1900 N")).replace('operating_points = ["2500 rpm"]\n', ""))
     found = solve(tight)
     assert found.limits[0].value <= 1900.0 * (1.0 + 1e-5)
@@ -237,7 +235,7 @@ def test_limits_are_kept_by_every_engine(read: Callable[[str], Problem]) -> None
     )
     assert found.limits[0].shadow_price == pytest.approx((narrow - wide) / 60.0, rel=0.05, abs=1e-6)
     for z in itertools.product((-1.0, 1.0), repeat=6):
-        own = tight.built(np.array(z))
+        own = built(tight, np.array(z))
         design = own.design(turned([d.value for d in found.decisions]))
         assert evaluate(own, design).value(tight.limits[0].measure) <= 1900.0 * (1.0 + 1e-5)
     none = solve(read((TEXT + ROBUST + limit.format("200 N")).replace('operating_points = ["2500 rpm"]\n', "")))
@@ -322,8 +320,8 @@ def test_crossed(read: Callable[[str], Problem], text: str) -> None:
     assert found.certificate is not None
     assert found.certificate.kind is Proof.GLOBAL
     values = unbalances_of(problem, found)
-    for z in problem.tolerances.draw(np.random.default_rng(4), 200):
-        own = problem.built(z)
+    for z in tolerances_of(problem).draw(np.random.default_rng(4), 200):
+        own = built(problem, z)
         value = objective_value(own, evaluate(own, own.design(values), found.final.samples))
         assert value <= worst(found) * (1.0 + 1e-9)
 
@@ -334,14 +332,14 @@ def test_what_bends_loads_is_drawn(read: Callable[[str], Problem]) -> None:
     problem = read(text + ROBUST + "engines = 30\n")
     found = solve(problem)
     assert found.objective is not None
-    assert found.robust is not None
+    assert isinstance(found.details, RobustResult)
     assert found.certificate is not None
     assert "worst of 30 drawn engines" in found.objective.name
     assert "not of all" in found.certificate.method
-    assert not found.robust.exact
+    assert not found.details.exact
     values = unbalances_of(problem, found)
-    built = (problem.built(z) for z in problem.tolerances.draw(np.random.default_rng(1), 30))
-    most = max(objective_value(own, evaluate(own, own.design(values), found.final.samples)) for own in built)
+    engines = (built(problem, z) for z in tolerances_of(problem).draw(np.random.default_rng(1), 30))
+    most = max(objective_value(own, evaluate(own, own.design(values), found.final.samples)) for own in engines)
     assert most == pytest.approx(worst(found), rel=1e-9)
 
 
@@ -351,6 +349,6 @@ def test_ready_problem() -> None:
     problem = load(PROBLEMS / "tractor-four-robust.toml")
     found = solve(replace(problem, tolerance=1e-3, fidelity=replace(problem.fidelity, samples=72)))
     assert worst(found) == pytest.approx(462.02, rel=1e-3)
-    assert found.robust is not None
-    assert found.robust.nominal.worst == pytest.approx(469.99, rel=1e-3)
-    assert found.robust.exceeding == 0
+    assert isinstance(found.details, RobustResult)
+    assert found.details.nominal.worst == pytest.approx(469.99, rel=1e-3)
+    assert found.details.exceeding == 0

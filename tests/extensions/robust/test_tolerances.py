@@ -13,7 +13,7 @@ from laufruhe.files.reader import load
 from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.tolerance import Law, Scope
+from laufruhe.problem.tolerance import Law, Scope, built, tolerances_of
 from problem_files import FOUR, MOUNTS, changed, shaft
 
 TEXT = (
@@ -28,7 +28,7 @@ minimise = "rms mount force"
 
 def read(folder: Path, text: str) -> Problem:
     path = folder / "engine.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text if "[robust]" in text else f"{text}\n[robust]\n", encoding="utf-8")
     return load(path)
 
 
@@ -43,7 +43,7 @@ def read(folder: Path, text: str) -> Problem:
     ],
 )
 def test_forms(tmp_path: Path, words: str, size: float, law: Law, scope: Scope) -> None:
-    (told,) = read(tmp_path, TEXT.format(words) + MOUNTS).tolerances.each
+    (told,) = tolerances_of(read(tmp_path, TEXT.format(words) + MOUNTS)).each
     assert told.size == pytest.approx(size)
     assert (told.law, told.scope, told.unit) == (law, scope, "kg")
     assert len(told.errors) == (1 if scope is Scope.BATCH else 4)
@@ -51,10 +51,10 @@ def test_forms(tmp_path: Path, words: str, size: float, law: Law, scope: Scope) 
 
 def test_errors_move_what_they_are_of(tmp_path: Path) -> None:
     problem = read(tmp_path, TEXT.format(" ± 25 g") + MOUNTS)
-    built = problem.built(np.array([1.0, -1.0, 0.0, 0.5]))
-    masses = [part.reciprocating_mass for part in built.engine.slider_cranks]
+    own = built(problem, np.array([1.0, -1.0, 0.0, 0.5]))
+    masses = [part.reciprocating_mass for part in own.engine.slider_cranks]
     assert masses == pytest.approx([1.275, 1.225, 1.25, 1.2625])
-    batch = read(tmp_path, TEXT.format(" ± 25 g batch") + MOUNTS).built(np.array([-1.0]))
+    batch = built(read(tmp_path, TEXT.format(" ± 25 g batch") + MOUNTS), np.array([-1.0]))
     assert [part.reciprocating_mass for part in batch.engine.slider_cranks] == pytest.approx([1.225] * 4)
 
 
@@ -63,7 +63,7 @@ def test_open_unbalances_are_off_by_a_share(tmp_path: Path) -> None:
         "left", 2, "0 mm", 'unbalance = { between = ["0 kg m", "0.05 kg m"], tolerance = "2 %" }\nangle = 90'
     )
     problem = read(tmp_path, TEXT.format("") + MOUNTS + weight)
-    own = problem.built(np.array([1.0]))
+    own = built(problem, np.array([1.0]))
     assert own.design([0.04j]).rotors[-1].unbalance == pytest.approx(0.0408j)
     assert problem.design([0.04j]).rotors[-1].unbalance == pytest.approx(0.04j)
 
@@ -82,23 +82,40 @@ def test_numbers_of_the_file(tmp_path: Path, old: str, new: str, scale: float) -
     problem = read(tmp_path, plain.replace(old, new))
     unit = "" if "ratio" in old else " m"
     written = f'"{scale!r}{unit}"'
-    other = read(tmp_path, plain.replace(old, f"{old.rpartition(' = ')[0]} = {written}" if " = " in old else written))
-    assert problem.built(np.array([1.0])).engine == other.engine
-    assert problem.built(np.array([0.0])).engine == problem.engine
-    assert not problem.tolerances.is_affine
+    other = load(plain.replace(old, f"{old.rpartition(' = ')[0]} = {written}" if " = " in old else written))
+    assert built(problem, np.array([1.0])).engine == other.engine
+    assert built(problem, np.array([0.0])).engine == problem.engine
+    assert not tolerances_of(problem).is_affine
 
 
 def test_angles_of_throws(tmp_path: Path) -> None:
     text = TEXT.format("").replace("firing_order", 'throws = [0, "180 deg ± 1 deg", "180 ± 1", 0]\nfiring_order')
     problem = read(tmp_path, text + MOUNTS)
-    throws = [math.degrees(p.throw) for p in problem.built(np.array([1.0, -0.5])).engine.slider_cranks]
+    throws = [math.degrees(p.throw) for p in built(problem, np.array([1.0, -0.5])).engine.slider_cranks]
     assert throws == pytest.approx([0.0, 181.0, 179.5, 0.0])
+
+
+@pytest.mark.parametrize(("names", "told"), [
+    ([None], ["s"]), (["a"], ["s.a"]), ([None, None], ["s.1", "s.2"]), (["a", None, "b"], ["s.a", "s.2", "s.b"]),
+])  # fmt: skip
+def test_errors_of_a_shaft_have_the_names_of_its_unbalances(
+    tmp_path: Path, names: list[str | None], told: list[str]
+) -> None:
+    weights = "".join(
+        f'[[balancer_shafts.unbalances]]\nx = "{10 * k} mm"\nunbalance = "0.01 kg m ± 1 %"\n'
+        + ("" if name is None else f'name = "{name}"\n')
+        for k, name in enumerate(names)
+    )
+    shafts = f'[[balancer_shafts]]\nname = "s"\nratio = 2\nposition = ["0 mm", "0 mm"]\n{weights}'
+    problem = read(tmp_path, TEXT.format("") + MOUNTS + shafts)
+    assert {error.name for error in tolerances_of(problem).errors} == set(told)
+    assert set(told) <= {rotor.name for rotor in problem.engine.rotors}
 
 
 def test_draws_stay_within(tmp_path: Path) -> None:
     for law in ("uniform", "normal"):
         text = TEXT.format(f" ± 2 % {law}") + MOUNTS + f'[tolerances]\nresidual_unbalance = "10 g cm"\nlaw = "{law}"\n'
-        drawn = read(tmp_path, text).tolerances.draw(np.random.default_rng(1), 20_000)
+        drawn = tolerances_of(read(tmp_path, text)).draw(np.random.default_rng(1), 20_000)
         sizes = np.hypot(drawn[:, 4::2], drawn[:, 5::2])
         assert np.abs(drawn[:, :4]).max() <= 1.0
         assert sizes.max() <= 1.0
@@ -115,12 +132,12 @@ def test_grades(tmp_path: Path) -> None:
     assert permitted_unbalance(6.3e-3, 60.0, 100.0 * math.pi) == pytest.approx(60.0 * 20.05e-6, rel=1e-3)
     text = TEXT.format("") + MOUNTS + '[tolerances]\nresidual_unbalance = "G 6.3"\nrotor_mass = "60 kg"\n'
     problem = read(tmp_path, text)
-    (told,) = problem.tolerances.each
+    (told,) = tolerances_of(problem).each
     assert told.size == pytest.approx(0.5 * 60.0 * 20.05e-6, rel=1e-3)
-    built = problem.built(np.array([0.0, 1.0, -1.0, 0.0]))
-    assert [rotor.unbalance for rotor in built.engine.rotors] == pytest.approx([1j * told.size, -told.size])
-    assert [rotor.x for rotor in built.engine.rotors] == pytest.approx([0.1875, -0.1875])
-    assert objective_value(built, evaluate(built)) != objective_value(problem, evaluate(problem))
+    own = built(problem, np.array([0.0, 1.0, -1.0, 0.0]))
+    assert [rotor.unbalance for rotor in own.engine.rotors] == pytest.approx([1j * told.size, -told.size])
+    assert [rotor.x for rotor in own.engine.rotors] == pytest.approx([0.1875, -0.1875])
+    assert objective_value(own, evaluate(own)) != objective_value(problem, evaluate(problem))
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from laufruhe.problem.evaluation import Evaluation, evaluate, over
 from laufruhe.problem.measure import Measure, bends_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
+from laufruhe.problem.tolerance import Tolerances, built, tolerances_of
 
 
 class BuiltEngines:
@@ -22,26 +23,26 @@ class BuiltEngines:
     Parameters
     ----------
     problem
-        With its tolerances; loads have to be affine in all errors.
+        Of built engines, or of one drawing.
+    tolerances
+        Those of the problem where None; loads have to be affine in all errors.
     values
         Of its decisions.
     samples
         Steps over the cycle.
     """
 
-    def __init__(self, problem: Problem, values: Sequence[Value], samples: int) -> None:
+    def __init__(
+        self, problem: Problem, values: Sequence[Value], samples: int, tolerances: Tolerances | None = None
+    ) -> None:
         self.problem, self.samples = problem, samples
-        units = np.concatenate([np.zeros((1, problem.tolerances.count)), np.eye(problem.tolerances.count)])
-        self._built = [evaluated(problem.built(unit), values, samples) for unit in units]
-
-    @property
-    def drawn(self) -> Evaluation:
-        """As on the drawing."""
-        return self._built[0]
+        own = tolerances_of(problem) if tolerances is None else tolerances
+        units = np.concatenate([np.zeros((1, own.count)), np.eye(own.count)])
+        self._built = [evaluated(built(problem, unit, own), values, samples) for unit in units]
 
     def norm(self, measure: Measure) -> AffineNorm:
         """A measure over the errors."""
-        drawn, finer = self.drawn, measure.norm.refinement
+        drawn, finer = self._built[0], measure.norm.refinement
         bends = None
         if measure.is_load:
             signals = over(drawn.engine.cycle.base_order, drawn.signals(measure.load))
@@ -57,9 +58,9 @@ class BuiltEngines:
         return tuple((term.weight, self.norm(term.measure)) for term in self.problem.objective)
 
 
-def evaluated(built: Problem, values: Sequence[Value], samples: int) -> Evaluation:
-    """A design with the errors of a built problem."""
-    return evaluate(built, built.design(values), samples)
+def evaluated(own: Problem, values: Sequence[Value], samples: int) -> Evaluation:
+    """Return a design with the errors of a built problem."""
+    return evaluate(own, own.design(values), samples)
 
 
 def values_of(terms: Sequence[tuple[float, AffineNorm]], errors: Array) -> Array:

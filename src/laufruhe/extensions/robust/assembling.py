@@ -8,36 +8,39 @@ that the bound is drawn to, step by step; every such assignment is an assembly t
 from __future__ import annotations
 
 import cmath
+import itertools
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from laufruhe.errors import ModelError
-from laufruhe.load_models.built_engines import BuiltEngines, values_of
+from laufruhe.errors import BoundError, ModelError
+from laufruhe.extensions.robust.built_engines import BuiltEngines, values_of
+from laufruhe.extensions.robust.error_parts import Terms
+from laufruhe.extensions.robust.worst_case import value_at
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.progress import tell
-from laufruhe.problem.assembly import Chosen, Lot, assembled
+from laufruhe.problem.assembly import Assembly, Chosen, Lot, assembled
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import is_affine
-from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.tolerance import AddedDrive, Error, PistonDrive, Tolerance, Tolerances
 from laufruhe.prove.best_first import Division, Parts, Waiting
-from laufruhe.prove.certificate import Proof, Reach, certified
-from laufruhe.prove.tolerances.error_parts import Terms
-from laufruhe.prove.tolerances.worst_case import value_at
+from laufruhe.prove.certificate import Proof, Reach, certified, withheld
 from laufruhe.prove.witness import Known, check_around
+from laufruhe.solvers import walk
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import KEPT, limit_values
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.tolerances.assembly_result import AssemblyResult, Place
 from laufruhe.solvers.tolerances.result import SHARES
 from laufruhe.solvers.values import ObjectiveValue
+from laufruhe.solvers.withheld import without_proof
 
 MOST_NODES, STEPS, RANDOM = 20_000, 8, 2000
 """Parts of all assemblies that are bounded, steps of each bound, and assemblies at random that are shown."""
@@ -48,43 +51,76 @@ PER_KILOGRAM = 0.01
 """Mass that is added to find what a kilogram does [kg]: small beside a piston."""
 
 
-def solve_assembly(problem: Problem) -> Result:
-    """The best assembly, proven.
+def solve_assembly(problem: Problem, *_: object) -> Result:
+    """Return the best assembly, proven.
 
     Raises
     ------
     ModelError
         If anything else is open, or is asked that is not affine in the masses.
     """
-    assembly = problem.assembly
+    assembly = problem.extra(Assembly)
     if assembly is None:
         raise ValueError("there are no parts to choose among")
     refuse(problem)
-    started = time.perf_counter()
+    started, spent = time.perf_counter(), time.thread_time()
     tell("what every part adds")
     terms, lots = _terms(problem), assembly.lots
     search = _Search(terms, lots, len(problem.engine.slider_cranks), problem.tolerance)
     bound = search.run()
     tell("the best assembly, and random ones", value=search.value, bound=bound)
-    given = replace(problem, engine=assembled(problem.engine, lots, search.given))
-    best = replace(problem, engine=assembled(problem.engine, lots, search.best))
-    initial, final = evaluate(given), evaluate(best)
+    witness = _walked(problem, lots, search.best, bound, max(walk.SHARE * (time.thread_time() - spent), walk.SECONDS))
+    chosen = search.best if witness is None else witness
+    initial, final = _evaluated(problem, lots, search.given), _evaluated(problem, lots, chosen)
     value = objective_value(problem, final)
-    certificate = certified(
-        value, bound, nothing_of(problem), problem.tolerance, Reach.WHOLE, 0.0,
-        f"branch and bound over assignments, {search.seen} parts bounded by dual rows",
-    )  # fmt: skip
-    limits = limit_values(problem, final)
+    certificate = withheld(value, math.inf, "a walk by exact evaluations, which proves nothing")
+    if witness is None:
+        certificate = certified(
+            value, bound, nothing_of(problem), problem.tolerance, Reach.WHOLE, 0.0,
+            f"branch and bound over assignments, {search.seen} parts bounded by dual rows",
+        )  # fmt: skip
     met = final.excess(problem.limits) <= KEPT
     status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
-    return Result(
+    found = Result(
         problem=problem, status=status if met else Status.FAILED,
         objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)), certificate=certificate,
-        limits=limits, initial=initial, final=final,
+        limits=limit_values(problem, final), initial=initial, final=final,
         message="" if met else "the best assembly breaks a limit, and limits do not choose parts; relax it",
         error=partial(error_of, problem, final), timing={"solve": time.perf_counter() - started},
-        assembly=search.result([part.name for part in problem.engine.slider_cranks]),
+        details=search.result(chosen, [part.name for part in problem.engine.slider_cranks]),
     )  # fmt: skip
+    return found if witness is None else without_proof(found, BoundError("a walk", bound, value))
+
+
+def _evaluated(problem: Problem, lots: Sequence[Lot], chosen: Chosen) -> Evaluation:
+    return evaluate(problem, assembled(problem.engine, lots, chosen))
+
+
+def _walked(problem: Problem, lots: Sequence[Lot], best: Chosen, bound: float, seconds: float) -> Chosen | None:
+    """Return an assembly under a bound, found by exact evaluations alone; None where the walk meets none."""
+    random, until = np.random.default_rng(walk.SEED), time.thread_time() + seconds
+    here, own, least, left = best, _evaluated(problem, lots, best), math.inf, [best]
+    for _ in range(walk.MOST):
+        if not left or time.thread_time() > until:
+            break
+        chosen = left.pop()
+        found = _evaluated(problem, lots, chosen)
+        if objective_value(problem, found) < least:
+            here, own, least = chosen, found, objective_value(problem, found)
+            near = list(_neighbours(lots, chosen))
+            left = [near[k] for k in random.permutation(len(near))]
+    over = 1.0 + 2.0 * error_of(problem, own) + walk.ROUNDING
+    return here if least * over + nothing_of(problem, own.engine) < bound else None
+
+
+def _neighbours(lots: Sequence[Lot], chosen: Chosen) -> Iterator[Chosen]:
+    """Yield assemblies with another part in one cylinder, which goes where that one comes from."""
+    for k, (lot, parts) in enumerate(zip(lots, chosen, strict=True)):
+        for i, part in itertools.product(range(len(parts)), range(len(lot.masses))):
+            if part not in parts[: i + 1]:
+                own = [parts[i] if other == part else other for other in parts]
+                own[i] = part
+                yield (*chosen[:k], tuple(own), *chosen[k + 1 :])
 
 
 def refuse(problem: Problem) -> None:
@@ -93,7 +129,7 @@ def refuse(problem: Problem) -> None:
         raise ModelError(
             "[assembly] chooses parts of an engine that is fixed; fix what is open, or leave [assembly] out"
         )
-    if problem.over is not None:
+    if len(problem.extras) > 1:
         raise ModelError("[assembly] takes measured parts, [robust] unmeasured ones; leave one of them out")
     if problem.fidelity.is_uneven:
         raise ModelError("[assembly] takes a crank that turns evenly; leave fidelity.crank_inertia out")
@@ -116,7 +152,7 @@ def _terms(problem: Problem) -> Terms:
         for part in parts
     ]
     unit = Tolerance("a part", "kg", PER_KILOGRAM, tuple(errors))
-    built = BuiltEngines(replace(problem, tolerances=Tolerances((unit,))), (), problem.fidelity.samples)
+    built = BuiltEngines(problem, (), problem.fidelity.samples, Tolerances((unit,)))
     return tuple((weight, replace(norm, slope=norm.slope / PER_KILOGRAM)) for weight, norm in built.terms)
 
 
@@ -232,14 +268,14 @@ class _Search(Division[Chosen]):
             found.append(tuple(own))
         return tuple(found)
 
-    def result(self, names: Sequence[str]) -> AssemblyResult:
-        """The best assembly cylinder by cylinder, beside others at random."""
+    def result(self, chosen: Chosen, names: Sequence[str]) -> AssemblyResult:
+        """Return an assembly cylinder by cylinder, beside others at random."""
         random = np.random.default_rng(0)
         others = [tuple(tuple(random.permutation(len(m))[: self.cylinders]) for m in self.more) for _ in range(RANDOM)]
-        values = values_of(self.terms, np.array([self._mass(chosen) for chosen in others]))
+        values = values_of(self.terms, np.array([self._mass(other) for other in others]))
         places = tuple(
-            Place(name, tuple(int(p[k]) + 1 for p in self.best),
-                  tuple(lot.masses[int(p[k])] for lot, p in zip(self.lots, self.best, strict=True)))
+            Place(name, tuple(int(p[k]) + 1 for p in chosen),
+                  tuple(lot.masses[int(p[k])] for lot, p in zip(self.lots, chosen, strict=True)))
             for k, name in enumerate(names)
         )  # fmt: skip
         return AssemblyResult(

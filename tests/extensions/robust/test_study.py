@@ -9,8 +9,7 @@ import pytest
 import xarray as xr
 
 from laufruhe import load
-from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.studies.kinds.tolerance import (
+from laufruhe.extensions.robust.study import (
     GRAVITY,
     Tolerance,
     TolerancesTable,
@@ -22,6 +21,7 @@ from laufruhe.studies.kinds.tolerance import (
     spread,
     worst_parts,
 )
+from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.studies.picture import Words
 from laufruhe.studies.scenes import Point
 from problem_files import PROBLEMS

@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 from pydantic import Field, model_validator
 
+from laufruhe.extensions.robust.worst_case import worst_case
 from laufruhe.files import fields as f
 from laufruhe.files.fields import Name, Table
 from laufruhe.files.study_tables import CaseTable
@@ -25,12 +26,12 @@ from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.physics.modes import GRAVITY
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.present.numbers import percent
+from laufruhe.problem.drawing import Drawing
 from laufruhe.problem.evaluation import evaluate, over
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.tolerance import AddedDrive, Drawing, Error, PistonDrive, Tolerances
+from laufruhe.problem.tolerance import AddedDrive, Error, PistonDrive, Tolerances
 from laufruhe.problem.tolerance import Tolerance as Cause
-from laufruhe.prove.tolerances.worst_case import worst_case
 from laufruhe.studies import picture as p
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes

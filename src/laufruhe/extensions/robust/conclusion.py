@@ -8,19 +8,19 @@ from functools import partial
 
 import numpy as np
 
-from laufruhe.load_models.built_engines import BuiltEngines, evaluated, values_of
+from laufruhe.extensions.robust.adversaries import Adversary, Found, names_broken
+from laufruhe.extensions.robust.built_engines import BuiltEngines, evaluated, values_of
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.problem.tolerance import Over, Tolerance
+from laufruhe.problem.tolerance import Over, Tolerance, built, robust_of, tolerances_of, with_tolerances
 from laufruhe.prove.certificate import Proof, certified
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, decided, decision_values, limit_values, none_within
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.tolerances.adversaries import Adversary, Found, names_broken
 from laufruhe.solvers.tolerances.result import CONFIDENCE, SHARE, SHARES, BuiltDesign, PricedTolerance, RobustResult
 from laufruhe.solvers.values import LimitValue, ObjectiveValue
 
@@ -57,7 +57,7 @@ def compared(
     held: Held, scenarios: int,
 ) -> RobustResult:  # fmt: skip
     """The best drawing and the design decided, each built many times, and the price of every tolerance."""
-    over = problem.over or Over()
+    over = robust_of(problem).over
     sample = _Sample.of(problem, over, seeker.samples)
     values = sample.values(problem, robust)
     share = SHARE if over.share is None else over.share
@@ -66,10 +66,10 @@ def compared(
         _design("best drawing", problem, nominal, first, sample.values(problem, nominal), share),
         _design("decided", problem, robust, found, values, share),
     )
-    worst = evaluated(problem.built(found.errors[0]), robust, seeker.samples)
+    worst = evaluated(built(problem, found.errors[0]), robust, seeker.samples)
     exceeding = int((values > found.bound * (1.0 + 1e-12)).sum())
     return RobustResult(
-        over=over, exact=over.share is None and problem.tolerances.is_affine, share=share,
+        over=over, exact=over.share is None and tolerances_of(problem).is_affine, share=share,
         nominal=designs[0], robust=designs[1], tolerances=_priced(problem, robust, held, sample, share),
         scenarios=scenarios, divisions=found.divisions, engines=len(values), seed=sample.seed, worst_engine=worst,
         exceeding=exceeding, exceeding_at_most=_at_most(exceeding, len(values)),
@@ -86,19 +86,19 @@ class _Sample:
 
     @classmethod
     def of(cls, problem: Problem, over: Over, samples: int) -> _Sample:
-        count = CHECKED if problem.tolerances.is_affine else min(over.engines, CHECKED_CURVED)
+        count = CHECKED if tolerances_of(problem).is_affine else min(over.engines, CHECKED_CURVED)
         random = np.random.default_rng([over.seed, 1])
-        return cls(problem.tolerances.draw(random, count), over.seed, samples)
+        return cls(tolerances_of(problem).draw(random, count), over.seed, samples)
 
     def values(self, problem: Problem, values: Sequence[Value]) -> Array:
         """Objective of every engine of a design; errors that loads are affine in are all taken at once."""
-        if problem.tolerances.is_affine:
+        if tolerances_of(problem).is_affine:
             return values_of(BuiltEngines(problem, values, self.samples).terms, self.errors)
         return np.array([_value(problem, values, z, self.samples) for z in self.errors])
 
 
 def _value(problem: Problem, values: Sequence[Value], errors: Array, samples: int) -> float:
-    return objective_value(problem, evaluated(problem.built(errors), values, samples))
+    return objective_value(problem, evaluated(built(problem, errors), values, samples))
 
 
 def _design(
@@ -110,9 +110,9 @@ def _design(
     low, high = (int(binom.ppf(0.5 + side * 0.5 * CONFIDENCE, len(built), share)) for side in (-1.0, 1.0))
     pairs = zip(problem.decisions, values, strict=True)
     entries = tuple((e.name, e.value, e.unit) for d, v in pairs for e in decision_values(d, v))
-    drawing = _value(problem, values, np.zeros(problem.tolerances.count), problem.fidelity.samples)
+    drawing = _value(problem, values, np.zeros(tolerances_of(problem).count), problem.fidelity.samples)
     level = float(ordered[min(int(np.ceil(share * len(built))) - 1, len(built) - 1)])
-    worst = found.bound if problem.over is None or problem.over.share is None else float(ordered[-1])
+    worst = found.bound if robust_of(problem).over.share is None else float(ordered[-1])
     return BuiltDesign(
         name, entries, drawing, worst, level,
         float(ordered[max(low - 1, 0)]), float(ordered[min(high, len(built) - 1)]),
@@ -132,7 +132,7 @@ def _priced(
 ) -> tuple[PricedTolerance, ...]:
     """Every tolerance with its price, the dearest first."""
     told = []
-    for tolerance in problem.tolerances.each:
+    for tolerance in tolerances_of(problem).each:
         wide, narrow = (_taken(problem, values, held, sample, share, tolerance, 1.0 + s) for s in (STEP, -STEP))
         saving = (wide - narrow) / (2.0 * STEP)
         told.append(PricedTolerance(
@@ -147,14 +147,14 @@ def _taken(
     factor: float,
 ) -> float:  # fmt: skip
     """What holds the design, with one tolerance so many times as wide and all else as it is (R11)."""
-    moved = replace(problem, tolerances=problem.tolerances.scaled(tolerance.name, factor))
-    if problem.over is not None and problem.over.share is not None:
+    moved = with_tolerances(problem, tolerances_of(problem).scaled(tolerance.name, factor))
+    if robust_of(problem).over.share is not None:
         return float(np.quantile(sample.values(moved, values), share))
     total = 0.0
     for errors, own, prices in zip(held.errors, held.shares, held.prices, strict=True):
         priced = [(limit, price) for limit, price in prices if price > 0.0 and limit.measure.is_load]
         if own > 0.0 or priced:
-            found = evaluated(moved.built(errors), values, sample.samples)
+            found = evaluated(built(moved, errors), values, sample.samples)
             total += own * objective_value(problem, found)
             total += sum(price * found.value(limit.measure) for limit, price in priced)
     return total
@@ -211,5 +211,5 @@ def robust_result(
         message="" if met else message,
         error=partial(error_of, problem, details.worst_engine),
         timing=timing,
-        robust=details,
+        details=details,
     )  # fmt: skip

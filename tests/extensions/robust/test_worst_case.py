@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 
 from lanes import first_fast
+from laufruhe.extensions.robust.error_parts import Block, _Moved, bounded
+from laufruhe.extensions.robust.worst_case import value_at, worst_case
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.norms import NORMS, Grid
-from laufruhe.prove.tolerances.error_parts import Block, _Moved, bounded
-from laufruhe.prove.tolerances.worst_case import value_at, worst_case
 
 Array = NDArray[np.float64]
 COLUMNS = (slice(0, 1), slice(1, 2), slice(2, 3), slice(3, 5))

@@ -10,16 +10,17 @@ import numpy as np
 import pytest
 
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.robust.assembling import _Search
 from laufruhe.files.reader import load
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.norms import MEAN, Grid
-from laufruhe.problem.assembly import Lot, assembled
+from laufruhe.problem.assembly import Assembly, Lot, assembled
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.tolerances.assembly import _Search
+from laufruhe.solvers.tolerances.assembly_result import AssemblyResult
 from problem_files import FOUR, MOUNTS
 
 THREE = FOUR.replace("[1, 3, 4, 2]", "[1, 3, 2]")
@@ -46,8 +47,9 @@ def read(tmp_path: Path) -> Read:
 
 def every(problem: Problem) -> list[float]:
     """The objective of all assemblies, by the exact model."""
-    assert problem.assembly is not None
-    lots, cylinders = problem.assembly.lots, len(problem.engine.slider_cranks)
+    own = problem.extra(Assembly)
+    assert own is not None
+    lots, cylinders = own.lots, len(problem.engine.slider_cranks)
     found = []
     for chosen in itertools.product(*(itertools.permutations(range(len(lot.masses)), cylinders) for lot in lots)):
         found.append(objective_value(problem, evaluate(problem, assembled(problem.engine, lots, chosen))))
@@ -75,15 +77,15 @@ def test_best_of_all_assemblies(read: Read, engine: str, quantity: str, lots: st
     # many angles may tell otherwise of the proof than those asked for
     values = every(result.problem)
     assert result.certificate is not None
-    assert result.assembly is not None
+    assert isinstance(result.details, AssemblyResult)
     assert result.certificate.kind is Proof.GLOBAL
     assert best(result) == pytest.approx(min(values), rel=1e-4)
     assert result.certificate.lower_bound <= min(values) * (1.0 + 1e-12)
-    assert result.assembly.assemblies == len(values)
-    assert result.assembly.worst <= max(values) * (1.0 + 1e-9)
+    assert result.details.assemblies == len(values)
+    assert result.details.worst <= max(values) * (1.0 + 1e-9)
     # every part once
-    for kind in range(len(result.assembly.kinds)):
-        parts = [place.parts[kind] for place in result.assembly.places]
+    for kind in range(len(result.details.kinds)):
+        parts = [place.parts[kind] for place in result.details.places]
         assert len(set(parts)) == len(parts)
 
 

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.errors import BoundError
+from laufruhe.extensions.robust.error_parts import ROUNDING, Block, Terms, bounded
+from laufruhe.extensions.robust.error_parts import Known as Told
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.witness import is_over, report
 from laufruhe.prove.best_first import Division, Over, Parts, Waiting
-from laufruhe.prove.tolerances.error_parts import ROUNDING, Block, Terms, bounded
-from laufruhe.prove.tolerances.error_parts import Known as Told
 from laufruhe.prove.witness import THIN, Known, check_around
 
 MOST_NODES = 5000

@@ -9,15 +9,16 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.extensions.robust.built_engines import BuiltEngines, evaluated, values_of
+from laufruhe.extensions.robust.error_parts import Terms
+from laufruhe.extensions.robust.worst_case import MOST_NODES, check_worst, worst_case
 from laufruhe.load_models.affine import AffineModel, AffineNorm
-from laufruhe.load_models.built_engines import BuiltEngines, evaluated, values_of
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import objective_value, told_at
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.tolerances.error_parts import Terms
-from laufruhe.prove.tolerances.worst_case import MOST_NODES, check_worst, worst_case
+from laufruhe.problem.tolerance import built, tolerances_of
 from laufruhe.solvers.conclusion import KEPT
 
 QUICK = 1
@@ -83,14 +84,14 @@ class EveryError:
 
     def at(self, values: Sequence[Value], proven: bool) -> Found:
         """By branch and bound."""
-        built = BuiltEngines(self.problem, values, self.samples)
-        columns, most = self.problem.tolerances.columns, MOST_NODES if proven else QUICK
-        found = worst_case(built.terms, columns, self.tolerance, most=most)
+        engines = BuiltEngines(self.problem, values, self.samples)
+        columns, most = tolerances_of(self.problem).columns, MOST_NODES if proven else QUICK
+        found = worst_case(engines.terms, columns, self.tolerance, most=most)
         if proven:
-            check_worst(built.terms, columns, found)
+            check_worst(engines.terms, columns, found)
         errors, limits, divisions = [found.errors], [], found.nodes
         broken: list[str] = []
-        finely = {self.samples: built}
+        finely = {self.samples: engines}
         for limit in moved_limits(self.problem):
             angles = told_at(limit.measure, self.samples)
             finely[angles] = finely.get(angles) or BuiltEngines(self.problem, values, angles)
@@ -144,14 +145,14 @@ class DrawnEngines:
 
     def _measured(self, values: Sequence[Value], limit: Limit | None) -> Array:
         samples = self.samples if limit is None else told_at(limit.measure, self.samples)
-        if self.problem.tolerances.is_affine:
-            built = BuiltEngines(self.problem, values, samples)
+        if tolerances_of(self.problem).is_affine:
+            engines = BuiltEngines(self.problem, values, samples)
             terms: Sequence[tuple[float, AffineNorm]] = (
-                built.terms if limit is None else ((1.0, built.norm(limit.measure)),)
+                engines.terms if limit is None else ((1.0, engines.norm(limit.measure)),)
             )
             return values_of(terms, self.errors)
         if not self.models:
-            self.models.extend(AffineModel(self.problem.built(z)) for z in self.errors)
+            self.models.extend(AffineModel(built(self.problem, z)) for z in self.errors)
         found = (evaluated(model.problem, values, samples) for model in self.models)
         return np.array([
             objective_value(self.problem, each) if limit is None else each.value(limit.measure) for each in found

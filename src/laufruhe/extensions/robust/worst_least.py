@@ -15,8 +15,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.errors import ModelError
+from laufruhe.extensions.robust.adversaries import Adversary, DrawnEngines, EveryError, Found
+from laufruhe.extensions.robust.built_engines import evaluated
+from laufruhe.extensions.robust.conclusion import Held, compared, none_built, robust_result
 from laufruhe.load_models.affine import AffineModel, AffineProblem
-from laufruhe.load_models.built_engines import evaluated
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.numerics.progress import tell, within
@@ -29,14 +31,13 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.problem.tolerance import Over
+from laufruhe.problem.tolerance import Over, built, robust_of, tolerances_of, with_tolerances
 from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, READINGS, Shown, judged, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import conflict_of, is_empty, tightened
+from laufruhe.solvers.general import solve_star_by_star
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.tolerances.adversaries import Adversary, DrawnEngines, EveryError, Found
-from laufruhe.solvers.tolerances.conclusion import Held, compared, none_built, robust_result
 
 Solve = Callable[[Problem], Result]
 
@@ -82,7 +83,7 @@ class Least:
     conflict: tuple[str, ...] = ()
 
 
-def solve_robust(problem: Problem, solve: Solve) -> Result:
+def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
     """Decide for the engines that tolerances allow.
 
     Parameters
@@ -90,44 +91,49 @@ def solve_robust(problem: Problem, solve: Solve) -> Result:
     problem
         Its unbalances may be open.
     solve
-        Decides the drawing.
+        Decides the drawing, and each star of an open one.
 
     Raises
     ------
     ModelError
         If anything else is open or asked.
     """
-    over = problem.over
-    if over is None:
-        raise ValueError("nothing is asked of built engines")
     refuse(problem)
+    if problem.phasing is not None:
+        found = solve_star_by_star(problem, solve)
+        # of engines as built the design as given is told as they are too
+        given = None if found.objective is None else solve(replace(problem, phasing=None, decisions=())).objective
+        if found.objective is None or given is None:
+            return found
+        return replace(found, objective=replace(found.objective, initial=given.value))
+    over = robust_of(problem).over
     started = time.perf_counter()
     with within("drawing"):
-        drawing = solve(problem.changed(over=None))
-    acting = problem.tolerances.acting
+        drawing = solve(problem.drawing)
+    acting = tolerances_of(problem).acting
     without = drawing.certificate is None and (problem.decisions or drawing.status is Status.INFEASIBLE)
     if without or not acting.each:
         return replace(drawing, problem=problem)
-    problem = replace(problem, tolerances=acting, fidelity=drawing.problem.fidelity)
+    problem = with_tolerances(replace(problem, fidelity=drawing.problem.fidelity), acting)
     start = tuple(unbalances_of(problem, drawing))
     tell("worst errors of the drawing")
-    seeker, found = _found(problem, over, start, drawing)
-    seeker = replace(seeker, samples=found.samples)
-    given = seeker.at(problem.start, proven=False)
-    if found.conflict:
-        return none_built(problem, given, found.conflict, {"solve": time.perf_counter() - started})
+    seeker, least = _found(problem, over, start, drawing)
+    seeker = replace(seeker, samples=least.samples)
+    as_given = seeker.at(problem.start, proven=False)
+    if least.conflict:
+        return none_built(problem, as_given, least.conflict, {"solve": time.perf_counter() - started})
     solved = time.perf_counter()
     reach = Reach.WHOLE if over.share is None else Reach.ASIDE
-    design = judged(problem, found.values, found.samples)
-    shown = Shown(found.bound, reach, found.held.residual, _method(problem, found))
-    details = compared(problem, seeker, start, found.values, found.found, found.held, found.scenarios)
+    design = judged(problem, least.values, least.samples)
+    shown = Shown(least.bound, reach, least.held.residual, _method(problem, least))
+    details = compared(problem, seeker, start, least.values, least.found, least.held, least.scenarios)
     timing = {"solve": solved - started, "compare": time.perf_counter() - solved}
-    return robust_result(problem, design, given, found.found, found.held, shown, details, timing)
+    return robust_result(problem, design, as_given, least.found, least.held, shown, details, timing)
 
 
 def _found(problem: Problem, over: Over, start: tuple[Value, ...], drawing: Result) -> tuple[Adversary, Least]:
     """Who seeks the worst engines, and the design that is best against it."""
-    tolerances, samples = problem.tolerances, problem.fidelity.samples
+    tolerances, samples = tolerances_of(problem), problem.fidelity.samples
     nothing, random = nothing_of(problem, drawing.final.engine), np.random.default_rng(over.seed)
     if over.share is None and tolerances.is_affine:
         every = EveryError(problem, samples, 0.5 * problem.tolerance)
@@ -151,6 +157,12 @@ def _found(problem: Problem, over: Over, start: tuple[Value, ...], drawing: Resu
 
 def refuse(problem: Problem) -> None:
     """Refuse what no method decides for built engines."""
+    phasing = problem.phasing
+    if phasing is not None:
+        if phasing.continuous or phasing.throw_bounds is not None:
+            rule = "[robust] decides cranks that fire evenly"
+            raise ModelError(f"{rule}; leave phasing.intervals and bounds of throws out, or leave [robust] out")
+        return
     open_kinds = {decision.kind for decision in problem.decisions} - {Kind.UNBALANCE}
     if open_kinds:
         names = ", ".join(d.name for d in problem.decisions if d.kind in open_kinds)
@@ -164,17 +176,17 @@ def refuse(problem: Problem) -> None:
             raise ModelError(f"[robust] is for loads only, not for {measure.name}; ask for it without [robust]")
     if not problem.objective:
         raise ModelError("[robust] minimises nothing; add [objective]")
-    if problem.over is not None and problem.over.share is not None and any(m.measure.is_load for m in problem.limits):
+    if robust_of(problem).over.share is not None and any(m.measure.is_load for m in problem.limits):
         raise ModelError('limits of loads are kept in the worst case only; take over = "worst case", or leave them out')
 
 
 def _method(problem: Problem, found: Least) -> str:
-    over, angles = problem.over or Over(), f"at {found.angles} angles; " if found.angles else ""
+    over, angles = robust_of(problem).over, f"at {found.angles} angles; " if found.angles else ""
     cones = f"second-order cones over {found.scenarios} sets of errors {angles}" if angles else ""
     if over.share is not None:
-        bounded = "bounded by the drawing" if problem.tolerances.is_affine else "without a bound"
+        bounded = "bounded by the drawing" if tolerances_of(problem).is_affine else "without a bound"
         return f"{cones}{over.engines} drawn engines, {bounded}"
-    if problem.tolerances.is_affine:
+    if tolerances_of(problem).is_affine:
         return f"{cones}every error bounded by branch and bound"
     return f"{cones}the worst of {over.engines} drawn engines, not of all"
 
@@ -200,7 +212,7 @@ class _Program:
                 del own[least]
         for z in new:
             self.errors.append(z)
-            self.models.append(AffineModel(self.problem.built(z)))
+            self.models.append(AffineModel(built(self.problem, z)))
             self.shares.append(1.0)
         base = common_base([model.base for model in self.models])
         for model in self.models:
@@ -267,11 +279,11 @@ def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], 
     best = Least(start, found, 0.0, Held((found.errors[0],), (1.0,), ((),)), 1, 0, seeker.samples)
     if not problem.decisions:
         # an engine that was found is built, whatever else is: what it breaks is broken, and what it has is had
-        built = evaluated(problem.built(found.errors[0]), start, seeker.samples)
-        best = replace(best, bound=objective_value(problem, finely(built)), conflict=found.broken)
+        engine = evaluated(built(problem, found.errors[0]), start, seeker.samples)
+        best = replace(best, bound=objective_value(problem, finely(engine)), conflict=found.broken)
         return _read_under(seeker, best, nothing)
     program, values, bound = _Program(problem, nothing), start, 0.0
-    program.add([np.zeros(problem.tolerances.count)])
+    program.add([np.zeros(tolerances_of(problem).count)])
     samples, level, before, known = program.angles // COARSER, 0.0, math.inf, True
     for _ in in_time(range(MOST_ROUNDS)):
         is_worse = found.value > level * (1.0 + JOINS * problem.tolerance)

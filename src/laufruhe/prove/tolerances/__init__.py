@@ -1,1 +1,0 @@
-"""The worst errors of a design."""

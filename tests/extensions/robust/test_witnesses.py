@@ -1,0 +1,130 @@
+"""Bounds of built engines and of assemblies that are broken on purpose are found out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import laufruhe
+from laufruhe.errors import BoundError
+from laufruhe.extensions.robust import assembling, worst_case
+from laufruhe.problem.assembly import Assembly, assembled
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.prove import certificate
+from laufruhe.prove.best_first import Over
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import solve, walk
+from laufruhe.solvers.result import Status
+from laufruhe.solvers.tolerances.assembly_result import AssemblyResult
+from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft, written
+from ready import solved
+
+Break = Callable[[pytest.MonkeyPatch], None]
+
+
+@pytest.fixture(autouse=True)
+def whole_walks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave no step out for want of time."""
+    monkeypatch.setattr(walk, "SECONDS", 20.0)
+
+
+def scaled(owner: Any, name: str, change: Callable[[Any], Any]) -> Break:
+    """Change the answers of a function."""
+    whole = getattr(owner, name)
+
+    def broken(*given: Any, **named: Any) -> Any:
+        return change(whole(*given, **named))
+
+    return lambda patch: patch.setattr(owner, name, broken)
+
+
+def value_times(factor: float) -> Callable[[Any], Any]:
+    return lambda found: replace(found, value=found.value * factor)
+
+
+def bound_times(factor: float) -> Callable[[Any], Any]:
+    return lambda found: replace(found, bound=found.bound * factor)
+
+
+ROBUST = (
+    changed(FOUR, "1.25 kg", "2 kg ± 2 %")
+    + """[[operating_points]]
+speed = "2500 rpm"
+[objective]
+minimise = "rms mount force"
+[fidelity]
+samples = 48
+[robust]
+engines = 200
+"""
+    + MOUNTS
+    + shaft("left", 2, "60 mm", 'unbalance = { between = ["0 kg m", "0.05 kg m"] }\nradius = "20 mm"\nangle = 180')
+)
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [scaled(worst_case, "bounded", bound_times(0.99)), scaled(certificate, "lower_bound", value_times(1.001))],
+    ids=["the worst engine", "dual rows"],
+)
+def test_a_broken_bounder_of_built_engines(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, broken: Break) -> None:
+    problem = written(tmp_path, ROBUST)
+    broken(monkeypatch)
+    with pytest.raises(BoundError):
+        laufruhe.solve(problem)
+
+
+@pytest.mark.slow
+def test_a_broken_bounder_of_assemblies(monkeypatch: pytest.MonkeyPatch) -> None:
+    scaled(assembling._Search, "bound", lambda found: 1.001 * found)(monkeypatch)
+    with pytest.raises(BoundError, match="contradicts a known design"):
+        laufruhe.solve(PROBLEMS / "selective-assembly.toml")
+
+
+@pytest.mark.slow
+def test_parts_are_left_out_in_one_place_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever a search says of what is enough, its bound is that of all parts: the gap grows, and no more."""
+    monkeypatch.setattr(assembling._Search, "enough", property(lambda _: -math.inf))
+    found = laufruhe.solve(PROBLEMS / "selective-assembly.toml")
+    assert found.certificate is not None
+    assert found.certificate.kind is Proof.WITHIN_GAP
+    assert found.objective is not None
+    assert found.certificate.lower_bound < found.objective.value
+
+
+@pytest.fixture
+def pruned_assemblies(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts of the assemblies that may hold a better one are left out, and the others are kept."""
+    right = assembling._Search.parts
+
+    def turned(self: Any, taken: Any) -> Iterator[Any]:
+        for part in right(self, taken):
+            yield Over(self.enough) if isinstance(part, tuple) and part[0] < self.enough else part
+
+    monkeypatch.setattr(assembling._Search, "parts", turned)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("pruned_assemblies")
+def test_an_assembly_that_was_pruned_is_found_out() -> None:
+    found = solve(laufruhe.load(PROBLEMS / "selective-assembly.toml"))
+    best = solved("selective-assembly")
+    assert best.objective is not None
+    assert found.certificate is not None
+    assert (found.status, found.certificate.kind, found.certificate.lower_bound) == (Status.FEASIBLE, Proof.NONE, 0.0)
+    assert "report" in found.message
+    assert isinstance(found.details, AssemblyResult)
+    # the places told are those of the design
+    chosen = tuple(zip(*([p - 1 for p in place.parts] for place in found.details.places), strict=True))
+    own = found.problem.extra(Assembly)
+    assert own is not None
+    engine = assembled(found.problem.engine, own.lots, chosen)
+    value = objective_value(found.problem, evaluate(found.problem, engine))
+    assert found.objective is not None
+    assert found.objective.value >= best.objective.value * (1.0 - 1e-4)
+    assert value == pytest.approx(found.objective.value, rel=1e-12)
