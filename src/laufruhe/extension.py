@@ -1,4 +1,4 @@
-"""Extensions: what they add to the tables of norms, channels, layouts, quantities, keys and study kinds.
+"""Extensions: what they add to the tables of the core.
 
 Those of this package are the folders of `laufruhe.extensions`; the core runs without each of them. Another installed
 package names an `Extension` as an entry point of the group `laufruhe.extensions`. Objects are imported when the table
@@ -19,7 +19,9 @@ from typing import Any, Literal
 from laufruhe.errors import ModelError
 
 GROUP = "laufruhe.extensions"
-Tables = Literal["norms", "channels", "layouts", "quantities", "study_kinds", "commands", "keys", "reductions"]
+Tables = Literal[
+    "norms", "channels", "layouts", "methods", "quantities", "provers", "reductions", "study_kinds", "commands", "keys"
+]
 
 
 @dataclass(frozen=True)
@@ -39,8 +41,12 @@ class Extension:
         every bound, and decided locally.
     layouts
         Objects of `laufruhe.machine.layouts.LayoutKind`.
+    methods
+        Objects of `laufruhe.solvers.method.Method`: rows of the table of methods, each before the one that it names.
     quantities
         Objects of `laufruhe.files.quantities.Quantity`: decisions that several numbers of the file follow.
+    provers
+        Objects of `laufruhe.prove.mounts.provers.Prover`: bounds of designs on open mounts.
     reductions
         Objects of `laufruhe.solvers.methods.Reduction`, each with the one that it stands before.
     study_kinds
@@ -56,7 +62,9 @@ class Extension:
     channels: tuple[str, ...] = ()
     dependences: tuple[str, ...] = ()
     layouts: tuple[str, ...] = ()
+    methods: tuple[str, ...] = ()
     quantities: tuple[str, ...] = ()
+    provers: tuple[str, ...] = ()
     reductions: tuple[str, ...] = ()
     study_kinds: tuple[str, ...] = ()
     commands: tuple[str, ...] = ()

@@ -12,7 +12,6 @@ from typing import Any
 import pytest
 
 import laufruhe
-from attack.families import problem as random_problem
 from laufruhe.errors import BoundError
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models.affine import AffineNorm
@@ -26,9 +25,7 @@ from laufruhe.prove.boxes.shared_gas import SharedGasBoxes
 from laufruhe.prove.boxes.sizes import SizeBoxes
 from laufruhe.prove.boxes.twist import TwistBoxes
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.mounts.design_boxes import DesignBoxes
-from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bound
-from laufruhe.prove.springs.search import SpringBoxes
+from laufruhe.prove.mounts.subdivision import StiffnessBoxes
 from laufruhe.prove.throws.star_cut import Cut
 from laufruhe.solvers.boxes import places
 from laufruhe.solvers.conclusion import judged, known_of
@@ -39,6 +36,7 @@ from laufruhe.solvers.stars import answers
 from laufruhe.solvers.throws import uneven
 from laufruhe.solvers.throws.boxes import ThrowPrograms
 from problem_files import PROBLEMS
+from prove.test_subdivision import divided_bound
 
 INPUTS = Path(__file__).parent / "inputs"
 Break = Callable[[pytest.MonkeyPatch], None]
@@ -86,7 +84,6 @@ BROKEN = {
     "sizes": ("worked-diesel-sizes", scaled(SizeBoxes, "objective", times(1.01))),
     "leads": ("geared-three-leads", scaled(LeadBoxes, "bound", value_times(1.01))),
     "places": ("tractor-four-shaft-heights", scaled(places._Search, "box", bound_times(1.01))),
-    "spring forces": ("powertrain-joined-springs", scaled(SpringBoxes, "relaxed", first_times(1.01))),
     "matrix inequalities": ("powertrain-torque-roll", scaled(convex, "dual_bound", first_times(1.001))),
 }
 """A ready problem of a family, and what breaks its bounder."""
@@ -111,14 +108,6 @@ def test_a_broken_bounder_by_expansions(monkeypatch: pytest.MonkeyPatch) -> None
     scaled(StiffnessBoxes, "_bounds", first_times(1.001))(monkeypatch)
     with pytest.raises(BoundError, match="boxes of stiffness"):
         divided_bound(problem, design.value, 1e-4 * design.value, known)
-
-
-@pytest.mark.slow
-def test_a_broken_bounder_of_mounts_with_unbalances(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = laufruhe.load(random_problem("joint", 780003)[0])
-    scaled(DesignBoxes, "_bound", first_times(1.05))(monkeypatch)
-    with pytest.raises(BoundError, match="boxes of mounts, with unbalances"):
-        laufruhe.solve(problem)
 
 
 @pytest.mark.slow

@@ -23,7 +23,6 @@ from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.named import named_part
-from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.solvers import METHODS
 
 SPRINGS = Path(__file__).parent / "inputs" / "resultant-of-joined-springs.toml"
@@ -106,7 +105,6 @@ def test_a_norm_that_claims_nothing_is_decided_locally(worst_twentieth: Norm) ->
 def test_no_bound_counts_what_it_does_not_name(resultant: LoadChannel, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = laufruhe.load(SPRINGS)
     assert named_part(problem).objective == ()
-    assert spring_bound(problem, 50.0, 0.01, KNOWN).bound == 0.0
     limited = replace(problem, limits=(*problem.limits, Limit("resultant", Measure(resultant), maximum=1.0)))
     assert named_part(limited).limits == problem.limits
     declared(monkeypatch)

@@ -7,13 +7,7 @@ import numpy as np
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes
-from laufruhe.prove.springs.search import SpringBoxes
 from prove.test_subdivision import boxes
-
-
-def by_springs(problem: Problem, low: np.ndarray, high: np.ndarray, least: float) -> float:
-    """Bound of a box by the forces of springs over the least design seen in it; a worse one is what is known."""
-    return SpringBoxes(problem, 1.2 * least, 1e-4, problem.start).relaxed(low, high)[0] / least
 
 
 def designs(problem: Problem, low, high, seed: int) -> list[float]:

@@ -24,7 +24,7 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import judged
 from laufruhe.solvers.cones.unbalances import solve_unbalances
-from laufruhe.solvers.mounts.bounds import _by_boxes, divided_by
+from laufruhe.solvers.mounts.bounds import divided_by
 from laufruhe.solvers.mounts.nonlinear import mounts_bound, solve_joint, solve_mounts
 from laufruhe.solvers.mounts.search import Found, MountSearch
 from laufruhe.solvers.mounts.starts import start_points
@@ -200,12 +200,13 @@ def test_what_is_bounded_is_the_best_design_found_on_the_way(stiffness, asked, t
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE.format(measure="rms"), "[fidelity]\nsamples = 72\n")
     values = []
 
-    def by_boxes(_problem, value, room, near, known):
+    def by_provers(question):
+        value = question.value
         values.append(value)
-        assert known.place == pytest.approx([number.real for number in near])
+        assert question.known.place == pytest.approx([number.real for number in question.near])
         return Divided(0.9 * value, 3, (np.array(stiffness),) if len(values) == 1 else ())
 
-    monkeypatch.setattr("laufruhe.solvers.mounts.bounds._by_boxes", by_boxes)
+    monkeypatch.setattr("laufruhe.solvers.mounts.bounds.proven", by_provers)
     search = ScriptedSearch(problem, [2e5, 2e5])
     given = search.best.design.value
     found = divided_by(problem, search, False)
@@ -213,39 +214,6 @@ def test_what_is_bounded_is_the_best_design_found_on_the_way(stiffness, asked, t
     assert len(values) == asked
     assert values[-1] == pytest.approx(search.best.design.value, rel=1e-6)
     assert (found.bound, found.boxes) == (0.9 * values[-1], 3)
-
-
-@pytest.mark.parametrize(
-    ("springs", "expansions", "bound", "boxes", "order"),
-    [
-        # bound and boxes of springs (s), of all that is open and again, and of expansions (e), some and all
-        ([(0.95, 2)], [], 0.95, 2, "s"),
-        ([(0.5, 2)], [(0.95, 10)], 0.95, 12, "se"),
-        ([(0.5, 2), (0.95, 7)], [(0.6, 10)], 0.95, 7, "ses"),
-        ([(0.5, 2), (0.6, 7)], [(0.4, 10), (0.7, 50)], 0.7, 57, "sese"),
-        ([(0.5, 2), (0.8, 7)], [(0.4, 10), (0.7, 50)], 0.8, 57, "sese"),
-        ([(0.5, 0)], [(0.4, 10), (0.7, 50)], 0.7, 50, "see"),
-    ],
-)
-def test_boxes_of_each_kind_are_divided_until_one_closes(
-    springs, expansions, bound, boxes, order, tmp_path, monkeypatch
-):
-    """A value of 1 is closed from 0.9: each kind has its turn, and the best bound of them is what is told."""
-    problem, asked = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE.format(measure="rms")), []
-
-    def spring_bound(*_, **__):
-        asked.append("s")
-        return Divided(*springs[asked.count("s") - 1])
-
-    def divided_bounds(*_):
-        for each in expansions:
-            asked.append("e")
-            yield Divided(*each)
-
-    monkeypatch.setattr("laufruhe.solvers.mounts.bounds.spring_bound", spring_bound)
-    monkeypatch.setattr("laufruhe.solvers.mounts.bounds.divided_bounds", divided_bounds)
-    found = _by_boxes(problem, 1.0, 0.1, (), None)
-    assert (found.bound, found.boxes, "".join(asked)) == (bound, boxes, order)
 
 
 def test_what_is_convex_in_a_sum_is_bounded_by_its_own_optimum(tmp_path):

@@ -132,7 +132,7 @@ def test_every_star_keeps_its_own_design_when_it_is_bounded(tmp_path, monkeypatc
     assert [star.candidate for star in out] == [star.candidate for star in found]
     assert [star.bound for star in out] == pytest.approx([0.9 * star.value for star in found])
     least = found[0].value
-    assert asked == [(least, math.inf, True), *[(least, 0.9 * least, False)] * 2]
+    assert asked == [(least, math.inf, True), *[(least, 0.9 * least, True)] * 2]
     assert _bounded(found, phasing, len(found) + 1) is found
 
 

@@ -20,7 +20,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes
 from laufruhe.solvers import solve
-from mounts.bounds_seen import bounds_over_designs, by_springs, designs
+from mounts.bounds_seen import bounds_over_designs, designs
 from mounts.files import BLOCK, ENGINE, MOUNTS, OPEN, changed, problem_of
 from mounts.powertrain import BLOCK as POWERTRAIN
 from mounts.powertrain import random_mounting, wrench
@@ -74,14 +74,6 @@ ASKED = {
 def test_bounds_know_damping_that_follows(name: str, tmp_path: Path) -> None:
     problem = problem_of(tmp_path, ENGINE, BLOCK, FOLLOWING, ASKED[name])
     ratios = bounds_over_designs(problem)
-    assert max(ratios) <= 1.0 + 1e-9
-    assert max(ratios) > 0.99
-
-
-def test_bounds_by_springs_know_damping_that_follows(tmp_path: Path) -> None:
-    problem = problem_of(tmp_path, ENGINE, BLOCK, FOLLOWING, RMS)
-    low, high = boxes(problem, 3, 7)
-    ratios = [by_springs(problem, *ends, min(designs(problem, *ends, 1))) for ends in zip(low, high, strict=True)]
     assert max(ratios) <= 1.0 + 1e-9
     assert max(ratios) > 0.99
 
@@ -183,10 +175,9 @@ def test_bounds_know_joined_springs(tmp_path: Path) -> None:
     plain = StiffnessBoxes(problem, 1e-4 * value)
     low, high = boxes(problem, 8, 2)
     ratios = []
-    for k, ends in enumerate(zip(low, high, strict=True)):
+    for ends in zip(low, high, strict=True):
         least = min(designs(problem, *ends, 3))
         ratios.append(float(plain.bounds(ends[0][None], ends[1][None])[0][0]) / least)
-        ratios += [by_springs(problem, *ends, least)] if k < 2 else []
     assert max(ratios) <= 1.0 + 1e-9
     assert max(ratios) > 0.99
 

@@ -33,9 +33,9 @@ from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.prove.mounts.box_runs import RunBoxes, _Look, bounds_runs
 from laufruhe.prove.mounts.run_matrices import RunMatrices
 from laufruhe.prove.mounts.run_motion import Steps, _force, equations
-from laufruhe.prove.mounts.subdivision import divided_bound
 from laufruhe.solvers import Status
 from problem_files import PROBLEMS
+from prove.test_subdivision import divided_bound
 
 READY = PROBLEMS / "soft-single-run-up-mounts.toml"
 OF_RUNS = tuple(Measure(channel) for channel in (RUN_FORCE, RUN_TRAVEL, RUN_TWIST))

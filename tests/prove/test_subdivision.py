@@ -15,11 +15,13 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
+from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.box_lines import BoxLines
 from laufruhe.prove.mounts.box_norms import under
 from laufruhe.prove.mounts.box_numbers import sag, sag_under
-from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bound, divides
+from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bounds, divides
+from laufruhe.prove.witness import Known
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.mounts.places import judged_at
@@ -43,6 +45,13 @@ compression_ratio = 11
 samples = 720
 orders = 24
 """
+
+
+def divided_bound(problem: Problem, value: float, room: float, known: Known | None = None) -> Divided:
+    """Return the bound by all boxes that are worth it; of no boxes zero."""
+    return next(divided_bounds(problem, value, room, (1.0,), known), Divided(0.0, 0))
+
+
 ASKED = {
     "rms": 'minimise = "rms mount force"',
     "mean": 'minimise = "mean mount force"',

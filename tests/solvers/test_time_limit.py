@@ -7,17 +7,13 @@ import math
 import time
 from pathlib import Path
 
-import clarabel
-import numpy as np
 import pytest
-from scipy.sparse import csc_array
 from typer.testing import CliRunner
 
 from cli import scenes
 from laufruhe.cli import app
 from laufruhe.files.reader import load
-from laufruhe.numerics.budget import at_least, in_time, left, limited, passed, rounds
-from laufruhe.prove.quadratics import solver_of
+from laufruhe.numerics.budget import in_time, left, limited, passed, rounds
 from laufruhe.solvers.methods import CUT_SHORT, Status, solve
 from problem_files import PROBLEMS, written
 
@@ -46,17 +42,6 @@ def test_a_limit_within_a_limit() -> None:
             assert 99.0 < left() <= 100.0
             assert list(in_time(range(5))) == list(rounds(5)) == list(range(5))
     assert not passed()
-
-
-def test_a_relaxation_stops_when_time_is_over_unless_it_is_given_more() -> None:
-    cones, settings = [clarabel.NonnegativeConeT(3)], {"verbose": False}
-    solver = solver_of(np.ones(3), csc_array(-np.eye(3)), -np.arange(3.0), cones, settings)
-    with limited(1e-9):
-        assert solver.solve().iterations <= 1
-        with at_least(60.0):
-            assert left() > 50.0
-            assert solver.solve().x == pytest.approx([0.0, 1.0, 2.0], abs=1e-6)
-        assert passed()
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in OPTIMA])

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, partial
-from typing import Any
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.extension import extended
@@ -35,20 +34,20 @@ from laufruhe.problem.channels import (
     Channel,
 )
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.dependence import Dependence, dependence, depends, kinds_of
+from laufruhe.problem.dependence import Dependence, depends, kinds_of
 from laufruhe.problem.evaluation import objective_value
-from laufruhe.problem.measure import Limit, Measure
+from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, Reach
-from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.apart import is_apart, solve_apart
 from laufruhe.solvers.boxes.place_boxes import without_places
 from laufruhe.solvers.conclusion import KEPT, Shown, concluded, judged, none_within, with_limits
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import beyond_mounts
 from laufruhe.solvers.in_order import solve_in_order
+from laufruhe.solvers.method import Method, by_home
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex
 from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.relaxed import solve_relaxed
@@ -64,10 +63,6 @@ CUT_SHORT = "stopped at the time limit"
 Decide = Callable[[Problem], Result]
 
 
-def _is_convex(norm: Norm) -> bool:
-    return norm.is_convex
-
-
 def _is_pointwise(norm: Norm) -> bool:
     return norm.is_convex and norm.is_pointwise
 
@@ -80,83 +75,6 @@ def _is_no_number(channel: Channel) -> bool:
     return not channel.is_number
 
 
-@dataclass(frozen=True)
-class Method:
-    """A way of deciding.
-
-    Attributes
-    ----------
-    name
-        In words.
-    needs
-        Kinds that it can have open together, and how what is asked may depend on each of them; NONE is always allowed.
-    reach
-        What its bounds can prove.
-    home
-        The function below `laufruhe.solvers` that finds the design, proven as far as it is.
-    judges_fidelity
-        Whether the fidelity is chosen again where the design needs a better one than that given (F11).
-    knows
-        Channels that it has formulas of its own for, however they depend on what is open, but not UNKNOWN.
-    norms
-        Return whether it suits a norm of a load, by what that claims.
-    still
-        Return whether a channel that it does not know, and that nothing open moves, may be asked beside.
-    also
-        Return whether other facts of a problem suit it.
-    proves
-        What of the best design, in words.
-    """
-
-    name: str
-    needs: Mapping[Kind, Collection[Dependence]]
-    reach: Reach
-    home: str
-    judges_fidelity: bool = False
-    knows: frozenset[Channel] = frozenset()
-    norms: Callable[[Norm], bool] = _is_convex
-    still: Callable[[Channel], bool] = lambda _: True
-    also: Callable[[Problem], bool] = lambda _: True
-    proves: str = ""
-
-    @property
-    def decides(self) -> frozenset[Kind]:
-        """Kinds that it can have open together."""
-        return frozenset(self.needs)
-
-    def suits(self, problem: Problem) -> bool:
-        """Return whether it decides all that is open and asked of a problem."""
-        kinds = kinds_of(problem)
-        return (
-            kinds <= self.decides
-            and all(self._names(m, kinds, problem) for m in problem.measures)
-            and self.also(problem)
-        )
-
-    def _names(self, measure: Measure, kinds: Collection[Kind], problem: Problem) -> bool:
-        """Return whether a measure depends on these kinds in a way that the method allows."""
-        if measure in problem.known_rows:
-            return all(Dependence.AFFINE in self.needs[kind] for kind in kinds)
-        if measure.is_load and not self.norms(measure.norm):
-            return False
-        found = {kind: dependence(measure.channel, kind, problem) for kind in kinds}
-        if measure.channel in self.knows:
-            return Dependence.UNKNOWN not in found.values()
-        if all(each is Dependence.NONE for each in found.values()):
-            return self.still(measure.channel)
-        return all(each is Dependence.NONE or each in self.needs[kind] for kind, each in found.items())
-
-    def decided(self, problem: Problem) -> Result:
-        """The design, accurate as far as that is looked at; what decides is imported when it first does."""
-        solve = partial(_by, self.home)
-        return solve_within(problem, solve) if self.judges_fidelity else solve(problem)
-
-
-def _by(home: str, *asked: Any) -> Result:
-    found: Result = called(f"laufruhe.solvers.{home}", *asked)
-    return found
-
-
 def solve_each_apart(problem: Problem) -> Result:
     """Parts of what is open, each by its own method."""
     return solve_apart(problem, _decided)
@@ -166,7 +84,13 @@ def solve_with_places(problem: Problem) -> Result:
     """Places, and what else is open by the method of that alone."""
     method = _method(without_places(problem))
     # fidelity is judged once, of all
-    return _by("boxes.places:solve_places_with", problem, partial(_by, method.home), method.name, solve_all_numbers)
+    return by_home(
+        ".boxes.places:solve_places_with",
+        problem,
+        partial(by_home, method.home),
+        method.name,
+        solve_all_numbers,
+    )
 
 
 def _closes_without_places(problem: Problem) -> bool:
@@ -176,7 +100,7 @@ def _closes_without_places(problem: Problem) -> bool:
 
 def solve_all_numbers(problem: Problem, near: Sequence[Sequence[Value]] = ()) -> Result:
     """Numbers that nothing better decides, by local programs; what loads are affine in by cones within them."""
-    return _by("general:solve_generally", problem, _decided, lambda part: _method(part).home == _CONES, near)
+    return by_home(".general:solve_generally", problem, _decided, lambda part: _method(part).home == _CONES, near)
 
 
 def _is_rigid(problem: Problem) -> bool:
@@ -203,42 +127,42 @@ _BUILT = (Dependence.SHIFT, Dependence.AFFINE)
 _OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *OF_RUNS}
 _OF_SIZES = frozenset(channel for channel in OF_SIZES if channel.of_engine is not None)
 _TOLD_APART = frozenset({IRREGULARITY, ABSORBER_HEAT})
-_CONES, _JOINT = "cones.unbalances:solve_sharply", "mounts.nonlinear:solve_joint"
-METHODS: tuple[Method, ...] = (
-    Method("evaluation", {}, Reach.WHOLE, "conclusion:state", norms=lambda _: True,
+_CONES, _JOINT = ".cones.unbalances:solve_sharply", ".mounts.nonlinear:solve_joint"
+_OWN: tuple[Method, ...] = (
+    Method("evaluation", {}, Reach.WHOLE, ".conclusion:state", norms=lambda _: True,
            proves="the value itself"),
-    Method("boxes of the flywheel", {_F: ()}, Reach.WHOLE, "boxes.flywheel:solve_flywheel",
+    Method("boxes of the flywheel", {_F: ()}, Reach.WHOLE, ".boxes.flywheel:solve_flywheel",
            knows=frozenset(OF_FLYWHEEL), still=lambda _: False,
            proves="the optimum"),
-    Method("boxes of discs and shafts", {_T: ()}, Reach.NEAR, "boxes.torsion:solve_torsion", True,
+    Method("boxes of discs and shafts", {_T: ()}, Reach.NEAR, ".boxes.torsion:solve_torsion", True,
            frozenset({*TORSIONAL, IRREGULARITY, FLYWHEEL_INERTIA}), _is_pointwise,
            proves="the optimum of root mean squares of two or three; else a local one"),
     Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, Reach.WHOLE, _CONES, True,
            proves="the optimum"),
     Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, Reach.WHOLE, _CONES, True,
            proves="the optimum"),
-    Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, Reach.WHOLE, "boxes.leads:solve_leads", True,
+    Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, Reach.WHOLE, ".boxes.leads:solve_leads", True,
            frozenset({IRREGULARITY}), _is_pointwise, _is_no_number,
            proves="the optimum, as far as the boxes go (P13)"),
     Method("boxes of leads between shared chambers", {Kind.LEAD: ()}, Reach.WHOLE,
-           "boxes.shared_leads:solve_shared_leads", True, frozenset({MOUNT_FORCE, *OF_BLOCK}), _is_pointwise,
+           ".boxes.shared_leads:solve_shared_leads", True, frozenset({MOUNT_FORCE, *OF_BLOCK}), _is_pointwise,
            _is_no_number, _is_rigid,
            proves="the optimum, as far as the boxes go (P15)"),
     Method("cones over boxes of places", {_U: _AFFINE, _P: _PLACED}, Reach.WHOLE,
-           "boxes.places:solve_places", True, OF_SHAFT_PLACES, _is_pointwise,
+           ".boxes.places:solve_places", True, OF_SHAFT_PLACES, _is_pointwise,
            proves="the optimum, as far as the boxes go (P8)"),
-    Method("stars, each with cones", {_S: _BUILT, _U: _AFFINE}, Reach.WHOLE, "stars.phasing:solve_phasing", True,
+    Method("stars, each with cones", {_S: _BUILT, _U: _AFFINE}, Reach.WHOLE, ".stars.phasing:solve_phasing", True,
            _TOLD_APART, _is_pointwise,
            proves="the optimum; where throws leave the even steps as far as boxes of throws, bank angle and split "
            "pins go (S29, S30)"),
-    Method("boxes of sizes", {_Z: _MASSES, _U: _AFFINE}, Reach.WHOLE, "boxes.sizes:solve_sizes", True, _OF_SIZES,
+    Method("boxes of sizes", {_Z: _MASSES, _U: _AFFINE}, Reach.WHOLE, ".boxes.sizes:solve_sizes", True, _OF_SIZES,
            _is_of_lengths, _is_no_number,
            proves="the optimum (Z12, Z14); with the length of the rod within a gap where bends of a load move "
            "with it (Z13)"),
     Method("stars, each with boxes of sizes", {_S: _BUILT, _U: _AFFINE, _Z: _MASSES}, Reach.WHOLE,
-           "stars.sizes:solve_star_sizes", True, _OF_SIZES, _is_of_lengths, _is_no_number,
+           ".stars.sizes:solve_star_sizes", True, _OF_SIZES, _is_of_lengths, _is_no_number,
            proves="the optimum, of 60 even stars or firing orders at most"),
-    Method("linear matrix inequalities", {_K: ()}, Reach.WHOLE, "mounts.convex:solve_convex_mounts",
+    Method("linear matrix inequalities", {_K: ()}, Reach.WHOLE, ".mounts.convex:solve_convex_mounts",
            knows=frozenset({*CONVEX, FREQUENCIES}), also=is_convex,
            proves="the optimum"),
     Method("smooth program, boxes of stiffness", {_K: ()}, Reach.NEAR, _JOINT, False, _OF_MOUNTS, _is_pointwise,
@@ -246,22 +170,39 @@ METHODS: tuple[Method, ...] = (
     Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE, _JOINT, False, _OF_MOUNTS, _is_pointwise,
            proves="mostly the optimum of up to five numbers of the mounts (E69); else a local one, with a bound"),
     Method("flywheel, crankshaft and the rest apart", dict.fromkeys(set(Kind) - {_S}, tuple(Dependence)), Reach.ASIDE,
-           "methods:solve_each_apart", norms=lambda _: True, also=is_apart,
+           ".methods:solve_each_apart", norms=lambda _: True, also=is_apart,
            proves="what each of them proves"),
     Method("local programs of sizes and mounts", {_Z: _MASSES, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
-           "mounts.sizes:solve_mounted_sizes", False, _OF_SIZES | _OF_MOUNTS, _is_of_lengths, also=_minimises_loads,
+           ".mounts.sizes:solve_mounted_sizes", False, _OF_SIZES | _OF_MOUNTS, _is_of_lengths, also=_minimises_loads,
            proves="a local optimum, with the bound of any masses that the sizes may have (Z15)"),
     Method("stars, each with a smooth program", {_S: _BUILT, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
-           "mounts.stars:solve_star_mounts", False, _OF_MOUNTS | _TOLD_APART, _is_pointwise, also=_tells_stars_apart,
+           ".mounts.stars:solve_star_mounts", False, _OF_MOUNTS | _TOLD_APART, _is_pointwise, also=_tells_stars_apart,
            proves="a local optimum, with a bound"),
     Method("local programs, places at their corners",
            {_U: _AFFINE, _P: _PLACED, _Q: _AFFINE, _Z: _MASSES, Kind.LEAD: _SHIFT}, Reach.WHOLE,
-           "methods:solve_with_places", True, OF_SHAFT_PLACES | _OF_SIZES | {IRREGULARITY}, also=_closes_without_places,
+           ".methods:solve_with_places", True, OF_SHAFT_PLACES | _OF_SIZES | {IRREGULARITY},
+           also=_closes_without_places,
            proves="what is proven of the rest with places at the corners of their bounds (P20)"),
     Method("local programs of all numbers", dict.fromkeys(Kind, tuple(Dependence)), Reach.ASIDE,
-           "methods:solve_all_numbers", norms=lambda _: True,
+           ".methods:solve_all_numbers", norms=lambda _: True,
            proves="a local optimum by exact evaluations, without a bound; of stars each of 60 at most"),
 )  # fmt: skip
+
+
+def _with_extensions(own: Sequence[Method]) -> tuple[Method, ...]:
+    """Return the rows, those of extensions each before the one that it names."""
+    rows = list(own)
+    for method in extended("methods", Method, own).values():
+        if method in rows:
+            continue
+        names = [row.name for row in rows]
+        if method.before not in names:
+            raise ModelError(f"method '{method.name}' stands before '{method.before}', which is no method; mend it")
+        rows.insert(names.index(method.before), method)
+    return tuple(rows)
+
+
+METHODS = _with_extensions(_OWN)
 """Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
 
 
@@ -456,7 +397,7 @@ REDUCTIONS: tuple[Reduction, ...] = (
               _refuse_any_rank),
     Reduction("limits that nothing open moves", lambda p: bool(_fixed_limits(p)), _without_fixed_limits),
     Reduction("run-ups", lambda p: asks_runs(p) and bool(kinds_of(p)) and Kind.NUMBER not in kinds_of(p),
-              lambda p, decide, _: _by("runs:solve_runs", p, kinds_of(p), decide)),
+              lambda p, decide, _: by_home(".runs:solve_runs", p, kinds_of(p), decide)),
     Reduction("an objective that nothing open moves", _is_settled, _as_given),
 )  # fmt: skip
 """Reductions of the core in the order in which they are looked for."""

@@ -12,13 +12,13 @@ of it is over its tangent at any of their values; the tangent where the norm is 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
-from laufruhe.numerics.budget import passed
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
 from laufruhe.problem.decision import Kind, ends_of, sides_of
@@ -46,8 +46,6 @@ WORK, MOST_BOXES = 8e6, 10_000
 """What all boxes may cost together, and how many they may be."""
 HELD = 4e4
 """What boxes of one round may cost."""
-EARLY = 0.1
-"""Share of the boxes that are tried first."""
 LEFT_OUT = 0.05
 """Of the gap that counts as proven, what small orders may take of it."""
 SWEEPS = 12
@@ -70,32 +68,26 @@ def is_boxed(problem: Problem, throws: OpenThrows | None = None) -> bool:
     return known and count <= MOST_NUMBERS and any(_is_bounded(t.measure, problem, turns) for t in problem.objective)
 
 
-def load_bound(
-    problem: Problem, value: float, room: float, told: float = 0.0, known: Known | None = None,
+def load_bounds(
+    problem: Problem, value: float, room: float, shares: Sequence[float], known: Known | None = None,
     throws: OpenThrows | None = None,
-) -> Divided:  # fmt: skip
-    """Divide the bounds until no design is more than `room` better than `value`, or as often as is worth it.
+) -> Iterator[Divided]:  # fmt: skip
+    """Yield bounds of boxes, each after a share of what is worth it, until none is `room` better than `value`.
 
     Parameters
     ----------
-    told
-        What no design goes under; boxes that have not come to it after a share of them are not worth the others. Where
-        nothing is told, all are.
     known
         A design by its numbers of the mounts, the columns of its unbalances, and its open throws.
     throws
         That are open too.
     """
     if not is_boxed(problem, throws) or not 0.0 < value < math.inf:
-        return Divided(0.0, 0)
+        return
     boxes = LoadBoxes(problem, LEFT_OUT * room, throws)
     most = boxes.most_boxes
-    if not most or not boxes.is_sampled_fully:
-        return Divided(0.0, 0)
-    divided = divided_on(boxes, boxes.lower, boxes.upper, value, room, (math.ceil(EARLY * most), most), known)
-    found = next(divided)
-    is_worth = (told < found.bound or told <= 0.0) and found.bound < value - room
-    return next(divided) if is_worth and not passed() else found
+    if most and boxes.is_sampled_fully:
+        counts = [math.ceil(share * most) for share in shares]
+        yield from divided_on(boxes, boxes.lower, boxes.upper, value, room, counts, known)
 
 
 def _is_affine(measure: Measure, problem: Problem) -> bool:

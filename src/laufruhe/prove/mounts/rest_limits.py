@@ -29,10 +29,6 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.mount_loops import OpenStiffness, open_stiffness
 from laufruhe.prove.mounts.ranges import SLACK, number_ranges
 
-# times that prices of several limits are sought in turn, and steps to each
-ROUNDS, STEPS = 2, 40
-_SHARE = 0.5 * (math.sqrt(5.0) - 1.0)
-
 
 @dataclass(frozen=True, eq=False)
 class _Rest:
@@ -119,34 +115,3 @@ class RestLimits:
         at = open_stiffness(self._problem, lower, upper)
         rest = _Rest(len(lower), at, self._pull, self._weight, np.concatenate(stiffness))
         return [each for limit in self._limits for each in OVER[limit.measure.channel](limit, rest)]
-
-
-def priced(values: Array, over: list[Array]) -> Array:
-    """Values with limits at the prices at which the least of them is largest, (v,); infinite where one is broken."""
-    if any(float(each.min()) > 0.0 for each in over):
-        return np.full_like(values, math.inf)
-    for _ in range(ROUNDS if len(over) > 1 else 1):
-        for each in over:
-            values = values + _price(values, each) * each
-    return values
-
-
-def _price(values: Array, over: Array) -> float:
-    """At which the least of values + price over is largest, which is concave in it (P4)."""
-
-    def least(price: float) -> float:
-        return float((values + price * over).min())
-
-    worst = int(np.argmin(values))
-    if over[worst] <= 0.0:
-        return 0.0
-    high = float(values.max() - values[worst]) / float(over[worst])
-    low, best = 0.0, 0.0
-    for _ in range(STEPS):
-        one, two = high - _SHARE * (high - low), low + _SHARE * (high - low)
-        if least(one) >= least(two):
-            high = two
-        else:
-            low = one
-        best = max(best, one, two, key=least)
-    return best

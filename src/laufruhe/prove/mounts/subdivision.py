@@ -52,8 +52,10 @@ def divides(problem: Problem) -> bool:
     return bool(problem.decisions) and stiffness
 
 
-def divided_bound(problem: Problem, value: float, room: float, known: Known | None = None) -> Divided:
-    """Divide the bounds until no design is more than `room` better than `value`, or as often as is worth it.
+def divided_bounds(
+    problem: Problem, value: float, room: float, shares: Sequence[float], known: Known | None = None
+) -> Iterator[Divided]:  # fmt: skip
+    """Yield bounds of boxes, each after a share of what is worth it, until none is `room` better than `value`.
 
     Parameters
     ----------
@@ -63,23 +65,16 @@ def divided_bound(problem: Problem, value: float, room: float, known: Known | No
         Objective of the best design known; infinite where none is, and then the bound tells whether there is one.
     room
         Difference that counts as none [SI].
+    shares
+        Of the boxes that are worth it.
     known
         The design, the witness of bounds.
     """
-    return next(divided_bounds(problem, value, room, [1.0], known))
-
-
-def divided_bounds(
-    problem: Problem, value: float, room: float, shares: Sequence[float], known: Known | None = None
-) -> Iterator[Divided]:  # fmt: skip
-    """The same by each of these shares of what is worth it, one after the other."""
     search = StiffnessBoxes(problem, LEFT_OUT * room, value - NEARLY * room if value < math.inf else math.inf)
     most = search.most_boxes
-    if not most or not search.is_sampled_fully:
-        yield from (Divided(0.0, 0) for _ in shares)
-        return
-    counts = [math.ceil(share * most) for share in shares]
-    yield from divided_on(search, search.model.lower, search.model.upper, value, room, counts, known)
+    if most and search.is_sampled_fully:
+        counts = [math.ceil(share * most) for share in shares]
+        yield from divided_on(search, search.model.lower, search.model.upper, value, room, counts, known)
 
 
 def worth_halving(pull: Array, lower: Array, upper: Array) -> NDArray[np.intp]:

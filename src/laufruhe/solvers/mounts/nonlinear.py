@@ -26,8 +26,8 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach, gap_of, room_of
 from laufruhe.prove.mounts.named import named_part
+from laufruhe.prove.mounts.provers import Question, proven, provers
 from laufruhe.prove.mounts.subdivision import divides
-from laufruhe.prove.springs.proof import spring_bound
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, decided, nearest_of, none_within, unbalances_of
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_unbalances
 from laufruhe.solvers.mounts.bounds import divided_by
@@ -106,7 +106,7 @@ def _solved(
     started = time.perf_counter()
     initial = evaluate_start(problem)
     worth = looks(problem) >= MANY_LOOKS and workers != 1 and not among
-    with at_hand(run, spring_bound, libraries=["scipy.sparse"]) if worth else nullcontext():
+    with at_hand(run, *(prover.bounds for prover in provers())) if worth else nullcontext():
         search = MountSearch(problem, initial, workers, moves, first, beside=moves is None)
         modelled = time.perf_counter()
         search.run()
@@ -185,8 +185,8 @@ def mounts_bound(problem: Problem, near: Sequence[Value] = ()) -> float:
     """What no design goes under: each kind of terms alone, for none is under zero.
 
     Numbers of the mounts by what of them is convex (E16-E19), loads of the block and masses by the unbalances alone,
-    whatever the mounts (P4); beside these, forces and travel of the mounts by their springs (E44), next to a design
-    whose values are given.
+    whatever the mounts (P4); beside these, forces and travel of the mounts by all provers, near a design that is
+    given.
     """
     problem, found, parts = named_part(problem), 0.0, []
     felt, block = (
@@ -196,7 +196,7 @@ def mounts_bound(problem: Problem, near: Sequence[Value] = ()) -> float:
         alone = replace(problem, objective=felt)
         evaluation = evaluate(alone, alone.design(list(near)))
         value = objective_value(alone, evaluation)
-        found += spring_bound(alone, value, room_of(value, alone.tolerance, nothing_of(alone)), near).bound
+        found += proven(Question(alone, value, room_of(value, alone.tolerance, nothing_of(alone)), near)).bound
     if block:
         limits = tuple(limit for limit in problem.load_limits if not limit.measure.on_mounts)
         alone = replace(off_resonance(problem).balance, objective=block, limits=limits)

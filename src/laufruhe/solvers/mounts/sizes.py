@@ -21,7 +21,7 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Value
 from laufruhe.prove.certificate import Reach, room_of
-from laufruhe.prove.springs.proof import spring_bound
+from laufruhe.prove.mounts.provers import Question, proven
 from laufruhe.solvers.boxes.sizes import check_acts, solve_sizes
 from laufruhe.solvers.conclusion import KEPT, Design, concluded, judged
 from laufruhe.solvers.mounts.nonlinear import mounts_bound
@@ -90,7 +90,7 @@ def _bound(problem: Problem, design: Design) -> float:
         return 0.0
     relaxed, near = with_masses(problem, model, design.values)
     room = room_of(design.value, problem.tolerance, nothing_of(problem, design.evaluation.engine))
-    return max(spring_bound(relaxed, design.value, room, near).bound, mounts_bound(relaxed, near))
+    return max(proven(Question(relaxed, design.value, room, near)).bound, mounts_bound(relaxed, near))
 
 
 def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> tuple[Problem, list[Value]]:

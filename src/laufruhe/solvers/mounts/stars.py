@@ -34,7 +34,7 @@ from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Certificate, Proof, Reach, certified, room_of
-from laufruhe.prove.mounts.load_boxes import load_bound
+from laufruhe.prove.mounts.load_boxes import load_bounds
 from laufruhe.prove.mounts.open_throws import throws_at
 from laufruhe.solvers.conclusion import contradiction, judged, known_of, result_under, values_of
 from laufruhe.solvers.mounts.bounds import bounded_under, mount_numbers
@@ -211,7 +211,7 @@ def _bounded(found: list[StarDesign], phasing: Phasing, designs: int) -> list[St
 
 def _bounded_one(piece: tuple[int, Result], value: float, enough: float) -> tuple[int, Result]:
     number, result = piece
-    return number, bounded_under(result, value, enough)
+    return number, bounded_under(result, value, enough, of_many=True)
 
 
 def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign]) -> list[StarDesign]:
@@ -270,7 +270,7 @@ def _divided(problem: Problem, phasing: Phasing, best: StarDesign) -> Divided:
     known = known_of(design, np.concatenate([mount_numbers(design), columns, throws.given[throws.open]]))
     value = design.value - over_read(realised, design.evaluation)
     room = room_of(value, problem.tolerance, nothing_of(problem, design.evaluation.engine))
-    return load_bound(realised, value, room, 0.0, known, throws)
+    return next(load_bounds(realised, value, room, (1.0,), known, throws), Divided(0.0, 0))
 
 
 def _bound(found: list[StarDesign]) -> float:

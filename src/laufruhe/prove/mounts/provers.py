@@ -1,0 +1,137 @@
+"""Provers: whoever bounds designs on open mounts from below, all of them asked alike.
+
+The core has boxes of stiffness (E38-E40) and boxes of mounts and unbalances (E71); extensions add theirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from laufruhe.extension import extended
+from laufruhe.numerics.budget import at_least, passed
+from laufruhe.problem.decision import domains_of, vector_of
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.prove.best_first import Divided
+from laufruhe.prove.mounts.load_boxes import is_boxed, load_bounds
+from laufruhe.prove.mounts.subdivision import divided_bounds, divides
+from laufruhe.prove.witness import Known
+
+EARLY_STIFFNESS, EARLY_LOADS = 0.2, 0.1
+"""Shares of the boxes that are tried before other provers go on."""
+LEAST_SECONDS = 0.5
+"""Time that the first bound has where time is over [s]."""
+
+
+@dataclass(eq=False)
+class Question:
+    """Ask provers if no design is more than `room` better than the best that is known.
+
+    Attributes
+    ----------
+    problem
+        On elastic mounts, some of their numbers open.
+    value
+        Objective of the best design known [SI], infinite where none is; a prover that meets a better one lowers it.
+    room
+        Difference that counts as none [SI].
+    near
+        Decisions of a design near which the best one is.
+    known
+        The best design by its numbers of the mounts, the witness of bounds.
+    of_many
+        The same is asked of many problems, so that a bound that is nearly as good and quick comes first.
+    bound
+        Best bound so far [SI]; provers read it, `proven` raises it.
+    """
+
+    problem: Problem
+    value: float
+    room: float
+    near: Sequence[Value] = ()
+    known: Known | None = None
+    of_many: bool = False
+    bound: float = 0.0
+
+
+@dataclass(frozen=True)
+class Prover:
+    """A way to bound designs on open mounts from below.
+
+    Attributes
+    ----------
+    name
+        Of what it divides, in words.
+    applies
+        Return whether it bounds anything of a problem.
+    bounds
+        Yield bounds that get better, each after more work; boxes are counted from the first one on. Places are numbers
+        of mounts, and columns of unbalances after them, from which a search may find a better design.
+    """
+
+    name: str
+    applies: Callable[[Problem], bool]
+    bounds: Callable[[Question], Iterator[Divided]]
+
+
+def _stiffness_bounds(question: Question) -> Iterator[Divided]:
+    shares = (EARLY_STIFFNESS, 1.0)
+    yield from divided_bounds(question.problem, question.value, question.room, shares, question.known)
+
+
+def _load_bounds(question: Question) -> Iterator[Divided]:
+    if question.of_many:
+        return
+    problem, known = question.problem, question.known
+    if known is not None:
+        pairs = zip(question.near, problem.decisions, strict=True)
+        columns = vector_of(domains_of(problem.unbalances), [value for value, decision in pairs if decision.is_affine])
+        known = replace(known, place=np.append(known.place, columns))
+    # boxes of one number are few
+    shares = (1.0,) if len(problem.decisions) == 1 else (EARLY_LOADS, 1.0)
+    for found in load_bounds(problem, question.value, question.room, shares, known):
+        yield replace(found, places=())
+        # boxes that are behind others after a share of them are not worth the rest
+        if found.bound < question.bound:
+            return
+
+
+PROVERS = (
+    Prover("boxes of stiffness", divides, _stiffness_bounds),
+    Prover("boxes of mounts and unbalances", lambda problem: not divides(problem) and is_boxed(problem), _load_bounds),
+)
+"""Those of the core."""
+
+
+@cache
+def provers() -> tuple[Prover, ...]:
+    """Return all provers, those of extensions first: they know more of less."""
+    found = extended("provers", Prover, PROVERS)
+    return tuple(sorted(found.values(), key=lambda prover: prover in PROVERS))
+
+
+def proven(question: Question) -> Divided:
+    """Ask all provers that apply in rounds of growing work, until one closes the question or time is over."""
+    answers = [prover.bounds(question) for prover in provers() if prover.applies(question.problem)]
+    found: dict[Iterator[Divided], Divided] = {}
+    while answers:
+        for each in tuple(answers):
+            if found and (passed() or not question.bound < question.value - question.room):
+                return _together(question, found)
+            with at_least(LEAST_SECONDS) if not found else nullcontext():
+                answer = next(each, None)
+            if answer is None:
+                answers.remove(each)
+                continue
+            found[each], question.bound = answer, max(question.bound, answer.bound)
+    return _together(question, found)
+
+
+def _together(question: Question, found: Mapping[Iterator[Divided], Divided]) -> Divided:
+    places = [each.places for each in found.values() if each.places]
+    return Divided(question.bound, sum(each.boxes for each in found.values()), places[-1] if places else ())

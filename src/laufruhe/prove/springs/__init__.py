@@ -1,1 +1,0 @@
-"""What no mounts and unbalances do better than, by the forces of springs."""

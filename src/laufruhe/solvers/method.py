@@ -1,0 +1,106 @@
+"""A row of the table of methods: what it can have open, what may be asked, and who decides."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+from laufruhe.numerics.norms import Norm
+from laufruhe.numerics.processes import called
+from laufruhe.problem.channels import Channel
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import Dependence, dependence, kinds_of
+from laufruhe.problem.measure import Measure
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Reach
+from laufruhe.solvers.accuracy import solve_within
+from laufruhe.solvers.result import Result
+
+
+def is_convex(norm: Norm) -> bool:
+    """Return whether a norm claims to be convex."""
+    return norm.is_convex
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way of deciding.
+
+    Attributes
+    ----------
+    name
+        In words.
+    needs
+        Kinds that it can have open together, and how what is asked may depend on each of them; NONE is always allowed.
+    reach
+        What its bounds can prove.
+    home
+        The function `module:name` that finds the design, proven as far as it is; `.module:name` is below
+        `laufruhe.solvers`.
+    judges_fidelity
+        Whether the fidelity is chosen again where the design needs a better one than that given (F11).
+    knows
+        Channels that it has formulas of its own for, however they depend on what is open, but not UNKNOWN.
+    norms
+        Return whether it suits a norm of a load, by what that claims.
+    still
+        Return whether a channel that it does not know, and that nothing open moves, may be asked beside.
+    also
+        Return whether other facts of a problem suit it.
+    proves
+        What of the best design, in words.
+    before
+        Name of the row that one of an extension stands before.
+    """
+
+    name: str
+    needs: Mapping[Kind, Collection[Dependence]]
+    reach: Reach
+    home: str
+    judges_fidelity: bool = False
+    knows: frozenset[Channel] = frozenset()
+    norms: Callable[[Norm], bool] = is_convex
+    still: Callable[[Channel], bool] = lambda _: True
+    also: Callable[[Problem], bool] = lambda _: True
+    proves: str = ""
+    before: str = ""
+
+    @property
+    def decides(self) -> frozenset[Kind]:
+        """Kinds that it can have open together."""
+        return frozenset(self.needs)
+
+    def suits(self, problem: Problem) -> bool:
+        """Return whether it decides all that is open and asked of a problem."""
+        kinds = kinds_of(problem)
+        return (
+            kinds <= self.decides
+            and all(self._names(m, kinds, problem) for m in problem.measures)
+            and self.also(problem)
+        )
+
+    def _names(self, measure: Measure, kinds: Collection[Kind], problem: Problem) -> bool:
+        """Return whether a measure depends on these kinds in a way that the method allows."""
+        if measure in problem.known_rows:
+            return all(Dependence.AFFINE in self.needs[kind] for kind in kinds)
+        if measure.is_load and not self.norms(measure.norm):
+            return False
+        found = {kind: dependence(measure.channel, kind, problem) for kind in kinds}
+        if measure.channel in self.knows:
+            return Dependence.UNKNOWN not in found.values()
+        if all(each is Dependence.NONE for each in found.values()):
+            return self.still(measure.channel)
+        return all(each is Dependence.NONE or each in self.needs[kind] for kind, each in found.items())
+
+    def decided(self, problem: Problem) -> Result:
+        """The design, accurate as far as that is looked at; what decides is imported when it first does."""
+        solve = partial(by_home, self.home)
+        return solve_within(problem, solve) if self.judges_fidelity else solve(problem)
+
+
+def by_home(home: str, *asked: Any) -> Result:
+    """Call a function by its name; its module is imported when it is first called."""
+    found: Result = called(f"laufruhe.solvers{home}" if home.startswith(".") else home, *asked)
+    return found

@@ -1,0 +1,99 @@
+"""A program over cones, by its dual and as told: x and z keep the conditions and meet, whatever was solved before."""
+
+from typing import Any
+
+import clarabel
+import numpy as np
+import pytest
+from scipy.sparse import coo_array
+
+from laufruhe.extensions.mount_relaxation.dual import Cone, Dual, Plain, solver_for
+from laufruhe.extensions.mount_relaxation.quadratics import column, matrix_of
+
+SETTINGS = {"verbose": False, "max_threads": 1, "presolve_enable": False, "chordal_decomposition_enable": False}
+SIZE, COUNT = 3, 4
+ENTRIES = SIZE * (SIZE + 1) // 2
+
+
+class Program:
+    """Numbers between -1 and 1, two matrices of trace one that equations bind, and a length under a number."""
+
+    def __init__(self, seed: int) -> None:
+        generator = np.random.default_rng(seed)
+        self.matrices = [COUNT + k * ENTRIES + np.arange(ENTRIES) for k in range(2)]
+        width = COUNT + 2 * ENTRIES
+        traces = np.zeros((2, width))
+        for row, own in zip(traces, self.matrices, strict=True):
+            row[own] = column(np.eye(SIZE))
+        inside = np.append(generator.uniform(-0.5, 0.5, COUNT), np.tile(column(np.eye(SIZE) / SIZE), 2))
+        bound = generator.normal(size=(1, width))
+        sides = np.zeros((2 * COUNT, width))
+        sides[:, :COUNT] = np.concatenate([np.eye(COUNT), -np.eye(COUNT)])
+        # sizes that are far apart are what scaling is for
+        length = 1e3 * np.concatenate([np.zeros((1, width)), generator.normal(size=(3, width))])
+        slack = 1e3 * np.array([3.0, 0.0, 0.0, 0.0])
+        self.rows = np.concatenate([traces, bound, sides, length])
+        right = [np.ones(2), bound @ inside, np.ones(2 * COUNT), slack + length @ inside]
+        self.right = np.concatenate(right)
+        self.cones = [
+            Cone(3, None, False),
+            Cone(2 * COUNT, clarabel.NonnegativeConeT(2 * COUNT), False),
+            Cone(4, clarabel.SecondOrderConeT(4), True),
+        ]
+        self.costs = generator.normal(size=(3, width))
+
+    def solver(self, scaled: bool, kind: Any) -> Dual | Plain:
+        """By its dual, or as told."""
+        kinds = [(own, clarabel.PSDTriangleConeT(SIZE)) for own in self.matrices]
+        found: Dual | Plain = kind(coo_array(self.rows), self.right, self.cones, kinds, scaled, SETTINGS)
+        return found
+
+
+@pytest.mark.parametrize("kind", [Dual, Plain])
+@pytest.mark.parametrize("scaled", [True, False])
+@pytest.mark.parametrize("seed", range(4))
+def test_both_keep_their_conditions_and_meet(seed: int, scaled: bool, kind: Any) -> None:
+    program = Program(seed)
+    for cost in program.costs:
+        x, z, least = program.solver(scaled, kind).solved(cost)
+        slack = program.right - program.rows @ x
+        assert np.abs(slack[:3]).max() < 1e-6
+        assert slack[3 : 3 + 2 * COUNT].min() > -1e-6
+        assert slack[-4] - np.linalg.norm(slack[-3:]) > -1e-3
+        left = cost + program.rows.T @ z
+        assert np.abs(left[:COUNT]).max() < 1e-6
+        for own in program.matrices:
+            assert np.linalg.eigvalsh(matrix_of(x[own], SIZE)).min() > -1e-6
+            assert np.linalg.eigvalsh(matrix_of(left[own], SIZE)).min() > -1e-6
+        assert z[3 : 3 + 2 * COUNT].min() > -1e-6
+        assert z[-4] - np.linalg.norm(z[-3:]) > -1e-6
+        assert least == cost @ x == pytest.approx(-program.right @ z, abs=1e-5)
+
+
+def test_what_is_larger_stands_in_a_program_once() -> None:
+    program = Program(1)
+    assert isinstance(program.solver(True, solver_for), Dual)
+    program.rows = np.concatenate([program.rows, program.rows[-4:], program.rows[-4:]])
+    program.right = np.concatenate([program.right, program.right[-4:], program.right[-4:]])
+    program.cones[-1:] = [Cone(12, clarabel.SecondOrderConeT(12), True)]
+    assert isinstance(program.solver(True, solver_for), Plain)
+
+
+@pytest.mark.parametrize("kind", [Dual, Plain])
+def test_an_answer_does_not_depend_on_those_before(kind: Any) -> None:
+    program = Program(7)
+    several = program.solver(True, kind)
+    for cost in (*program.costs, *program.costs[::-1]):
+        for told, alone in zip(several.solved(cost), program.solver(True, kind).solved(cost), strict=True):
+            assert np.array_equal(told, alone)
+
+
+@pytest.mark.parametrize("kind", [Dual, Plain])
+def test_what_has_no_least_value_is_told(kind: Any) -> None:
+    program = Program(3)
+    # nothing holds an entry that no row has
+    rows, width = np.column_stack([program.rows, np.zeros(len(program.rows))]), program.rows.shape[1] + 1
+    kinds = [(own, clarabel.PSDTriangleConeT(SIZE)) for own in program.matrices]
+    unbounded = kind(coo_array(rows), program.right, program.cones, kinds, True, SETTINGS)
+    assert unbounded.solved(np.eye(width)[-1])[2] == np.inf
+    assert np.isfinite(unbounded.solved(np.append(program.costs[0], 0.0))[2])

@@ -1,0 +1,62 @@
+"""Ends of sides that others work out ahead: to the last bit those of one process."""
+
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from extensions.mount_relaxation.test_mode_boxes import NEAR, decoupled, designs_about
+from extensions.mount_relaxation.test_spring_bound import DAMPED, LIMITS, MEANS, asked_for
+from laufruhe.extensions.mount_relaxation.ends import Aims, ends_ahead
+from laufruhe.extensions.mount_relaxation.program import Stated
+from laufruhe.extensions.mount_relaxation.proof import narrowed, spring_bound
+from laufruhe.extensions.mount_relaxation.search import SpringBoxes
+from laufruhe.numerics.workers import HERE, working_on
+from laufruhe.problem.evaluation import evaluate, objective_value
+
+
+@pytest.mark.slow
+def test_whoever_works_them_out() -> None:
+    problem = decoupled(3)
+    best, least = min(designs_about(problem, NEAR[:3], 30), key=lambda pair: pair[1])
+    found = []
+    with ThreadPoolExecutor(3) as pool:
+        for executor in (HERE, pool):
+            with working_on(executor), ends_ahead() as ahead:
+                boxes = SpringBoxes(problem, 1.02 * least, 1e-3, best.tolist(), ahead)
+                box, solved = narrowed(boxes, boxes.lower, boxes.upper, np.ones(len(boxes.lower)))
+                assert box is not None
+                found.append((box, solved, spring_bound(problem, least, 1e-2 * least, best.tolist()).bound))
+                # those that are asked for are foreseen, though some are not asked for any more
+                assert (ahead.foreseen > solved // 2) == (executor is pool)
+    (box, solved, bound), (other, counted, proven) = found
+    assert np.array_equal(box, other)
+    assert (solved, bound) == (counted, proven)
+
+
+@pytest.mark.slow
+def test_aims_are_those_of_their_own_program_and_box() -> None:
+    """Whatever was stated, or looked at, before."""
+    problem = decoupled(2)
+    best, least = min(designs_about(problem, NEAR[:2], 6), key=lambda pair: pair[1])
+    boxes, anew = (SpringBoxes(problem, 1.02 * least, 1e-3, best.tolist()) for _ in range(2))
+    middle = 0.5 * (boxes.lower + boxes.upper)
+    boxes.look(boxes.lower, middle)
+    half, whole = (boxes.left(boxes.lower, upper)[0] for upper in (middle, boxes.upper))
+    aim = np.eye(whole.numbers + 5 * len(boxes.modes))[0]
+    found = [Aims(program, None).least(0, aim)[0] for program in (whole, half, whole)]
+    alone = [Stated(program).least(aim)[0] for program in (anew.left(boxes.lower, boxes.upper)[0], half)]
+    assert found == [*alone, alone[0]]
+    assert alone[0] != alone[1]
+
+
+@pytest.mark.slow
+def test_roots_of_a_box_are_not_taken_for_those_of_a_wider_one(tmp_path: Path) -> None:
+    problem = asked_for(tmp_path, MEANS, LIMITS, mounts=DAMPED)
+    value, near = objective_value(problem, evaluate(problem)), [d.start for d in problem.decisions]
+    boxes, anew = (SpringBoxes(problem, value, 1e-3, near) for _ in range(2))
+    at, aim = boxes.lower + 0.9 * (boxes.upper - boxes.lower), np.eye(len(boxes.lower))[0]
+    boxes.look(at, boxes.upper)
+    found, alone = (Stated(one.left(one.lower, one.upper)[0]).least(aim)[0] for one in (boxes, anew))
+    assert found == alone

@@ -1,0 +1,144 @@
+"""Limits of decoupling in the relaxation of spring forces: no design that keeps them is left out (E56, E59)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from extensions.mount_relaxation.test_spring_bound import powertrain
+from laufruhe.extensions.mount_relaxation.bound import Multipliers, Priced, Program, Proposed, follows
+from laufruhe.extensions.mount_relaxation.modes import mode_of, shapes_of
+from laufruhe.extensions.mount_relaxation.open_mounts import open_mounts
+from laufruhe.extensions.mount_relaxation.program import Stated
+from laufruhe.extensions.mount_relaxation.proof import narrowed, spring_bound
+from laufruhe.extensions.mount_relaxation.search import SpringBoxes
+from laufruhe.files.reader import load
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.evaluation import evaluate, objective_value, remounted
+from laufruhe.problem.problem import Problem
+
+DECOUPLED = {"limit": "kinetic-energy decoupling", "motions": ["bounce", "roll"], "min": "0.5"}
+
+
+def decoupled(opened: int, turned: bool = False) -> Problem:
+    """So many springs of the powertrain open, bounce and roll each with half of a mode at least."""
+    tables = powertrain("2", "4 Hz", opened)
+    tables["constraints"].append(dict(DECOUPLED))
+    tables["search"] = {"boxes": 8, "starts": 4}
+    if turned:
+        tables["mounts"]["places"][1]["turned"] = [{"between": [-20, 20], "start": 3}, 0, 0]
+    return load(tables)
+
+
+def sides(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
+    low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
+    return low, high
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_every_mode_is_in_its_shapes(turned: bool) -> None:
+    """Its moments and those of every s times these keep all conditions of a box that it is in."""
+    problem, generator = decoupled(9, turned), np.random.default_rng(3)
+    low, high = sides(problem)
+    for _ in range(12):
+        width = generator.choice([1.0, 0.2]) * (high - low)
+        below = low + generator.random(len(low)) * (high - low - width)
+        x = below + generator.random(len(low)) ** 3 * width
+        mounts = open_mounts(problem, below, below + width)
+        mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
+        stiffness = mounts.root @ mounting.stiffness @ mounts.root.T
+        squares, modes = np.linalg.eigh(stiffness)
+        if not (mounts.lowest <= squares[0] and squares[-1] <= mounts.highest):
+            continue
+        slopes = mounts.slopes.reshape(mounts.numbers, -1).T
+        s = np.linalg.lstsq(slopes, (stiffness - mounts.middle).ravel(), rcond=None)[0]
+        for motion in range(6):
+            along, momentum = mounts.root[:, motion], np.linalg.inv(mounts.root)[motion]
+            shares = (along @ modes) * (momentum @ modes)
+            k = int(np.argmax(shares))
+            assert shares[k] == pytest.approx(mounting.modes.energy[motion].max())
+            mode = mode_of(mounts.root, motion, 0.999 * float(shares[k]))
+            z = np.linalg.solve(mode.basis, modes[:, k] / (momentum @ modes[:, k]))
+            assert z[0] == pytest.approx(1.0)
+            assert float(z[1:] @ z[1:]) <= 1.0
+            shapes = shapes_of(mounts, mode, z[1:] - 0.1, z[1:] + 0.1)
+            moments = np.outer(z, z) * np.concatenate([[1.0], s])[:, None, None]
+            for tensor in shapes.matrices:
+                assert np.linalg.eigvalsh(np.einsum("mabxy,mxy->ab", tensor, moments))[0] >= -1e-8
+            assert np.einsum("nmxy,mxy->n", shapes.sides, moments).min() >= -1e-8
+            assert np.abs(np.einsum("nmxy,mxy->n", shapes.equal, moments)).max() <= 1e-8
+
+
+def designs_about(problem: Problem, near: np.ndarray, count: int) -> list[tuple[np.ndarray, float]]:
+    """Designs that keep all limits, and what they are worth."""
+    generator, given, found = np.random.default_rng(5), evaluate(problem), []
+    low, high = sides(problem)
+    while len(found) < count:
+        x = np.clip(near * np.exp(generator.normal(0.0, 0.25, len(near))), low, high)
+        each = remounted(given, problem.design(x.tolist()))
+        if each.excess(problem.limits) <= 0.0:
+            found.append((x, objective_value(problem, each)))
+    return found
+
+
+NEAR = np.array([90e3, 40e3, 110e3, 60e3])
+
+
+def spoilt(found: Multipliers, by: float, noise: float, generator: Any) -> Multipliers:
+    """Multipliers of caps, conditions and modes off by a factor each, and by as much as they are large."""
+
+    def bad(m: np.ndarray) -> np.ndarray:
+        return m * generator.uniform(0.0, by) + noise * generator.normal(size=m.shape)
+
+    shapes = [
+        Priced(
+            [bad(m) for m in own.matrices], bad(own.sides), bad(own.equal), bad(own.corners),
+            [(bad(first), bad(second)) for first, second in own.shares],
+        )
+        for own in found.shapes
+    ]  # fmt: skip
+    return replace(found, caps=[bad(m) for m in found.caps], held=[bad(m) for m in found.held], shapes=shapes)
+
+
+def test_sides_hold_whatever_a_solver_proposes() -> None:
+    """Least s and least w of all designs that are better than one, by multipliers at random too."""
+    problem, generator = decoupled(4), np.random.default_rng(11)
+    designs = designs_about(problem, NEAR, 12)
+    best, least = min(designs, key=lambda pair: pair[1])
+    boxes = SpringBoxes(problem, 1.1 * least, 1e-3, best.tolist())
+    program, mounts = boxes.left(boxes.lower, boxes.upper)
+    assert len(program.shapes) == 2
+    stated = Stated(program)
+    half = 0.5 * (boxes.upper - boxes.lower)
+    inside = [x for x, value in designs if value <= 1.1 * least]
+    for number in (0, 2):
+        own: Program = replace(program, aim=np.eye(program.numbers + 10)[number])
+        told: Proposed = stated.answer(own, False)
+        side = mounts.straight[number]
+        assert side is not None
+        smallest = min((x[side] - 0.5 * (boxes.lower + boxes.upper)[side]) / half[side] for x in inside)
+        assert -1.01 <= follows(own, told.multipliers) <= smallest
+        # by the solver of the aim before, as exactly as it is worth
+        proven, stands = stated.least(np.eye(program.numbers + 10)[number])
+        assert follows(own, told.multipliers) - 0.05 < proven <= min(smallest, stands[number] + 0.05)
+        for by, noise in ((2.0, 0.0), (1.0, 1e-3), (0.0, 1.0), (0.0, 0.0)):
+            assert follows(own, spoilt(told.multipliers, by, noise, generator)) <= smallest
+
+
+@pytest.mark.slow
+def test_a_narrowed_box_keeps_all_better_designs_and_halves_are_dropped_rightly() -> None:
+    """And what is proven of the whole is not over the best of them."""
+    problem = decoupled(4)
+    designs = designs_about(problem, NEAR, 60)
+    best, least = min(designs, key=lambda pair: pair[1])
+    boxes = SpringBoxes(problem, 1.02 * least, 1e-3, best.tolist())
+    found, _ = narrowed(boxes, boxes.lower, boxes.upper, np.ones(len(boxes.lower)))
+    assert found is not None
+    for x, value in designs:
+        if value <= 1.02 * least:
+            assert np.all((found[0][:4] <= x) & (x <= found[1][:4]))
+    assert np.prod((found[1] - found[0])[:4] / (boxes.upper - boxes.lower)[:4]) < 0.5
+    assert 0.0 < spring_bound(problem, least, 1e-2 * least, best.tolist()).bound <= least

@@ -1,0 +1,34 @@
+"""Bounds by spring forces of hydraulic mounts, of damping that follows stiffness, and of springs in one place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from laufruhe.extensions.mount_relaxation.search import SpringBoxes
+from laufruhe.problem.problem import Problem
+from mounts.bounds_seen import designs
+from mounts.files import BLOCK, ENGINE, problem_of
+from mounts.test_hydraulic_mounts import HYDRAULIC
+from mounts.test_springs_of_a_place import FOLLOWING, OPEN_PAD, RMS
+from prove.test_subdivision import boxes
+
+
+def ratio(problem: Problem, low: np.ndarray, high: np.ndarray) -> float:
+    """Return the bound of a box over the least design seen in it; a worse design is known."""
+    least = min(designs(problem, low, high, 1))
+    return SpringBoxes(problem, 1.2 * least, 1e-4, problem.start).relaxed(low, high)[0] / least
+
+
+KINDS = {"damping that follows": FOLLOWING, "hydraulic": HYDRAULIC, "joined": OPEN_PAD}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_bounds_know_every_kind_of_mount(kind: str, tmp_path: Path) -> None:
+    problem = problem_of(tmp_path, ENGINE, BLOCK, KINDS[kind], RMS)
+    ratios = [ratio(problem, *ends) for ends in zip(*boxes(problem, 3, 7), strict=True)]
+    assert max(ratios) <= 1.0 + 1e-9
+    assert max(ratios) > 0.98

@@ -1,0 +1,122 @@
+"""What is known of all mounts of a box: no design stands outside of it, and limits at rest are told as they are."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from laufruhe.extensions.mount_relaxation.columns import columns_of
+from laufruhe.extensions.mount_relaxation.mirrored import mirrored_parts
+from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts, open_mounts
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.decision import Decision, Domain
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Interval, Sector
+from laufruhe.prove.mounts.rest_limits import RestLimits
+from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
+
+RMS = '[objective]\nminimise = "rms mount force"\n'
+PLACE = ('["300 mm", "200 mm", "0 mm"]', '[{ between = ["250 mm", "350 mm"] }, "200 mm", "0 mm"]')
+LIMITS = """
+[[constraints]]
+limit = "natural frequencies"
+min = "4 Hz"
+max = "16 Hz"
+[[constraints]]
+limit = "total stiffness"
+min = "1100 N/mm"
+max = "2500 N/mm"
+"""
+
+
+def designs(problem: Problem, count: int, seed: int = 0) -> list[np.ndarray]:
+    """Of the whole box, its ends among them."""
+    low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
+    return [*np.random.default_rng(seed).uniform(low, high, (count, len(low))), low, high]
+
+
+def known(problem: Problem) -> OpenMounts:
+    return open_mounts(problem, *designs(problem, 0))
+
+
+def least(matrix: np.ndarray) -> float:
+    return float(np.linalg.eigvalsh(matrix)[0])
+
+
+@pytest.mark.parametrize("places", [(), (PLACE,)])
+def test_no_stiffness_of_a_box_is_outside_of_what_is_known(tmp_path: Path, places: tuple) -> None:
+    problem = problem_of(tmp_path, ENGINE, BLOCK, changed(MOUNTS, *places), RMS)
+    mounts = known(problem)
+    for x in designs(problem, 40):
+        mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
+        own = mounts.root @ mounting.stiffness @ mounts.root.T
+        size = float(np.linalg.norm(own))
+        assert least(mounts.most - own) >= -1e-9 * size
+        assert least(own - mounts.least) >= -1e-9 * size
+
+
+def test_mounts_that_mirror_each_other_move_in_two_halves(tmp_path: Path) -> None:
+    """Fore and aft, up and pitch; aside, roll and yaw: their stiffness has the same principal values together."""
+    whole = known(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, RMS))
+    parts = mirrored_parts(whole)
+    assert [part.size for part in parts] == [3, 3]
+    for side in ("least", "most"):
+        values = np.concatenate([np.linalg.eigvalsh(getattr(part, side)) for part in parts])
+        assert np.sort(values) == pytest.approx(np.linalg.eigvalsh(getattr(whole, side)), rel=1e-9)
+
+
+def test_limits_on_frequencies_are_those_of_the_stiffness(tmp_path: Path) -> None:
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, RMS, LIMITS)
+    mounts, seen = known(problem), set()
+    (floor,), (ceiling,) = mounts.floors, mounts.ceilings
+    for x in designs(problem, 200):
+        mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
+        own, hertz = mounts.root @ mounting.stiffness @ mounts.root.T, mounting.modes.frequencies
+        if abs(hertz[0] / 4.0 - 1.0) > 1e-3:
+            assert (least(own - floor) > 0.0) == (hertz[0] > 4.0)
+        if abs(hertz[-1] / 16.0 - 1.0) > 1e-3:
+            assert (least(ceiling - own) > 0.0) == (hertz[-1] < 16.0)
+        seen.add((bool(hertz[0] > 4.0), bool(hertz[-1] < 16.0)))
+    assert len(seen) >= 2
+
+
+def test_a_total_stiffness_outside_is_told_as_a_share_of_its_limit(tmp_path: Path) -> None:
+    """Of boxes of no width, whose stiffness is one number."""
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, RMS, LIMITS.replace("natural frequencies", "static sag")
+                         .replace('min = "4 Hz"\n', "").replace("16 Hz", "1 m"))  # fmt: skip
+    rest, seen = RestLimits(problem), set()
+    for x in designs(problem, 20):
+        mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
+        total = sum(float(np.trace(k)) for k in mounting.springs)
+        told = [float(each.min()) for each in rest.over(x, x)]
+        by = [total / 2.5e6 - 1.0, 1.0 - total / 1.1e6]
+        assert min(abs(own - by[0]) for own in told) < 1e-5
+        assert min(abs(own - by[1]) for own in told) < 1e-5
+        seen.add(max(by) > 0.0)
+    assert seen == {True, False}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_columns_of_unbalances_reach_from_minus_one_to_one(seed: int) -> None:
+    """An interval that is far from zero, one about it, a disc and a sector: every set holds all that is allowed."""
+    random = np.random.default_rng(seed)
+    sets = [Interval(0.3, 0.5), Interval(-0.2, 0.1), Sector(0.4, (0.0, math.tau)), Sector(0.4, (0.2, 1.4))]
+    domains, start = [], 0
+    for k, own in enumerate(sets):
+        domains.append(Domain(Decision(f"d{k}", "kg m", own, 0j, ()), start))
+        start += domains[-1].width
+    columns, middles = columns_of(domains, [0j for _ in sets])
+    farthest = np.zeros(start)
+    for _ in range(400):
+        drawn = random.uniform(-1.0, 1.0, start)
+        x = np.concatenate([domain.project(drawn) for domain in domains])
+        u = np.linalg.solve(columns.of_domains, x - middles)
+        farthest = np.maximum(farthest, np.abs(u))
+        lifted = np.concatenate([[1.0], u])
+        assert all(lifted @ matrix @ lifted <= 1e-12 for matrix in columns.sets)
+    assert np.all(farthest <= 1.0 + 1e-12)
+    # of the sector less is reached
+    assert np.all(farthest[:4] > 0.95)

@@ -1,0 +1,77 @@
+"""Provers of open mounts: asked alike, in rounds of growing work, until one closes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from laufruhe.numerics.budget import limited
+from laufruhe.prove.best_first import Divided
+from laufruhe.prove.mounts import provers
+from laufruhe.prove.mounts.provers import Prover, Question, proven
+from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
+
+FORCE = '[objective]\nminimise = "rms mount force"\n'
+PLACE = (np.zeros(2),)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "bound", "boxes", "order"),
+    [
+        # bound and boxes of two provers, after less and more work
+        ([(0.95, 2)], [], 0.95, 2, "f"),
+        ([(0.5, 2)], [(0.95, 10)], 0.95, 12, "fs"),
+        ([(0.5, 2), (0.95, 7)], [(0.6, 10)], 0.95, 17, "fsf"),
+        ([(0.5, 2), (0.6, 7)], [(0.4, 10), (0.7, 50)], 0.7, 57, "fsfs"),
+        ([(0.5, 2), (0.8, 7)], [(0.4, 10), (0.7, 50)], 0.8, 57, "fsfs"),
+        ([], [(0.4, 10), (0.7, 50)], 0.7, 50, "ss"),
+        ([], [], 0.0, 0, ""),
+    ],
+)
+def test_each_has_its_turn_until_one_closes(
+    first: list[tuple[float, int]], second: list[tuple[float, int]], bound: float, boxes: int, order: str,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """A value of 1 is closed from 0.9, and the best bound is the answer."""
+    asked = []
+
+    def bounds_of(name: str, answers: list[tuple[float, int]]):
+        def bounds(question: Question) -> Iterator[Divided]:
+            for answer in answers:
+                asked.append((name, question.bound))
+                yield Divided(*answer, PLACE)
+
+        return Prover(name, lambda _: True, bounds)
+
+    never = Prover("never", lambda _: False, bounds_of("n", [(1.0, 1)]).bounds)
+    monkeypatch.setattr(provers, "provers", lambda: (never, bounds_of("f", first), bounds_of("s", second)))
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE)
+    found = proven(Question(problem, 1.0, 0.1))
+    assert (found.bound, found.boxes, "".join(name for name, _ in asked)) == (bound, boxes, order)
+    assert bool(found.places) is bool(order)
+    # each knows the best bound before its own
+    told = [0.0, *(answer[0] for answer in (first + second))]
+    assert all(known in told for _, known in asked)
+    with limited(1e-9):
+        asked.clear()
+        proven(Question(problem, 1.0, 0.1))
+        assert "".join(name for name, _ in asked) == order[:1]
+
+
+def test_boxes_that_are_behind_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE)
+    monkeypatch.setattr(provers, "load_bounds", lambda *_: iter([Divided(0.5, 1), Divided(0.6, 9)]))
+    for known, boxes in ((0.4, 9), (0.7, 1)):
+        question = Question(problem, 1.0, 0.1, bound=known)
+        assert [found.boxes for found in provers._load_bounds(question)][-1] == boxes
+    assert not [*provers._load_bounds(Question(problem, 1.0, 0.1, of_many=True))]
+
+
+@pytest.mark.slow
+def test_a_question_without_a_design_asks_if_there_is_one(tmp_path: Path) -> None:
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE)
+    assert proven(Question(problem, math.inf, math.inf)).bound < math.inf
