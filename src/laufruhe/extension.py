@@ -7,7 +7,7 @@ that they belong to is made, so that each of their modules imports no more than 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -131,6 +131,23 @@ def extended(
                 raise ModelError(f"extension '{extension.name}': {table} have '{name}' already; give it another name")
             found[name] = one
     return found
+
+
+def in_order(table: Tables, kind: Any, own: Sequence[Any]) -> tuple[Any, ...]:
+    """Return a table in its order: an object of an extension stands before the one that it names, else last.
+
+    Raises
+    ------
+    ModelError
+        If it names one that is not there.
+    """
+    found = list(own)
+    for one in [*extended(table, kind, own).values()][len(own) :]:
+        names = [other.name for other in found]
+        if one.before and one.before not in names:
+            raise ModelError(f"{table}: '{one.name}' stands before '{one.before}', which is not there; mend it")
+        found.insert(names.index(one.before) if one.before else len(found), one)
+    return tuple(found)
 
 
 def _imported(name: str, address: str) -> Any:

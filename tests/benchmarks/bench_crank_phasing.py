@@ -21,6 +21,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from pages import PAGES, ROOT, publish, spent
 
+from laufruhe.extensions.long_cranks.search import search_stars
 from laufruhe.files.reader import load
 from laufruhe.load_models.amplitudes import AmplitudeObjective, AmplitudeTerm
 from laufruhe.load_models.star_model import StarModel
@@ -37,7 +38,7 @@ from laufruhe.solvers import solve
 from laufruhe.solvers.stars.cuts import search_designs
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.program import owners_of, solve_design
-from laufruhe.solvers.stars.search import enumerate_stars, search_stars
+from laufruhe.solvers.stars.search import enumerate_stars
 
 OUT = PAGES / "crank-phasing.md"
 RANKED = (

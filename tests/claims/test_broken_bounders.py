@@ -76,7 +76,7 @@ BROKEN = {
     "dual rows": ("flat-four", scaled(certificate, "lower_bound", value_times(1.001))),
     "half a price": ("locomotive-balanced-share", scaled(AffineNorm, "dual_norm", times(0.5))),
     "cuts of stars": ("two-stroke-four-open", scaled(Cut, "_sums", times(1.02))),
-    "stars by their couples": ("vee-twenty-open", scaled(answers, "search_stars", least_times(1.02))),
+    "stars one by one": ("vee-twenty-open", scaled(answers, "enumerate_stars", least_times(1.02))),
     "windows of throws": ("inline-nine-uneven", scaled(uneven, "uneven_bound", lambda found: found + 1e3)),
     "throws": ("steam-two-crank", scaled(ThrowPrograms, "_under", first_times(1.02))),
     "the flywheel": ("scotch-yoke-steam-pump", scaled(OneWayProblem, "least", times(1.02))),

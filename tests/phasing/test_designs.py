@@ -1,4 +1,4 @@
-"""Stars, shafts and unbalances together: cuts, listing and exchanges agree."""
+"""Stars, shafts and unbalances together: cuts and listing agree."""
 
 import itertools
 import math
@@ -17,9 +17,7 @@ from laufruhe.prove.certificate import Multipliers, Proof, gap_of, lower_bound
 from laufruhe.prove.throws.star_cut import cut_of
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.stars import answers
 from laufruhe.solvers.stars.cuts import search_designs
-from laufruhe.solvers.stars.exchange import exchanges, improved
 from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.program import coarse_value, owners_of, solve_design
 from phasing import engines
@@ -148,21 +146,6 @@ def test_limits_that_contradict_each_other_at_one_star_exclude_others(tmp_path):
     assert found.solved[0].value == pytest.approx(min(solved.value for solved, _ in answers if solved), rel=2e-4)
 
 
-@pytest.mark.parametrize("cylinders", [4, 5])
-def test_exchanges_reach_what_cuts_prove(tmp_path, monkeypatch, cylinders):
-    """Exchanges decide cranks that no list holds; a bound of theirs holds for the optimum that cuts prove."""
-    rest = engines.MOUNTS + engines.WEIGHTS + TWO_SHAFTS + engines.MOUNT_FORCE.replace("mean", "rms")
-    problem = engines.problem(tmp_path, cylinders, phasing="best = 1\nmost_shafts = 1", rest=rest)
-    proven = solve(problem)
-    assert proven.certificate.kind is Proof.GLOBAL
-    monkeypatch.setattr(answers, "MOST_LISTED", 0)
-    found = solve(problem)
-    assert "exchanges of throws" in found.certificate.method
-    assert sum(d.value for d in found.decisions if d.name.endswith("built")) <= 1
-    assert found.objective.value == pytest.approx(proven.objective.value, rel=1e-3)
-    assert 0.0 < found.certificate.lower_bound <= proven.objective.value * (1.0 + 1e-9)
-
-
 @pytest.mark.slow
 def test_shafts_keep_the_limits_on_number_and_mass(tmp_path):
     rest = (
@@ -250,22 +233,6 @@ def test_a_limit_at_its_edge_excludes_no_star(tmp_path):
         assert found >= {star for star, value in felt.items() if value <= edge}
         assert found <= {star for star, value in felt.items() if value <= edge * (1.0 + 1e-4)}
         assert 0 < len(found) < len(stars)
-
-
-@pytest.mark.parametrize("name", ["mean", "limited", "shafts"])
-def test_exchanges_lead_to_stars_that_no_exchange_betters(tmp_path, name):
-    choice = "most_shafts = 1" if name == "shafts" else ""
-    problem = engines.problem(tmp_path, 5, phasing=choice, rest=CASES[name])
-    model, stars = model_of(problem)
-    owners = owners_of(model)
-    values = {tuple(map(int, star)): coarse_value(model, tuple(map(int, star)), (), owners) for star in stars}
-    worst = max(values, key=values.__getitem__)
-    found = improved(model, worst, (), owners)
-    value = coarse_value(model, found, (), owners)
-    # five throws: every star that has throw 1 where it is stands a few exchanges away
-    assert value == pytest.approx(min(values.values()), rel=1e-5)
-    assert value < values[worst]
-    assert len(set(exchanges(worst))) == len(list(exchanges(worst))) == 6 + 8
 
 
 @pytest.mark.parametrize(("bank", "split"), [((60, 90), 0), (90, (-30, 30))])

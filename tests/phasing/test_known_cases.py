@@ -18,7 +18,7 @@ from laufruhe.report.json_result import as_dict
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.stars.search import search_stars
+from laufruhe.solvers.stars.search import enumerate_stars
 from phasing import engines
 from problem_files import PROBLEMS
 from ready import solved
@@ -125,7 +125,7 @@ def test_least_couples_of_in_line_engines(cycle, cylinders):
     steps = firing_lattice(cycle, cylinders).steps
     space = StarSpace(steps, even_patterns(cycle, layout), layout.throw_positions)
     objective = AmplitudeObjective((1, 2), (AmplitudeTerm(1.0, (0.0, 0.0), (1.0, 0.25)),))
-    found = search_stars(
+    found = enumerate_stars(
         StarSpace(steps, space.patterns, space.places, mirror=True, reflect=True), objective, 1
     )  # fmt: skip
     least = math.inf
@@ -145,7 +145,7 @@ def test_published_couples():
     layout = inline(7, 1.0)
     space = StarSpace(7, ((1,) * 7,), layout.throw_positions, True, True)
     objective = AmplitudeObjective((1, 2), (AmplitudeTerm(1.0, (0.0, 0.0), (1.0, 1.0)),))
-    _, couples = score_stars(search_stars(space, objective).stars, 7, layout.throw_positions, (1, 2))
+    _, couples = score_stars(enumerate_stars(space, objective).stars, 7, layout.throw_positions, (1, 2))
     assert couples[0] == pytest.approx((0.2673, 1.0056), abs=1e-4)
 
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
-
-import numpy as np
 import pytest
 
 import laufruhe
@@ -65,21 +62,6 @@ def test_optional_shafts_with_open_places_are_decided_set_by_set() -> None:
     assert found.objective.value == pytest.approx(built.objective.value, rel=2e-4)
     limited = laufruhe.solve(text + "\n[phasing]\nmost_shafts = 1\n")
     assert limited.objective.value > found.objective.value
-
-
-@pytest.mark.slow
-def test_twelve_open_throws_with_weights_opposite_each() -> None:
-    """No program has weights that turn with open throws; exchanges find a crank without a couple, and it is proven."""
-    text = changed(changed(FOUR, "cylinders = 4", "cylinders = 12"), 'mass = { between = ["0 kg", "1 kg"] }\n', "")
-    text = changed(changed(text, "angle = { between = [0, 360] }\n", ""), "opposite_throw = 1\n",
-                   "balance_factor = { between = [0, 1] }\n")  # fmt: skip
-    found = laufruhe.solve(changed(text, 'rotating_mass = "0.3 kg"\n', ""))
-    assert found.objective.value < 1e-2 * found.objective.initial
-    assert found.certificate.lower_bound <= found.objective.value
-    throws = np.array([entry.value for entry in found.decisions if entry.name.startswith("throw")])
-    for order, power in itertools.product((1, 2), (0, 1)):
-        along = -0.1 * np.arange(12) if power else np.ones(12)
-        assert abs(np.sum(along * np.exp(1j * order * throws))) < 1e-9
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ OPTIMA = {
     "vee-eight-open": 444.51220,
     "two-stroke-four-open": 440.97076,
     "tractor-four-shaft-heights": 204.43,
-    "vee-twenty-open": 1690.7,
+    "vee-twenty-open": 1690.7138,
     "inline-five-uneven-gas": 285.7,
     "tractor-four-elastic": math.inf,
     "inline-five-elastic": math.inf,

@@ -14,10 +14,9 @@ from laufruhe.machine import Engine, Role, SliderCrank
 from laufruhe.machine.firing import even_patterns
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.crank_stars import Stars, phase_waves, star_sums
+from laufruhe.physics.crank_stars import Stars, star_sums
 from laufruhe.physics.order_coefficients import orders_needed
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.star_halves import Window
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Term
@@ -58,33 +57,6 @@ class AmplitudeObjective:
         weights = np.stack([np.ones(len(places)), places], axis=-1)
         waves = np.exp(1j * throws[:, None, :] * np.array(self.orders)[:, None])
         return self._of_sums(waves @ weights)
-
-    def largest(self, space: StarSpace) -> float:
-        """No crank has more: all throws on the side of their places [SI of the objective]."""
-        levers = float(np.abs(space.places).sum())
-        return sum(
-            term.weight * float(np.hypot(np.multiply(term.force, space.throws), np.multiply(term.couple, levers)).sum())
-            for term in self.terms
-        )
-
-    def least(self, space: StarSpace) -> float:
-        """No star has less: forces alone, which the pattern fixes [SI of the objective]."""
-        return min(self._forces(space, pattern) for pattern in space.patterns)
-
-    def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
-        """Of the order that weighs most: no norm is less than its share in it (S5)."""
-        shares = np.sum([np.multiply(term.weight, term.couple) for term in self.terms], axis=0)
-        place, room = int(np.argmax(shares)), value - self._forces(space, pattern)
-        if room < 0.0:
-            return None
-        most = room / shares[place] if shares[place] > 0.0 else np.inf
-        return Window(self.orders[place], complex(-most, -most), complex(most, most))
-
-    def _forces(self, space: StarSpace, pattern: Sequence[int]) -> float:
-        forces = np.abs(phase_waves(space.phases, self.orders) @ np.array(pattern))
-        forces[forces <= 1e-12 * space.throws] = 0.0
-        pure = [term for term in self.terms if not any(term.couple)]
-        return sum(term.weight * float(np.linalg.norm(np.multiply(term.force, forces))) for term in pure)
 
     def _of_sums(self, sums: NDArray[np.complex128]) -> Array:
         """Of F_h and C_h, shape (n, orders, 2)."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from laufruhe.numerics.norms import Norm
 from laufruhe.numerics.processes import called
-from laufruhe.problem.channels import Channel
+from laufruhe.problem.channels import ABSORBER_HEAT, IRREGULARITY, Channel
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence, kinds_of
 from laufruhe.problem.measure import Measure
@@ -17,6 +17,16 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach
 from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.result import Result
+
+# of stars and choices of shafts: masses are those of the shafts that are built
+BUILT = (Dependence.SHIFT, Dependence.AFFINE)
+TOLD_APART = frozenset({IRREGULARITY, ABSORBER_HEAT})
+"""Numbers that the search of stars decides beside loads."""
+
+
+def is_pointwise(norm: Norm) -> bool:
+    """Return whether a norm claims to be convex in what each angle has."""
+    return norm.is_convex and norm.is_pointwise
 
 
 def is_convex(norm: Norm) -> bool:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 
 from laufruhe.errors import ModelError, SolverError
-from laufruhe.extension import extended
+from laufruhe.extension import in_order
 from laufruhe.load_models.run_look import asks_runs
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.norms import Norm
@@ -18,7 +18,6 @@ from laufruhe.numerics.processes import called
 from laufruhe.numerics.progress import Listener, listening, tell
 from laufruhe.numerics.witness import collected
 from laufruhe.problem.channels import (
-    ABSORBER_HEAT,
     AT_EACH_MOUNT,
     FLYWHEEL_INERTIA,
     FREQUENCIES,
@@ -47,7 +46,7 @@ from laufruhe.solvers.conclusion import KEPT, Shown, concluded, judged, none_wit
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import beyond_mounts
 from laufruhe.solvers.in_order import solve_in_order
-from laufruhe.solvers.method import Method, by_home
+from laufruhe.solvers.method import BUILT, TOLD_APART, Method, by_home, is_pointwise
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex
 from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.relaxed import solve_relaxed
@@ -61,10 +60,6 @@ LIBRARIES = ("casadi", "clarabel", "cvxpy")
 """Packages that are imported where something open needs them, named as their modules."""
 CUT_SHORT = "stopped at the time limit"
 Decide = Callable[[Problem], Result]
-
-
-def _is_pointwise(norm: Norm) -> bool:
-    return norm.is_convex and norm.is_pointwise
 
 
 def _is_of_lengths(norm: Norm) -> bool:
@@ -122,12 +117,10 @@ _U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT,
 _T, _Z, _Q = Kind.TORSION, Kind.SIZE, Kind.PISTON
 _AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependence.SHIFT,)
 _PLACED = (Dependence.BIAFFINE, Dependence.BENT)
-# of stars and choices of shafts: masses are those of the shafts that are built
-_BUILT = (Dependence.SHIFT, Dependence.AFFINE)
 _OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *OF_RUNS}
 _OF_SIZES = frozenset(channel for channel in OF_SIZES if channel.of_engine is not None)
-_TOLD_APART = frozenset({IRREGULARITY, ABSORBER_HEAT})
 _CONES, _JOINT = ".cones.unbalances:solve_sharply", ".mounts.nonlinear:solve_joint"
+_STARS = ".stars.phasing:solve_phasing"
 _OWN: tuple[Method, ...] = (
     Method("evaluation", {}, Reach.WHOLE, ".conclusion:state", norms=lambda _: True,
            proves="the value itself"),
@@ -135,39 +128,39 @@ _OWN: tuple[Method, ...] = (
            knows=frozenset(OF_FLYWHEEL), still=lambda _: False,
            proves="the optimum"),
     Method("boxes of discs and shafts", {_T: ()}, Reach.NEAR, ".boxes.torsion:solve_torsion", True,
-           frozenset({*TORSIONAL, IRREGULARITY, FLYWHEEL_INERTIA}), _is_pointwise,
+           frozenset({*TORSIONAL, IRREGULARITY, FLYWHEEL_INERTIA}), is_pointwise,
            proves="the optimum of root mean squares of two or three; else a local one"),
     Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, Reach.WHOLE, _CONES, True,
            proves="the optimum"),
     Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, Reach.WHOLE, _CONES, True,
            proves="the optimum"),
     Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, Reach.WHOLE, ".boxes.leads:solve_leads", True,
-           frozenset({IRREGULARITY}), _is_pointwise, _is_no_number,
+           frozenset({IRREGULARITY}), is_pointwise, _is_no_number,
            proves="the optimum, as far as the boxes go (P13)"),
     Method("boxes of leads between shared chambers", {Kind.LEAD: ()}, Reach.WHOLE,
-           ".boxes.shared_leads:solve_shared_leads", True, frozenset({MOUNT_FORCE, *OF_BLOCK}), _is_pointwise,
+           ".boxes.shared_leads:solve_shared_leads", True, frozenset({MOUNT_FORCE, *OF_BLOCK}), is_pointwise,
            _is_no_number, _is_rigid,
            proves="the optimum, as far as the boxes go (P15)"),
     Method("cones over boxes of places", {_U: _AFFINE, _P: _PLACED}, Reach.WHOLE,
-           ".boxes.places:solve_places", True, OF_SHAFT_PLACES, _is_pointwise,
+           ".boxes.places:solve_places", True, OF_SHAFT_PLACES, is_pointwise,
            proves="the optimum, as far as the boxes go (P8)"),
-    Method("stars, each with cones", {_S: _BUILT, _U: _AFFINE}, Reach.WHOLE, ".stars.phasing:solve_phasing", True,
-           _TOLD_APART, _is_pointwise,
+    Method("stars, each with cones", {_S: BUILT, _U: _AFFINE}, Reach.WHOLE, _STARS, True,
+           TOLD_APART, is_pointwise,
            proves="the optimum; where throws leave the even steps as far as boxes of throws, bank angle and split "
            "pins go (S29, S30)"),
     Method("boxes of sizes", {_Z: _MASSES, _U: _AFFINE}, Reach.WHOLE, ".boxes.sizes:solve_sizes", True, _OF_SIZES,
            _is_of_lengths, _is_no_number,
            proves="the optimum (Z12, Z14); with the length of the rod within a gap where bends of a load move "
            "with it (Z13)"),
-    Method("stars, each with boxes of sizes", {_S: _BUILT, _U: _AFFINE, _Z: _MASSES}, Reach.WHOLE,
+    Method("stars, each with boxes of sizes", {_S: BUILT, _U: _AFFINE, _Z: _MASSES}, Reach.WHOLE,
            ".stars.sizes:solve_star_sizes", True, _OF_SIZES, _is_of_lengths, _is_no_number,
            proves="the optimum, of 60 even stars or firing orders at most"),
     Method("linear matrix inequalities", {_K: ()}, Reach.WHOLE, ".mounts.convex:solve_convex_mounts",
            knows=frozenset({*CONVEX, FREQUENCIES}), also=is_convex,
            proves="the optimum"),
-    Method("smooth program, boxes of stiffness", {_K: ()}, Reach.NEAR, _JOINT, False, _OF_MOUNTS, _is_pointwise,
+    Method("smooth program, boxes of stiffness", {_K: ()}, Reach.NEAR, _JOINT, False, _OF_MOUNTS, is_pointwise,
            proves="mostly the optimum of up to four numbers, often of six; else a bound"),
-    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE, _JOINT, False, _OF_MOUNTS, _is_pointwise,
+    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE, _JOINT, False, _OF_MOUNTS, is_pointwise,
            proves="mostly the optimum of up to five numbers of the mounts (E69); else a local one, with a bound"),
     Method("flywheel, crankshaft and the rest apart", dict.fromkeys(set(Kind) - {_S}, tuple(Dependence)), Reach.ASIDE,
            ".methods:solve_each_apart", norms=lambda _: True, also=is_apart,
@@ -175,8 +168,8 @@ _OWN: tuple[Method, ...] = (
     Method("local programs of sizes and mounts", {_Z: _MASSES, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
            ".mounts.sizes:solve_mounted_sizes", False, _OF_SIZES | _OF_MOUNTS, _is_of_lengths, also=_minimises_loads,
            proves="a local optimum, with the bound of any masses that the sizes may have (Z15)"),
-    Method("stars, each with a smooth program", {_S: _BUILT, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
-           ".mounts.stars:solve_star_mounts", False, _OF_MOUNTS | _TOLD_APART, _is_pointwise, also=_tells_stars_apart,
+    Method("stars, each with a smooth program", {_S: BUILT, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
+           ".mounts.stars:solve_star_mounts", False, _OF_MOUNTS | TOLD_APART, is_pointwise, also=_tells_stars_apart,
            proves="a local optimum, with a bound"),
     Method("local programs, places at their corners",
            {_U: _AFFINE, _P: _PLACED, _Q: _AFFINE, _Z: _MASSES, Kind.LEAD: _SHIFT}, Reach.WHOLE,
@@ -188,21 +181,7 @@ _OWN: tuple[Method, ...] = (
            proves="a local optimum by exact evaluations, without a bound; of stars each of 60 at most"),
 )  # fmt: skip
 
-
-def _with_extensions(own: Sequence[Method]) -> tuple[Method, ...]:
-    """Return the rows, those of extensions each before the one that it names."""
-    rows = list(own)
-    for method in extended("methods", Method, own).values():
-        if method in rows:
-            continue
-        names = [row.name for row in rows]
-        if method.before not in names:
-            raise ModelError(f"method '{method.name}' stands before '{method.before}', which is no method; mend it")
-        rows.insert(names.index(method.before), method)
-    return tuple(rows)
-
-
-METHODS = _with_extensions(_OWN)
+METHODS: tuple[Method, ...] = in_order("methods", Method, _OWN)
 """Which method decides what: the first row whose kinds cover what is open, and that what is asked suits."""
 
 
@@ -301,6 +280,8 @@ def refuse(problem: Problem) -> None:
     if kinds and not problem.objective:
         words = " and ".join(kind.name.lower() for kind in sorted(kinds))
         raise ModelError(f"{words} is open and nothing is minimised; add [objective] or [mounts]")
+    if problem.phasing is not None and _method(problem).home == _STARS:
+        called("laufruhe.solvers.stars.answers:refuse", problem)
 
 
 def _decided(problem: Problem, left: Sequence[Reduction] | None = None) -> Result:
@@ -406,10 +387,8 @@ REDUCTIONS: tuple[Reduction, ...] = (
 @cache
 def reductions() -> tuple[Reduction, ...]:
     """Return all reductions in the order in which they are looked for; methods decide what none of them applies to."""
-    found = list(REDUCTIONS)
-    for one in list(extended("reductions", Reduction, REDUCTIONS).values())[len(REDUCTIONS) :]:
-        found.insert(next((k for k, other in enumerate(found) if other.name == one.before), len(found)), one)
-    return tuple(found)
+    found: tuple[Reduction, ...] = in_order("reductions", Reduction, REDUCTIONS)
+    return found
 
 
 def _closing(problem: Problem, kinds: frozenset[Kind], method: Method) -> tuple[Method, Problem] | None:

@@ -76,7 +76,7 @@ def test_multipliers_of_a_corner_that_keeps_no_limits_call_it_bad(seed: int) -> 
 def test_a_corner_is_proven_as_closely_whatever_the_weights() -> None:
     problem = joint(780017)
     ((_, mounts),) = boxes_of(problem, np.random.default_rng(1), 1, 0.5)
-    given, gaps = MountedLoads(problem).at(mounts), []
+    given, gaps = CornerLoads(problem).at(mounts), []
     for times in (1e-6, 1.0, 1e6):
         weighted = replace(given, terms=tuple((times * weight, norm) for weight, norm in given.terms))
         x, multipliers = best_at(weighted)

@@ -41,4 +41,4 @@ def bounds(question: Question) -> Iterator[Divided]:
     yield replace(found, places=() if boxes.best is None else (np.concatenate(boxes.best),))
 
 
-CORNERS = Prover("boxes of mounts, with unbalances", applies, bounds)
+CORNERS = Prover("boxes of mounts, with unbalances", applies, bounds, "boxes of stiffness")

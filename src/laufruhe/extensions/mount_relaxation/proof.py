@@ -55,7 +55,7 @@ def bounds(question: Question) -> Iterator[Divided]:
         yield found if alone else replace(found, places=())
 
 
-SPRINGS = Prover("boxes of mounts and modes, by spring forces", applies, bounds)
+SPRINGS = Prover("boxes of mounts and modes, by spring forces", applies, bounds, "boxes of stiffness")
 
 
 def spring_bound(

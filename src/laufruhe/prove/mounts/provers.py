@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from laufruhe.extension import extended
+from laufruhe.extension import in_order
 from laufruhe.numerics.budget import at_least, passed
 from laufruhe.problem.decision import domains_of, vector_of
 from laufruhe.problem.problem import Problem
@@ -72,11 +72,14 @@ class Prover:
     bounds
         Yield bounds that get better, each after more work; boxes are counted from the first one on. Places are numbers
         of mounts, and columns of unbalances after them, from which a search may find a better design.
+    before
+        Name of the prover that one of an extension stands before.
     """
 
     name: str
     applies: Callable[[Problem], bool]
     bounds: Callable[[Question], Iterator[Divided]]
+    before: str = ""
 
 
 def _stiffness_bounds(question: Question) -> Iterator[Divided]:
@@ -110,9 +113,9 @@ PROVERS = (
 
 @cache
 def provers() -> tuple[Prover, ...]:
-    """Return all provers, those of extensions first: they know more of less."""
-    found = extended("provers", Prover, PROVERS)
-    return tuple(sorted(found.values(), key=lambda prover: prover in PROVERS))
+    """Return all provers in the order in which they are asked."""
+    found: tuple[Prover, ...] = in_order("provers", Prover, PROVERS)
+    return found
 
 
 def proven(question: Question) -> Divided:

@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -44,10 +45,16 @@ FINER, ROUNDS = 16, 2
 Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
 """A star, and its steps where it fires evenly."""
 Decide: TypeAlias = Callable[[Problem, float], Result]
+Search: TypeAlias = Callable[[Problem, Phasing, Sequence[Family]], Answer]
 
 
-def solve_phasing(problem: Problem) -> Result:
+def solve_phasing(problem: Problem, search: Search = searched) -> Result:
     """Decide open throws, firing orders, shafts and unbalances together.
+
+    Parameters
+    ----------
+    search
+        Return the best designs of all even stars of some families.
 
     Returns
     -------
@@ -64,23 +71,24 @@ def solve_phasing(problem: Problem) -> Result:
         raise SolverError("nothing of the phasing is open")
     wheel = of_wheel(problem)
     if phasing.throws is None and wheel and not phasing.continuous and not gas_tells_apart(problem):
-        return solve_told_alike(problem, phasing, solve_phasing)
+        return solve_told_alike(problem, phasing, partial(solve_phasing, search=search))
     started = time.perf_counter()
     if phasing.throws is not None:
         result = by_each_order(problem, phasing, every_star(phasing))
     elif phasing.throw_bounds is not None:
         result = _uneven(problem, phasing, None)
     else:
-        result = _of_open_throws(problem, phasing)
+        result = _of_open_throws(problem, phasing, search)
     return replace(result, timing={**result.timing, "phasing": time.perf_counter() - started})
 
 
-def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
+def _of_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Result:
     is_even = phasing.intervals.holds([phasing.even_interval])
     unlike = gas_tells_apart(problem)
     if of_wheel(problem) and not unlike:
         even = replace(phasing, intervals=Intervals(phasing.even_interval, phasing.even_interval))
-        told = solve_told_alike(problem, even, solve_phasing) if is_even and families_of(even)[0] else None
+        again = partial(solve_phasing, search=search)
+        told = solve_told_alike(problem, even, again) if is_even and families_of(even)[0] else None
         return _uneven(problem, phasing, None if told is None or told.objective is None else told)
     alone = unlike or phasing.shares_throws or any(measure.is_told_apart for measure in problem.measures)
     if (problem.feels_order or unlike) and is_even and alone:
@@ -94,7 +102,7 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
         return no_star(problem, none_fires(phasing)[0])
     if not families:
         return _uneven(problem, phasing, None)
-    answer = searched(replace(problem, tolerance=_share(problem)), phasing, families)
+    answer = search(replace(problem, tolerance=_share(problem)), phasing, families)
     if not answer.designs:
         if phasing.continuous:
             return _uneven(problem, phasing, None)
@@ -105,11 +113,11 @@ def _of_open_throws(problem: Problem, phasing: Phasing) -> Result:
         return no_star(problem, why, Status.FAILED)
     result = _best_of(problem, phasing, answer)
     if answer.complete and problem.search.proves:
-        result = _with_more_angles(problem, families, result)
+        result = _with_more_angles(problem, families, result, search)
     return _uneven(problem, phasing, result) if phasing.continuous else result
 
 
-def _with_more_angles(problem: Problem, families: Sequence[Family], result: Result) -> Result:
+def _with_more_angles(problem: Problem, families: Sequence[Family], result: Result, search: Search) -> Result:
     """The same search at more angles, while these are all that keeps a gap open (P7)."""
     for _ in range(ROUNDS):
         gap = result.certificate.gap if result.certificate else 0.0
@@ -121,7 +129,7 @@ def _with_more_angles(problem: Problem, families: Sequence[Family], result: Resu
         # the gas keeps its steps: a design is worth the same at as many angles, whoever evaluates it
         problem = problem.at(replace(own, samples=times * own.samples, gas_samples=own.gas_steps))
         assert problem.phasing is not None
-        answer = searched(replace(problem, tolerance=_share(problem)), problem.phasing, families)
+        answer = search(replace(problem, tolerance=_share(problem)), problem.phasing, families)
         found = _best_of(problem, problem.phasing, answer) if answer.designs else result
         if found.certificate is None or found.certificate.gap >= gap or not answer.complete:
             break

@@ -9,7 +9,9 @@ import numpy as np
 import pytest
 
 from lanes import first_fast
-from laufruhe.load_models.couple_norms import CoupleNorms, CoupleTerm, couple_norms, three_stars
+from laufruhe.extensions.long_cranks.couples import CoupleNorms, CoupleTerm, couple_norms, three_stars
+from laufruhe.extensions.long_cranks.search import search_stars
+from laufruhe.extensions.long_cranks.starts import _blocks, good_starts, swaps
 from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.physics.crank_stars import Stars, star_sums
 from laufruhe.problem.evaluation import evaluate, finely, objective_value
@@ -17,8 +19,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.stars.families import Family, families_of
-from laufruhe.solvers.stars.search import enumerate_stars, search_stars
-from laufruhe.solvers.stars.starts import _blocks, good_starts, swaps
+from laufruhe.solvers.stars.search import enumerate_stars
 from phasing import engines
 
 MOUNTS = (

@@ -17,13 +17,13 @@ from functools import cached_property
 
 import numpy as np
 
+from laufruhe.extensions.long_cranks.halves import Window
 from laufruhe.load_models.star_model import in_few_rows
 from laufruhe.machine import Role
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.norms import Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.crank_stars import Stars, star_sums
-from laufruhe.physics.star_halves import Window
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import Evaluation, evaluate, over

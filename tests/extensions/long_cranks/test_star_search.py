@@ -9,31 +9,33 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from laufruhe.load_models.amplitudes import AmplitudeObjective, AmplitudeTerm
+from laufruhe.extensions.long_cranks import search as star_search
+from laufruhe.extensions.long_cranks import starts
+from laufruhe.extensions.long_cranks.amplitudes import StarAmplitudes
+from laufruhe.extensions.long_cranks.halves import Free, Window, meeting, shares_of, work_of
+from laufruhe.extensions.long_cranks.search import search_stars
+from laufruhe.load_models.amplitudes import AmplitudeTerm
 from laufruhe.machine.layouts import inline
 from laufruhe.numerics.workers import HERE, working_on
 from laufruhe.physics.crank_stars import star_sums
-from laufruhe.physics.star_halves import Free, Window, meeting, shares_of, work_of
 from laufruhe.physics.star_space import StarSpace, outside_in
-from laufruhe.solvers.stars import search as star_search
-from laufruhe.solvers.stars import starts
-from laufruhe.solvers.stars.search import enumerate_stars, search_stars
+from laufruhe.solvers.stars.search import enumerate_stars
 
 NONE = (0.0,) * 4
 ORDERS = (1, 2, 3, 4)
 OBJECTIVES = {
-    "one order": AmplitudeObjective((1,), (AmplitudeTerm(1.0, (0.0,), (1.0,)),)),
-    "second order": AmplitudeObjective((2,), (AmplitudeTerm(2.5, (0.0,), (1.0,)),)),
-    "rms of two": AmplitudeObjective((1, 2), (AmplitudeTerm(1.0, (0.0, 0.0), (1.0, 0.25)),)),
-    "sum of two": AmplitudeObjective(
+    "one order": StarAmplitudes((1,), (AmplitudeTerm(1.0, (0.0,), (1.0,)),)),
+    "second order": StarAmplitudes((2,), (AmplitudeTerm(2.5, (0.0,), (1.0,)),)),
+    "rms of two": StarAmplitudes((1, 2), (AmplitudeTerm(1.0, (0.0, 0.0), (1.0, 0.25)),)),
+    "sum of two": StarAmplitudes(
         (1, 2), (AmplitudeTerm(1.0, (0.0, 0.0), (1.0, 0.0)), AmplitudeTerm(1.0, (0.0, 0.0), (0.0, 1.0)))
     ),
-    "rms of four": AmplitudeObjective(ORDERS, (AmplitudeTerm(1.0, NONE, (1.0, 0.3, 0.05, 0.02)),)),
-    "mixed": AmplitudeObjective(
+    "rms of four": StarAmplitudes(ORDERS, (AmplitudeTerm(1.0, NONE, (1.0, 0.3, 0.05, 0.02)),)),
+    "mixed": StarAmplitudes(
         ORDERS,
         (AmplitudeTerm(1.0, NONE, (1.0, 0.3, 0.0, 0.0)), AmplitudeTerm(0.5, NONE, (0.0, 1.0, 0.0, 0.4))),
     ),
-    "with force": AmplitudeObjective(
+    "with force": StarAmplitudes(
         (1, 2), (AmplitudeTerm(1.0, (1.0, 1.0), (0.0, 0.0)), AmplitudeTerm(1.0, (0.0, 0.0), (1.0, 0.25)))
     ),
 }
@@ -173,7 +175,7 @@ def test_long_cranks_without_couples_need_no_search(throws, name):
 @pytest.mark.parametrize("throws", [6, 14, 48])
 def test_a_search_that_nothing_is_left_of_ends(throws):
     """Forces alone, which even pairs cancel: every star is as good as the next, in pieces or not."""
-    forces = AmplitudeObjective((1, 2), (AmplitudeTerm(1.0, (1.0, 1.0), (0.0, 0.0)),))
+    forces = StarAmplitudes((1, 2), (AmplitudeTerm(1.0, (1.0, 1.0), (0.0, 0.0)),))
     found = search_stars(in_pairs(throws), forces, 1, time_limit=10.0)
     assert found.complete
     assert found.values == pytest.approx([0.0], abs=1e-12 * throws)

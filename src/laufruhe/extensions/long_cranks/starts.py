@@ -9,18 +9,18 @@ from typing import Protocol
 
 import numpy as np
 
+from laufruhe.extensions.long_cranks.halves import Free, Window, meeting, shares_of
 from laufruhe.load_models.amplitudes import NEGLIGIBLE
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.numerics.budget import in_time
 from laufruhe.physics.crank_stars import Stars
-from laufruhe.physics.star_halves import Free, Window, meeting, shares_of
 from laufruhe.physics.star_space import StarSpace
+from laufruhe.solvers.stars.search import SLACK
 
 STARTS, IN_BLOCKS = 12, 1500
 """Stars of each kind that are bettered, and of those in blocks so many that the best of them are taken from."""
 TOGETHER = (8, 8, 10, 10, 12, 12)
 """Throws that are arranged anew at once, of the best of them, one choice after the other."""
-SLACK = 1e-9
 SEED = 1964
 
 

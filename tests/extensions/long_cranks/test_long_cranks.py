@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import laufruhe
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
+from laufruhe.solvers.result import Status
 from laufruhe.solvers.stars.answers import MOST_LISTED
 from laufruhe.solvers.stars.families import families_of
 from phasing import engines
+from problem_files import changed
+from solvers.test_star_crossings import FOUR
 
 # three mounts, none alike
 MOUNTS = (
@@ -59,3 +64,26 @@ def test_a_long_crank_is_good_where_a_program_has_no_time(tmp_path: Path) -> Non
         own = problem.phasing.realise(family.candidate(problem.phasing, (0, *(1 + r.permutation(19)).tolist())))
         values.append(objective_value(own, evaluate(own)))
     assert result.certificate.lower_bound <= result.objective.value < 0.1 * min(values)
+
+
+@pytest.mark.slow
+def test_twelve_open_throws_with_weights_opposite_each() -> None:
+    """No program has weights that turn with open throws; exchanges find a crank without a couple, and it is proven."""
+    text = changed(changed(FOUR, "cylinders = 4", "cylinders = 12"), 'mass = { between = ["0 kg", "1 kg"] }\n', "")
+    text = changed(changed(text, "angle = { between = [0, 360] }\n", ""), "opposite_throw = 1\n",
+                   "balance_factor = { between = [0, 1] }\n")  # fmt: skip
+    found = laufruhe.solve(changed(text, 'rotating_mass = "0.3 kg"\n', ""))
+    assert found.objective.value < 1e-2 * found.objective.initial
+    assert found.certificate.lower_bound <= found.objective.value
+    throws = np.array([entry.value for entry in found.decisions if entry.name.startswith("throw")])
+    for order, power in itertools.product((1, 2), (0, 1)):
+        along = -0.1 * np.arange(12) if power else np.ones(12)
+        assert abs(np.sum(along * np.exp(1j * order * throws))) < 1e-9
+
+
+def test_a_search_cut_short_names_its_gap(tmp_path: Path) -> None:
+    result = solve(engines.problem(tmp_path, 11, phasing='time_limit = "1e-9 s"'))
+    assert result.status is Status.FEASIBLE
+    assert str(result.certificate.kind) == "global within gap"
+    assert result.certificate.gap > 0.01
+    assert not any(star.proven for star in result.phasing.ranking)

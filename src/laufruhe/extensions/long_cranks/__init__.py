@@ -1,0 +1,8 @@
+"""Decide cranks that have more than a million even stars, of eleven to 48 throws (S5, S44 to S48).
+
+Without it the stars of shorter cranks are looked at one by one, and longer ones are refused.
+"""
+
+from laufruhe.extension import Extension
+
+EXTENSION = Extension("long_cranks", methods=("laufruhe.extensions.long_cranks.method:LONG_CRANKS",))

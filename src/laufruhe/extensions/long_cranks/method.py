@@ -1,0 +1,30 @@
+"""The row of the table of methods that long cranks add."""
+
+from __future__ import annotations
+
+from laufruhe.numerics.processes import called
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import Dependence
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.certificate import Reach
+from laufruhe.solvers.method import BUILT, TOLD_APART, Method, is_pointwise
+
+
+def is_long(problem: Problem) -> bool:
+    """Return whether even stars are open that are too many to be listed."""
+    found: bool = called("laufruhe.solvers.stars.answers:is_long", problem)
+    return found
+
+
+LONG_CRANKS = Method(
+    "stars of long cranks, each with cones",
+    {Kind.STAR: BUILT, Kind.UNBALANCE: (Dependence.AFFINE,)},
+    Reach.WHOLE,
+    "laufruhe.extensions.long_cranks.solve:solve_long_cranks",
+    True,
+    TOLD_APART,
+    is_pointwise,
+    also=is_long,
+    proves="the optimum of up to sixteen throws with nothing else open, and of cranks without couples; else a bound",
+    before="stars, each with cones",
+)

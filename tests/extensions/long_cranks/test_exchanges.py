@@ -1,0 +1,44 @@
+"""Exchanges of throws lead to the stars that cuts prove (S44)."""
+
+from __future__ import annotations
+
+import pytest
+
+from laufruhe.extensions.long_cranks.exchange import exchanges, improved
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import solve
+from laufruhe.solvers.stars import answers
+from laufruhe.solvers.stars.program import coarse_value, owners_of
+from phasing import engines
+from phasing.test_designs import CASES, TWO_SHAFTS, model_of
+
+
+@pytest.mark.parametrize("cylinders", [4, 5])
+def test_exchanges_reach_what_cuts_prove(tmp_path, monkeypatch, cylinders):
+    """Exchanges decide cranks that no list holds; a bound of theirs holds for the optimum that cuts prove."""
+    rest = engines.MOUNTS + engines.WEIGHTS + TWO_SHAFTS + engines.MOUNT_FORCE.replace("mean", "rms")
+    problem = engines.problem(tmp_path, cylinders, phasing="best = 1\nmost_shafts = 1", rest=rest)
+    proven = solve(problem)
+    assert proven.certificate.kind is Proof.GLOBAL
+    monkeypatch.setattr(answers, "MOST_LISTED", 0)
+    found = solve(problem)
+    assert "exchanges of throws" in found.certificate.method
+    assert sum(d.value for d in found.decisions if d.name.endswith("built")) <= 1
+    assert found.objective.value == pytest.approx(proven.objective.value, rel=1e-3)
+    assert 0.0 < found.certificate.lower_bound <= proven.objective.value * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("name", ["mean", "limited", "shafts"])
+def test_exchanges_lead_to_stars_that_no_exchange_betters(tmp_path, name):
+    choice = "most_shafts = 1" if name == "shafts" else ""
+    problem = engines.problem(tmp_path, 5, phasing=choice, rest=CASES[name])
+    model, stars = model_of(problem)
+    owners = owners_of(model)
+    values = {tuple(map(int, star)): coarse_value(model, tuple(map(int, star)), (), owners) for star in stars}
+    worst = max(values, key=values.__getitem__)
+    found = improved(model, worst, (), owners)
+    value = coarse_value(model, found, (), owners)
+    # five throws: every star that has throw 1 where it is stands a few exchanges away
+    assert value == pytest.approx(min(values.values()), rel=1e-5)
+    assert value < values[worst]
+    assert len(set(exchanges(worst))) == len(list(exchanges(worst))) == 6 + 8
