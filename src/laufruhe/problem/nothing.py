@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import lru_cache
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, Mount
@@ -34,9 +35,15 @@ def nothing_of(problem: Problem, engine: Engine | None = None) -> float:
         On the mounts that are meant; that of the problem as given when left out.
     """
     engine = problem.engine if engine is None else engine
+    return _nothing(Problem("", "", engine, problem.points, objective=problem.objective, fidelity=problem.fidelity))
+
+
+@lru_cache(maxsize=32)
+def _nothing(problem: Problem) -> float:
+    """Return the objective of the problem's own engine that counts as zero; many ask for that of one design."""
     # on mounts that damp all modes: a resonance would make a size of its own
-    mounts = tuple(mount.each(_lossy) for mount in engine.mounts)
-    engine = replace(engine, mounts=mounts)
+    mounts = tuple(mount.each(_lossy) for mount in problem.engine.mounts)
+    engine = replace(problem.engine, mounts=mounts)
     # the crank turns evenly: what one part alone does to its speed is not asked
     even = replace(problem, engine=engine, fidelity=replace(problem.fidelity, crank_inertia=math.inf))
     whole = replace(

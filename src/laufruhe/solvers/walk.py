@@ -395,14 +395,17 @@ def _realised(phasing: Phasing, stand: Stand, candidate: Candidate) -> Stand | N
 def _is_shown(found: Result, witness: Visit, bound: float | None) -> bool:
     """Tell if a design keeps the limits, and lies under the bound if there is one, by more than samples may miss."""
     problem, own = witness.stand.problem, witness.evaluation
+    if bound is not None:
+        if witness.value >= bound:
+            return False
+        # the bound may be of as few angles as the fidelity has
+        coarse = replace(own, samples=min(own.samples, found.problem.fidelity.samples))
+        over = 1.0 + 2.0 * error_of(problem, coarse) + ROUNDING
+        if witness.value * over + nothing_of(problem, own.engine) >= bound:
+            return False
     standings = ((limit, own.standing(limit)) for limit in problem.limits)
     kept = all(stands.excess + relative(missed(limit.measure, own), stands.value) <= 0.0 for limit, stands in standings)
-    if bound is None or not kept or told_excess(problem, own) > 0.0:
-        return kept and told_excess(problem, own) <= 0.0
-    # the bound may be of as few angles as the fidelity has
-    coarse = replace(own, samples=min(own.samples, found.problem.fidelity.samples))
-    over = 1.0 + 2.0 * error_of(problem, coarse) + ROUNDING
-    return witness.value * over + nothing_of(problem, own.engine) < bound
+    return kept and told_excess(problem, own) <= 0.0
 
 
 def _withheld(problem: Problem, found: Result, witness: Visit, bound: float) -> Result:
