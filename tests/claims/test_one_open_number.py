@@ -1,4 +1,4 @@
-"""One open number of the mounts is bounded in seconds, and a band that no stiffness leaves is infeasible."""
+"""A band that no stiffness leaves is infeasible."""
 
 import tomllib
 from pathlib import Path
@@ -10,30 +10,9 @@ from scipy.linalg import eigh
 
 import laufruhe
 from attack.own_loads import si
-from attack.own_problem import Own
-from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.result import Status
 
 INPUTS = Path(__file__).parent / "inputs"
-
-
-def own_of(name: str) -> Own:
-    return Own(tomllib.loads((INPUTS / f"{name}.toml").read_text(encoding="utf-8")), 256)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["one-damper-over-41-speeds", "one-stiffness-under-transmissibility"])
-def test_one_number_is_proven(name: str) -> None:
-    found, own = laufruhe.solve(INPUTS / f"{name}.toml"), own_of(name)
-    ((low, high),) = own.box
-    designs = own.designs(np.linspace(low, high, 61)[:, None])
-    least = float(np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf).min())
-    assert found.certificate is not None
-    assert found.objective is not None
-    assert found.certificate.kind is Proof.GLOBAL
-    assert found.certificate.gap <= 1e-3
-    assert found.certificate.lower_bound <= least * (1.0 + 1e-6)
-    assert found.objective.value <= least * (1.0 + 1e-6)
 
 
 def frequencies(table: dict[str, Any], stiffness: float) -> np.ndarray:

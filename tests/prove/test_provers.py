@@ -62,15 +62,6 @@ def test_each_has_its_turn_until_one_closes(
         assert "".join(name for name, _ in asked) == order[:1]
 
 
-def test_boxes_that_are_behind_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE)
-    monkeypatch.setattr(provers, "load_bounds", lambda *_: iter([Divided(0.5, 1), Divided(0.6, 9)]))
-    for known, boxes in ((0.4, 9), (0.7, 1)):
-        question = Question(problem, 1.0, 0.1, bound=known)
-        assert [found.boxes for found in provers._load_bounds(question)][-1] == boxes
-    assert not [*provers._load_bounds(Question(problem, 1.0, 0.1, of_many=True))]
-
-
 @pytest.mark.slow
 def test_a_question_without_a_design_asks_if_there_is_one(tmp_path: Path) -> None:
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
 from laufruhe.extensions.mount_relaxation.columns import columns_of
 from laufruhe.extensions.mount_relaxation.mirrored import mirrored_parts
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts, open_mounts
@@ -15,7 +16,6 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import Decision, Domain
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Sector
-from laufruhe.prove.mounts.rest_limits import RestLimits
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 
 RMS = '[objective]\nminimise = "rms mount force"\n'

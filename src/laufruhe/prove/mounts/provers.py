@@ -1,29 +1,26 @@
 """Provers: whoever bounds designs on open mounts from below, all of them asked alike.
 
-The core has boxes of stiffness (E38-E40) and boxes of mounts and unbalances (E71); extensions add theirs.
+The core has boxes of stiffness (E38-E40); extensions add theirs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
-
-import numpy as np
 
 from laufruhe.extension import in_order
 from laufruhe.numerics.budget import at_least, passed
-from laufruhe.problem.decision import domains_of, vector_of
-from laufruhe.problem.problem import Problem
+from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
-from laufruhe.prove.mounts.load_boxes import is_boxed, load_bounds
 from laufruhe.prove.mounts.subdivision import divided_bounds, divides
 from laufruhe.prove.witness import Known
 
-EARLY_STIFFNESS, EARLY_LOADS = 0.2, 0.1
-"""Shares of the boxes that are tried before other provers go on."""
+EARLY = 0.2
+"""Share of the boxes of stiffness that is tried before other provers go on."""
 LEAST_SECONDS = 0.5
 """Time that the first bound has where time is over [s]."""
 
@@ -46,6 +43,8 @@ class Question:
         The best design by its numbers of the mounts, the witness of bounds.
     of_many
         The same is asked of many problems, so that a bound that is nearly as good and quick comes first.
+    moves
+        Throws that are open between bounds beside the mounts, and where they stand; None of a crank that is given.
     bound
         Best bound so far [SI]; provers read it, `proven` raises it.
     """
@@ -56,6 +55,7 @@ class Question:
     near: Sequence[Value] = ()
     known: Known | None = None
     of_many: bool = False
+    moves: tuple[Phasing, Candidate] | None = None
     bound: float = 0.0
 
 
@@ -74,40 +74,23 @@ class Prover:
         of mounts, and columns of unbalances after them, from which a search may find a better design.
     before
         Name of the prover that one of an extension stands before.
+    of_moves
+        Whether it bounds designs whose throws are open beside the mounts, and no others.
     """
 
     name: str
     applies: Callable[[Problem], bool]
     bounds: Callable[[Question], Iterator[Divided]]
     before: str = ""
+    of_moves: bool = False
 
 
 def _stiffness_bounds(question: Question) -> Iterator[Divided]:
-    shares = (EARLY_STIFFNESS, 1.0)
+    shares = (EARLY, 1.0)
     yield from divided_bounds(question.problem, question.value, question.room, shares, question.known)
 
 
-def _load_bounds(question: Question) -> Iterator[Divided]:
-    if question.of_many:
-        return
-    problem, known = question.problem, question.known
-    if known is not None:
-        pairs = zip(question.near, problem.decisions, strict=True)
-        columns = vector_of(domains_of(problem.unbalances), [value for value, decision in pairs if decision.is_affine])
-        known = replace(known, place=np.append(known.place, columns))
-    # boxes of one number are few
-    shares = (1.0,) if len(problem.decisions) == 1 else (EARLY_LOADS, 1.0)
-    for found in load_bounds(problem, question.value, question.room, shares, known):
-        yield replace(found, places=())
-        # boxes that are behind others after a share of them are not worth the rest
-        if found.bound < question.bound:
-            return
-
-
-PROVERS = (
-    Prover("boxes of stiffness", divides, _stiffness_bounds),
-    Prover("boxes of mounts and unbalances", lambda problem: not divides(problem) and is_boxed(problem), _load_bounds),
-)
+PROVERS = (Prover("boxes of stiffness", divides, _stiffness_bounds),)
 """Those of the core."""
 
 
@@ -120,7 +103,8 @@ def provers() -> tuple[Prover, ...]:
 
 def proven(question: Question) -> Divided:
     """Ask all provers that apply in rounds of growing work, until one closes the question or time is over."""
-    answers = [prover.bounds(question) for prover in provers() if prover.applies(question.problem)]
+    asked = [prover for prover in provers() if prover.of_moves is (question.moves is not None)]
+    answers = [prover.bounds(question) for prover in asked if prover.applies(question.problem)]
     found: dict[Iterator[Divided], Divided] = {}
     while answers:
         for each in tuple(answers):

@@ -17,7 +17,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach
 from laufruhe.prove.mounts.box_runs import bounds_runs
-from laufruhe.prove.mounts.provers import EARLY_STIFFNESS
+from laufruhe.prove.mounts.provers import EARLY
 from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, none_within
 from laufruhe.solvers.mounts.bounds import divided_by
@@ -92,7 +92,7 @@ def _looked(problem: Problem, search: MountSearch) -> tuple[Array | None, tuple[
     if not problem.limits or not problem.search.proves or search.starts_kept:
         return None, ()
     kept = LimitsKept(problem)
-    told = kept.together(problem.limits, EARLY_STIFFNESS)
+    told = kept.together(problem.limits, EARLY)
     return told.design, kept.conflict() if told.is_proven else ()
 
 

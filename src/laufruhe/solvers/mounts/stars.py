@@ -17,8 +17,6 @@ from dataclasses import replace
 from functools import partial
 from typing import TypeAlias
 
-import numpy as np
-
 from laufruhe.errors import ModelError, counted
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.budget import limited, passed
@@ -26,16 +24,14 @@ from laufruhe.numerics.norms import RMS
 from laufruhe.numerics.progress import tell, within
 from laufruhe.numerics.workers import executor_for, in_turn, working_on
 from laufruhe.problem import channels
-from laufruhe.problem.decision import domains_of, vector_of
-from laufruhe.problem.evaluation import Evaluation, evaluate
+from laufruhe.problem.evaluation import Evaluation, at_many, evaluate
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Certificate, Proof, Reach, certified, room_of
-from laufruhe.prove.mounts.load_boxes import load_bounds
-from laufruhe.prove.mounts.open_throws import throws_at
+from laufruhe.prove.mounts.provers import Question, proven
 from laufruhe.solvers.conclusion import contradiction, judged, known_of, result_under, values_of
 from laufruhe.solvers.mounts.bounds import bounded_under, mount_numbers
 from laufruhe.solvers.mounts.nonlinear import solve_mounts, solve_moved
@@ -257,20 +253,15 @@ def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs
 
 
 def _divided(problem: Problem, phasing: Phasing, best: StarDesign) -> Divided:
-    """Return what boxes of throws between bounds, mounts and unbalances prove, in whatever order these fire (E72)."""
-    if not best.is_met or not problem.search.proves or passed():
+    """Return what provers tell of mounts and throws between bounds together."""
+    if phasing.throw_bounds is None or not best.is_met or not problem.search.proves or passed():
         return Divided(0.0, 0)
-    throws = throws_at(problem, phasing, best.candidate)
-    if throws is None:
-        return Divided(0.0, 0)
-    realised = throws.waves.problem
+    realised = at_many(replace(phasing.realise(best.candidate), phasing=None))
     design = judged(realised, values_of(realised, best.result))
-    own = [value for value, decision in zip(design.values, realised.decisions, strict=True) if decision.is_affine]
-    columns = vector_of(domains_of(realised.unbalances), own)
-    known = known_of(design, np.concatenate([mount_numbers(design), columns, throws.given[throws.open]]))
+    known = known_of(design, mount_numbers(design))
     value = design.value - over_read(realised, design.evaluation)
     room = room_of(value, problem.tolerance, nothing_of(problem, design.evaluation.engine))
-    return next(load_bounds(realised, value, room, (1.0,), known, throws), Divided(0.0, 0))
+    return proven(Question(realised, value, room, design.values, known, moves=(phasing, best.candidate)))
 
 
 def _bound(found: list[StarDesign]) -> float:

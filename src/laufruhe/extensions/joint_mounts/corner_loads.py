@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from laufruhe.extensions.joint_mounts.mount_loops import mount_loop
+from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem.measure import Measure, load_rows
 from laufruhe.prove.certificate import Multipliers, minorant
 from laufruhe.prove.mounts.box_response import is_travel
-from laufruhe.prove.mounts.mount_loops import mount_loop
-from laufruhe.prove.mounts.mounted_loads import MountedLoads
 from laufruhe.prove.mounts.ranges import SLACK
 
 

@@ -13,11 +13,11 @@ import pytest
 
 import laufruhe
 from attack.own_problem import Own
+from laufruhe.extensions.joint_mounts.load_boxes import LoadBoxes
+from laufruhe.extensions.joint_mounts.open_throws import OpenThrows, along_arcs, throws_at
 from laufruhe.problem.phasing import Candidate
-from laufruhe.prove.mounts.load_boxes import LoadBoxes
-from laufruhe.prove.mounts.open_throws import OpenThrows, along_arcs, throws_at
 
-INPUT = Path(__file__).parents[1] / "claims" / "inputs" / "uneven-throws-beside-a-stiffness.toml"
+INPUT = Path(__file__).parents[2] / "claims" / "inputs" / "uneven-throws-beside-a-stiffness.toml"
 THREE = [[20, 20], [80, 150], [200, 260]]
 RIDING = [{"name": "c", "balance_factor": 0.4}, {"name": "e", "opposite_throw": 2, "radius": "60 mm", "mass": "2 kg"}]
 

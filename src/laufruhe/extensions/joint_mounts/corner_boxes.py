@@ -21,11 +21,13 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.extensions.corners.loads import CornerLoads, Pairing
-from laufruhe.extensions.corners.multipliers import best_at
+from laufruhe.extensions.joint_mounts.bernstein import corners_of, mixed
+from laufruhe.extensions.joint_mounts.corner_loads import CornerLoads, Pairing
+from laufruhe.extensions.joint_mounts.mount_loops import Loop, is_looped, mount_loop
+from laufruhe.extensions.joint_mounts.multipliers import best_at
+from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
 from laufruhe.load_models.affine import FEASIBLE, MOST_NUMBERS
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
-from laufruhe.numerics.bernstein import corners_of, mixed
 from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import at_many
 from laufruhe.problem.measure import Measure
@@ -33,9 +35,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Around, Bounded, Box, Divided
 from laufruhe.prove.certificate import Multipliers
 from laufruhe.prove.mounts.box_series import balanced, rest_of
-from laufruhe.prove.mounts.mount_loops import Loop, is_looped, mount_loop
 from laufruhe.prove.mounts.named import named_part
-from laufruhe.prove.mounts.rest_limits import RestLimits
 from laufruhe.prove.mounts.subdivision import EVEN
 from laufruhe.prove.witness import Known, check_around
 

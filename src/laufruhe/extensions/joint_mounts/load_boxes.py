@@ -18,6 +18,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.extensions.joint_mounts.mount_loops import Loop, is_looped, mount_loop
+from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads, Orders
+from laufruhe.extensions.joint_mounts.open_throws import OpenThrows, along_arcs
+from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
@@ -31,13 +35,9 @@ from laufruhe.prove.mounts.box_lines import BoxLines
 from laufruhe.prove.mounts.box_norms import Sampled, Under, counted_rows, line_weights, norm_under
 from laufruhe.prove.mounts.box_response import is_travel
 from laufruhe.prove.mounts.box_series import Answer, Expansion, Sides, balanced, mapped, rest_of
-from laufruhe.prove.mounts.mount_loops import Loop, is_looped, mount_loop
-from laufruhe.prove.mounts.mounted_loads import MountedLoads, Orders
 from laufruhe.prove.mounts.named import is_named
-from laufruhe.prove.mounts.open_throws import OpenThrows, along_arcs
 from laufruhe.prove.mounts.ranges import SLACK
 from laufruhe.prove.mounts.ratios import groups_of, is_ratio, ratio_under
-from laufruhe.prove.mounts.rest_limits import RestLimits
 from laufruhe.prove.witness import Known
 
 MOST_NUMBERS = 8

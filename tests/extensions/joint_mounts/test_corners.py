@@ -12,18 +12,18 @@ import laufruhe
 from attack.families import objective
 from attack.families import problem as random_problem
 from claims.test_broken_bounders import first_times, scaled
+from extensions.joint_mounts.test_mount_loops import SEEDS, boxes_of, joint
 from lanes import first_fast
 from laufruhe.errors import BoundError
-from laufruhe.extensions.corners import boxes as design_boxes
-from laufruhe.extensions.corners.boxes import DesignBoxes, mixes_corners, priced
-from laufruhe.extensions.corners.loads import CornerLoads
-from laufruhe.extensions.corners.multipliers import best_at
+from laufruhe.extensions.joint_mounts import corner_boxes as design_boxes
+from laufruhe.extensions.joint_mounts.corner_boxes import DesignBoxes, mixes_corners, priced
+from laufruhe.extensions.joint_mounts.corner_loads import CornerLoads
+from laufruhe.extensions.joint_mounts.mount_loops import mount_loop
+from laufruhe.extensions.joint_mounts.multipliers import best_at
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.problem.decision import TURNED
 from laufruhe.prove.certificate import lower_bound, minorant
-from laufruhe.prove.mounts.mount_loops import mount_loop
 from laufruhe.solvers.mounts.places import started_at
-from prove.test_mount_loops import SEEDS, boxes_of, joint
 
 
 @pytest.mark.parametrize("seed", first_fast((780017, 780000, 780004, 780012), 3))

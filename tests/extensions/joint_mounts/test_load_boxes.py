@@ -14,12 +14,12 @@ import laufruhe
 from attack.families import problem as random_problem
 from attack.own_problem import Own
 from lanes import first_fast
+from laufruhe.extensions.joint_mounts.load_boxes import LoadBoxes, is_boxed, load_bounds
+from laufruhe.extensions.joint_mounts.prover import EARLY
 from laufruhe.problem.evaluation import at_many, evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.load_boxes import LoadBoxes, is_boxed, load_bounds
-from laufruhe.prove.mounts.provers import EARLY_LOADS
 
-INPUTS = Path(__file__).parents[1] / "claims" / "inputs"
+INPUTS = Path(__file__).parents[2] / "claims" / "inputs"
 # rms, mean and largest force and travel on stiff, moved and turned mounts, under limits of loads and modes
 SEEDS = (780003, 780004, 780005, 780000, 780014, 780017, 780012, 780002, 780031, 780032, 780033, 780034)
 
@@ -110,7 +110,7 @@ def test_a_share_of_the_boxes_is_divided_first() -> None:
     ((low, high),) = own.box
     designs = own.designs(np.linspace(low, high, 61)[:, None])
     least = float(np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf).min())
-    few, many = load_bounds(problem, least, 1e-4 * least, (EARLY_LOADS, 1.0))
+    few, many = load_bounds(problem, least, 1e-4 * least, (EARLY, 1.0))
     assert few.boxes <= 10
     assert few.bound < least * (1.0 - 1e-4)
     assert many.boxes > few.boxes

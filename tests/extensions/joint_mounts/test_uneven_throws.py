@@ -14,7 +14,7 @@ from lanes import first_fast
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.result import Result
 
-PATH = Path(__file__).parent / "inputs" / "uneven-throws-beside-a-stiffness.toml"
+PATH = Path(__file__).parents[2] / "claims" / "inputs" / "uneven-throws-beside-a-stiffness.toml"
 
 
 def told(norm: str = "rms") -> dict[str, Any]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from laufruhe.extensions.corners.loads import coarser
+from laufruhe.extensions.joint_mounts.corner_loads import coarser
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.prove.certificate import Bound, Multipliers, best_bound, lower_bound, spread

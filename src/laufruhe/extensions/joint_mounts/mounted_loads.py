@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from laufruhe.extensions.joint_mounts.open_throws import OpenThrows
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 from laufruhe.numerics.namespaces import NUMBERS
@@ -22,7 +23,6 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.box_response import NOTHING
-from laufruhe.prove.mounts.open_throws import OpenThrows
 
 COARSER = 8
 """Times as few samples from which multipliers are sought first."""

@@ -17,8 +17,9 @@ from functools import cached_property
 
 import numpy as np
 
+from laufruhe.extensions.joint_mounts.bernstein import coefficients
+from laufruhe.extensions.joint_mounts.mount_loops import OpenStiffness, open_stiffness
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.bernstein import coefficients
 from laufruhe.physics.modes import weight_wrench
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.problem import channels
@@ -26,7 +27,6 @@ from laufruhe.problem.channels import Channel, mounting_in
 from laufruhe.problem.decision import STIFFNESS
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.mount_loops import OpenStiffness, open_stiffness
 from laufruhe.prove.mounts.ranges import SLACK, number_ranges
 
 

@@ -12,13 +12,13 @@ import pytest
 import laufruhe
 from attack.families import problem as random_problem
 from lanes import first_fast
-from laufruhe.numerics.bernstein import coefficients, corners_of, mixed
+from laufruhe.extensions.joint_mounts.bernstein import coefficients, corners_of, mixed
+from laufruhe.extensions.joint_mounts.mount_loops import is_looped, mount_loop
+from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import TURNED
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.mount_loops import is_looped, mount_loop
-from laufruhe.prove.mounts.rest_limits import RestLimits
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 from mounts.test_hydraulic_mounts import HYDRAULIC, RMS
 from mounts.test_springs_of_a_place import PAD

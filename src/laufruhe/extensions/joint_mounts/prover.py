@@ -1,0 +1,88 @@
+"""Ask boxes of mounts and unbalances, their corners first, where better designs are met on the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from laufruhe.extensions.joint_mounts.corner_boxes import DesignBoxes, designed_bound, mixes_corners
+from laufruhe.extensions.joint_mounts.load_boxes import is_boxed, load_bounds
+from laufruhe.extensions.joint_mounts.open_throws import throws_at
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.decision import domains_of, vector_of
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.best_first import Divided
+from laufruhe.prove.mounts.provers import Prover, Question
+from laufruhe.prove.mounts.subdivision import divides
+from laufruhe.prove.witness import Known
+from laufruhe.solvers.mounts.places import started_at
+from laufruhe.solvers.told_limits import over_read
+
+EARLY = 0.1
+"""Share of the boxes that is tried before other provers go on."""
+
+
+def mixes(problem: Problem) -> bool:
+    """Return whether unbalances are open beside several numbers of mounts; boxes of one number are few."""
+    return len(problem.decisions) > 1 and not divides(problem) and mixes_corners(problem)
+
+
+def corner_answers(question: Question) -> Iterator[Divided]:
+    """Yield one bound, with the best design that was met at a corner, whose value the question then has."""
+    problem = question.problem
+    if question.of_many or question.value == math.inf:
+        return
+
+    def judge(mounts: Array, columns: Array) -> float:
+        design = started_at(problem, (mounts.tolist(), columns))
+        if design is None or design.excess > 0.0:
+            return math.inf
+        return design.value - over_read(problem, design.evaluation)
+
+    boxes = DesignBoxes(problem, question.value, judge)
+    found = designed_bound(boxes, question.room, question.known)
+    question.value = boxes.value
+    yield replace(found, places=() if boxes.best is None else (np.concatenate(boxes.best),))
+
+
+def load_answers(question: Question) -> Iterator[Divided]:
+    """Yield what boxes of mounts and unbalances prove; those behind others after a share of them are given up."""
+    if question.of_many:
+        return
+    problem, known = question.problem, _known(question)
+    # boxes of one number are few
+    shares = (1.0,) if len(problem.decisions) == 1 else (EARLY, 1.0)
+    for found in load_bounds(problem, question.value, question.room, shares, known):
+        yield replace(found, places=())
+        if found.bound < question.bound:
+            return
+
+
+def throw_answers(question: Question) -> Iterator[Divided]:
+    """Yield what boxes of throws between bounds, mounts and unbalances prove, in whatever order these fire (E72)."""
+    throws = None if question.moves is None else throws_at(question.problem, *question.moves)
+    if throws is not None:
+        known = _known(question)
+        place = None if known is None else np.append(known.place, throws.given[throws.open])
+        known = None if known is None or place is None else replace(known, place=place)
+        yield from load_bounds(throws.waves.problem, question.value, question.room, (1.0,), known, throws)
+
+
+def _known(question: Question) -> Known | None:
+    """Return the known design by its numbers of the mounts and the columns of its unbalances."""
+    known, problem = question.known, question.problem
+    if known is None:
+        return None
+    pairs = zip(question.near, problem.decisions, strict=True)
+    columns = vector_of(domains_of(problem.unbalances), [value for value, decision in pairs if decision.is_affine])
+    return replace(known, place=np.append(known.place, columns))
+
+
+CORNERS = Prover("boxes of mounts, with unbalances", mixes, corner_answers, "boxes of stiffness")
+LOADS = Prover(
+    "boxes of mounts and unbalances", lambda problem: not divides(problem) and is_boxed(problem), load_answers
+)
+THROWS = Prover("boxes of throws, mounts and unbalances", lambda _: True, throw_answers, of_moves=True)

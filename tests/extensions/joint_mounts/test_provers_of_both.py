@@ -1,0 +1,48 @@
+"""Boxes of mounts and unbalances among other provers, and one open number that they prove."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import laufruhe
+from attack.own_problem import Own
+from laufruhe.extensions.joint_mounts import prover
+from laufruhe.prove.best_first import Divided
+from laufruhe.prove.certificate import Proof
+from laufruhe.prove.mounts.provers import Question
+from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
+from prove.test_provers import FORCE
+
+INPUTS = Path(__file__).parents[2] / "claims" / "inputs"
+
+
+def own_of(name: str) -> Own:
+    return Own(tomllib.loads((INPUTS / f"{name}.toml").read_text(encoding="utf-8")), 256)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["one-damper-over-41-speeds", "one-stiffness-under-transmissibility"])
+def test_one_number_is_proven(name: str) -> None:
+    found, own = laufruhe.solve(INPUTS / f"{name}.toml"), own_of(name)
+    ((low, high),) = own.box
+    designs = own.designs(np.linspace(low, high, 61)[:, None])
+    least = float(np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf).min())
+    assert found.certificate is not None
+    assert found.objective is not None
+    assert found.certificate.kind is Proof.GLOBAL
+    assert found.certificate.gap <= 1e-3
+    assert found.certificate.lower_bound <= least * (1.0 + 1e-6)
+    assert found.objective.value <= least * (1.0 + 1e-6)
+
+
+def test_boxes_that_are_behind_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE)
+    monkeypatch.setattr(prover, "load_bounds", lambda *_: iter([Divided(0.5, 1), Divided(0.6, 9)]))
+    for known, boxes in ((0.4, 9), (0.7, 1)):
+        question = Question(problem, 1.0, 0.1, bound=known)
+        assert [found.boxes for found in prover.load_answers(question)][-1] == boxes
+    assert not [*prover.load_answers(Question(problem, 1.0, 0.1, of_many=True))]
