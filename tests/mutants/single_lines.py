@@ -11,7 +11,11 @@ from functools import cache
 from pathlib import Path
 
 SOURCE = Path(__file__).resolve().parents[2] / "src"
-ROOMS = ("physics", "load_models", "prove", "solvers", "machine")
+ROOMS = (
+    "physics", "load_models", "prove", "solvers", "machine",
+    "extensions/mount_relaxation", "extensions/corners", "extensions/robust", "extensions/long_cranks",
+)  # fmt: skip
+"""Folders of physics, search and proof."""
 TOLERANCE = 1e-3
 COMPARISONS = {
     ast.Lt: ("<", ">"), ast.Gt: (">", "<"), ast.LtE: ("<=", ">="), ast.GtE: (">=", "<="), ast.Eq: ("==", "!="),

@@ -91,8 +91,17 @@ class Evaluation:
         """What a channel measures at every operating point, shape (n, places, d)."""
         return [channel.signal(loads) for loads in self.loads]
 
+    @cached_property
+    def _values(self) -> dict[Measure, Sequence[float]]:
+        return {}
+
     def values(self, measure: Measure) -> Sequence[float]:
-        """All numbers that a measure has of this design [SI]; the first one is its value."""
+        """Return all numbers that a measure has of this design [SI], its value first, worked out once."""
+        if measure not in self._values:
+            self._values[measure] = self._measured(measure)
+        return self._values[measure]
+
+    def _measured(self, measure: Measure) -> Sequence[float]:
         if isinstance(measure.channel, NumberChannel):
             return measure.channel.values(measure, self)
         finer = 1 if measure.is_mass else measure.norm.refinement

@@ -640,3 +640,15 @@ def test_products_that_are_not_those_of_the_means_pull(seed: int) -> None:
         assert np.all(mixed[k] > 0.0)
     assert np.all(plain[0] < 1e-9)
     assert np.all(plain[1] > 0.0)
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5])
+def test_what_is_a_share_of_a_norm_may_be_so_much_larger(share: float, tmp_path: Path) -> None:
+    """Where a norm is at most one number, a root that is half of it is at most twice that, its square four times."""
+    boxes = asked_of(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]\n" + ASKED["rms"]))
+    ((weight, each), *_), ((head,), *_) = boxes._terms, boxes._heads
+    look = box.SpringBox(boxes, each, boxes._ends(weight), boxes.lower, boxes.upper)
+    whole, part = (
+        look.under_all([replace(head, share=own, loss=0.0)], boxes._least[0]).tops[0] for own in (1.0, share)
+    )
+    assert part == pytest.approx(whole / share**2, rel=1e-12)
