@@ -1,7 +1,7 @@
 """Run the tests that reach a changed line, for a random sample of one-line mutants, and tell which survive.
 
     python tests/mutants/run_mutants.py map                     # which test calls which function; an hour
-    python tests/mutants/run_mutants.py map --tests prove/test_dual.py      # of new tests alone
+    python tests/mutants/run_mutants.py map --tests extensions/mount_relaxation/test_dual.py  # of new tests alone
     python tests/mutants/run_mutants.py run --page              # the sample; writes results/mutants/README.md
 
 `make mutants` does both. A mutant is killed if one of the tests that call its function fails, stops or takes far too

@@ -13,7 +13,7 @@ from pathlib import Path
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 ROOMS = (
     "physics", "load_models", "prove", "solvers", "machine",
-    "extensions/mount_relaxation", "extensions/corners", "extensions/robust", "extensions/long_cranks",
+    "extensions/mount_relaxation", "extensions/joint_mounts", "extensions/robust", "extensions/long_cranks",
 )  # fmt: skip
 """Folders of physics, search and proof."""
 TOLERANCE = 1e-3
