@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_array, csc_array, diags_array, eye_array, vstack
 
 from laufruhe.extensions.mount_relaxation.quadratics import solver_of
 from laufruhe.numerics.arrays import Array, Indices
@@ -66,8 +67,6 @@ class _Solver:
         self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]], scaled: bool,
         settings: Mapping[str, Any],
     ) -> None:  # fmt: skip
-        from scipy.sparse import csc_array, diags_array
-
         count, width = rows.shape
         self._scaled, self._settings = scaled, {**settings, "equilibrate_enable": False}
         self._along: Array = np.ones(count)
@@ -99,8 +98,6 @@ class Dual(_Solver):
         self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]], scaled: bool,
         settings: Mapping[str, Any],
     ) -> None:  # fmt: skip
-        from scipy.sparse import csc_array, diags_array, eye_array, vstack
-
         super().__init__(rows, right, cones, matrices, scaled, settings)
         count, width = rows.shape
         free = width - len(self._own)
@@ -132,8 +129,6 @@ class Plain(_Solver):
         self, rows: Any, right: Array, cones: Sequence[Cone], matrices: Sequence[tuple[Indices, Any]], scaled: bool,
         settings: Mapping[str, Any],
     ) -> None:  # fmt: skip
-        from scipy.sparse import coo_array, csc_array, vstack
-
         super().__init__(rows, right, cones, matrices, scaled, settings)
         count = len(self._own)
         entries = coo_array((-np.ones(count), (np.arange(count), self._own)), shape=(count, rows.shape[1]))

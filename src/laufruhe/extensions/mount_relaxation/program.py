@@ -9,6 +9,7 @@ from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
+from scipy.sparse import coo_array, vstack
 
 from laufruhe.extensions.mount_relaxation.bound import Cap, Multipliers, Priced, Program, Proposed, Root, follows
 from laufruhe.extensions.mount_relaxation.conditions import Held
@@ -116,8 +117,6 @@ class Stated:
         self, block: Array, columns: Indices, cone: str, name: Hashable = None, right: Array | None = None
     ) -> None:
         """Rows with entries in these columns alone, and what their multipliers are known by."""
-        from scipy.sparse import coo_array
-
         row, place = np.nonzero(block)
         shape = len(block), int(self.shapes[-1])
         self.rows.append(coo_array((block[row, place], (row, columns[place])), shape=shape))
@@ -278,7 +277,6 @@ class Stated:
     def _solved(self, cost: Array, scaled: bool, enough: tuple[float, float]) -> tuple[Array, Array, float]:
         """By one solver for all that is minimised under the same conditions."""
         import clarabel
-        from scipy.sparse import vstack
 
         solver = self._solvers.get((scaled, enough))
         if solver is None:

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csc_array
 
 from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.numerics.budget import passed
@@ -16,7 +17,6 @@ from laufruhe.numerics.budget import passed
 def solver_of(cost: Array, rows: Any, right: Array, cones: Sequence[Any], settings: Mapping[str, Any]) -> Any:
     """Clarabel's solver of least cost' x with right - rows x in the cones."""
     import clarabel
-    from scipy.sparse import csc_array
 
     told = clarabel.DefaultSettings()
     for name, value in settings.items():
