@@ -21,9 +21,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from pages import PAGES, ROOT, publish, spent
 
+from laufruhe.extensions.long_cranks.amplitudes import StarAmplitudes
 from laufruhe.extensions.long_cranks.search import search_stars
 from laufruhe.files.reader import load
-from laufruhe.load_models.amplitudes import AmplitudeObjective, AmplitudeTerm
+from laufruhe.load_models.amplitudes import AmplitudeTerm
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import even_patterns
@@ -45,7 +46,7 @@ RANKED = (
     "two-stroke-four-open", "vee-six-open", "vee-eight-open", "inline-five-open", "inline-seven-uneven",
     "two-stroke-eight-uneven", "inline-nine-uneven", "vee-twenty-open",
 )  # fmt: skip
-COUPLE = AmplitudeObjective((1, 2), (AmplitudeTerm(1.0, (0.0, 0.0), (1.0, 0.25)),))
+COUPLE = StarAmplitudes((1, 2), (AmplitudeTerm(1.0, (0.0, 0.0), (1.0, 0.25)),))
 SIZES = range(4, 14)
 MOST_ENUMERATED = 12
 SCORED = 400_000
