@@ -126,20 +126,6 @@ How each quantity depends on numbers of one kind while all others are held, on e
 means that it does not.
 
 """
-WORDS = {
-    "UNBALANCE": "unbalances",
-    "SHARE": "shares of geared inertia",
-    "PISTON": "masses of pistons",
-    "PLACE": "places of shafts",
-    "SIZE": "sizes",
-    "LEAD": "leads",
-    "STAR": "stars, firing orders, shafts",
-    "STIFFNESS": "stiffness",
-    "MOUNT": "other numbers of mounts",
-    "FLYWHEEL": "flywheel",
-    "TORSION": "crankshaft",
-    "NUMBER": "any number of the file",
-}
 SHORT = {
     "NONE": "-",
     "AFFINE": "affine",
@@ -181,20 +167,23 @@ FACTS = {
 def proven() -> str:
     """The methods, and how every quantity depends on every kind."""
     from laufruhe.numerics.norms import NORMS
-    from laufruhe.problem.dependence import TABLE
+    from laufruhe.problem.decision import KINDS
+    from laufruhe.problem.dependence import TABLE, Dependence
     from laufruhe.solvers import METHODS
 
     rows = [PROVEN]
     for method in METHODS:
-        every, missing = len(method.needs) >= len(WORDS) - 1, {*WORDS} - {kind.name for kind in method.needs}
-        kinds = ", ".join(WORDS[kind.name] for kind in method.needs) or "nothing"
-        kinds = "anything" + "".join(f" but {WORDS[name]}" for name in missing) if every else kinds
+        every, missing = len(method.needs) >= len(KINDS) - 1, [k for k in KINDS.values() if k not in method.needs]
+        kinds = ", ".join(kind.words for kind in method.needs) or "nothing"
+        kinds = "anything" + "".join(f" but {kind.words}" for kind in missing) if every else kinds
         rows.append(f"| {method.name} | {kinds} | {_asked(method, every)} | {method.proves} |\n")
     kinds = list(next(iter(TABLE.values())))
-    heads = " | ".join(WORDS[kind.name] for kind in kinds)
+    heads = " | ".join(kind.words for kind in kinds)
     rows += [DEPENDENCES, f"| quantity | {heads} |\n", "| --- " * (len(kinds) + 1) + "|\n"]
     for name, row in TABLE.items():
-        rows.append(f"| {name} | " + " | ".join(SHORT[row[kind].name] for kind in kinds) + " |\n")
+        rows.append(
+            f"| {name} | " + " | ".join(SHORT[row.get(kind, Dependence.UNKNOWN).name] for kind in kinds) + " |\n"
+        )
     rows += [CLAIMS, "".join(f"| {name} | {_claimed(norm)} |\n" for name, norm in NORMS.items())]
     return "".join(rows)
 

@@ -7,7 +7,7 @@ that they belong to is made, so that each of their modules imports no more than 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -20,8 +20,9 @@ from laufruhe.errors import ModelError
 
 GROUP = "laufruhe.extensions"
 Tables = Literal[
-    "norms", "channels", "layouts", "methods", "quantities", "provers", "reductions", "study_kinds", "commands", "keys"
-]
+    "norms", "channels", "kinds", "layouts", "methods", "quantities", "provers", "reductions", "study_kinds",
+    "commands", "keys", "pictures", "sections",
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -37,8 +38,10 @@ class Extension:
     channels
         Objects of `laufruhe.problem.channels.kinds.Channel`.
     dependences
-        Lines of the table in `laufruhe.problem.dependence`, about these channels; a channel without one is unknown to
-        every bound, and decided locally.
+        Lines of the table in `laufruhe.problem.dependence`, about these channels and kinds; a channel without one is
+        unknown to every bound, and decided locally.
+    kinds
+        Objects of `laufruhe.problem.drives.Kind`: kinds of numbers that may be open.
     layouts
         Objects of `laufruhe.machine.layouts.LayoutKind`.
     methods
@@ -55,12 +58,17 @@ class Extension:
         Objects of `typer.models.CommandInfo`; their modules are imported by `laufruhe --help`, so they import little.
     keys
         Objects of `laufruhe.files.problem_file.Key`: tables of a problem file.
+    sections
+        Objects of `laufruhe.report.section.Section`: tables and numbers of a result.
+    pictures
+        Objects of `laufruhe.present.pictures.Picture`.
     """
 
     name: str
     norms: tuple[str, ...] = ()
     channels: tuple[str, ...] = ()
     dependences: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
     layouts: tuple[str, ...] = ()
     methods: tuple[str, ...] = ()
     quantities: tuple[str, ...] = ()
@@ -69,6 +77,8 @@ class Extension:
     study_kinds: tuple[str, ...] = ()
     commands: tuple[str, ...] = ()
     keys: tuple[str, ...] = ()
+    sections: tuple[str, ...] = ()
+    pictures: tuple[str, ...] = ()
 
 
 HOMES: Mapping[Tables, Mapping[str, str]] = {
@@ -102,9 +112,28 @@ def _in_house() -> list[tuple[str, str]]:
     return [(one.name, f"laufruhe.extensions.{one.name}:EXTENSION") for one in iter_modules([str(home)])]
 
 
+class Table(Mapping[str, Any]):
+    """Objects by their names, put together when the first of them is asked for.
+
+    So a module of an extension may import the room of its table, whichever of the two is imported first.
+    """
+
+    def __init__(self, fill: Callable[[], Mapping[str, Any]]) -> None:
+        self._fill = cache(fill)
+
+    def __getitem__(self, name: str) -> Any:
+        return self._fill()[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._fill())
+
+    def __len__(self) -> int:
+        return len(self._fill())
+
+
 def extended(
     table: Tables, kind: Any, own: Iterable[Any], name_of: Callable[[Any], str] = lambda one: str(one.name)
-) -> dict[str, Any]:
+) -> Table:
     """Return a table by names: objects, or classes, of this package, then those that extensions add.
 
     Parameters
@@ -119,18 +148,27 @@ def extended(
     Raises
     ------
     ModelError
-        If one cannot be imported, is of another kind, or has the name of another one.
+        At first use, if one cannot be imported, is of another kind, or has the name of another one.
     """
+    return Table(lambda: _filled(table, kind, own, name_of))
+
+
+def _filled(table: Tables, kind: Any, own: Iterable[Any], name_of: Callable[[Any], str]) -> dict[str, Any]:
     found = {name_of(one): one for one in own}
     for extension in extensions():
-        for address in getattr(extension, table):
-            one = _imported(extension.name, address)
+        for address, one in objects(extension, table):
             if not (issubclass(one, kind) if isinstance(one, type) else isinstance(one, kind)):
                 raise ModelError(f"extension '{extension.name}': {address} is no {kind.__name__}; mend it")
             if (name := name_of(one)) in found:
                 raise ModelError(f"extension '{extension.name}': {table} have '{name}' already; give it another name")
             found[name] = one
     return found
+
+
+def objects(extension: Extension, table: Tables) -> Iterator[tuple[str, Any]]:
+    """Yield the addresses and objects that an extension adds to a table."""
+    for address in getattr(extension, table):
+        yield address, _imported(extension.name, address)
 
 
 def in_order(table: Tables, kind: Any, own: Sequence[Any]) -> tuple[Any, ...]:

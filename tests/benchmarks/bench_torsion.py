@@ -20,9 +20,10 @@ import opentorsion  # noqa: E402
 from pages import PAGES, ROOT, publish  # noqa: E402
 
 import laufruhe  # noqa: E402
+from laufruhe.extensions.torsion.machine import Torsion  # noqa: E402
+from laufruhe.extensions.torsion.physics import chain_of, natural_modes, throw_torques, twist  # noqa: E402
 from laufruhe.files.reader import load_tables, tables_of  # noqa: E402
-from laufruhe.machine import Engine, Torsion  # noqa: E402
-from laufruhe.physics.torsion import natural_modes, throw_torques, twist  # noqa: E402
+from laufruhe.machine import Engine  # noqa: E402
 
 PROBLEM = ROOT / "problems" / "inline-five-torsion.toml"
 OUT = PAGES / "torsion.md"
@@ -49,9 +50,9 @@ def assembly(chain: Torsion) -> opentorsion.Assembly:
 
 def viscous(engine: Engine) -> Engine:
     """An engine whose shafts have viscous damping alone."""
-    chain = engine.torsion
+    chain = chain_of(engine)
     sections = tuple(replace(section, loss_factor=0.0, damping=2.0) for section in chain.sections)
-    return replace(engine, torsion=replace(chain, sections=sections))
+    return engine.with_extra(replace(chain, sections=sections))
 
 
 def beside() -> list[str]:
@@ -60,10 +61,10 @@ def beside() -> list[str]:
     engine, point = viscous(problem.engine), problem.points[1]
     torques = throw_torques(engine, point)
     orders, series = torques.orders[1:], torques.coefficients[1:].T
-    theirs = assembly(engine.torsion)
+    theirs = assembly(chain_of(engine))
     squares, _ = theirs.undamped_modal_analysis()
     frequencies = np.sort(np.sqrt(np.abs(squares)))[1:] / (2.0 * np.pi)
-    modes = np.abs(natural_modes(engine.torsion).frequencies / frequencies - 1.0).max()
+    modes = np.abs(natural_modes(chain_of(engine)).frequencies / frequencies - 1.0).max()
 
     def their_response() -> np.ndarray:
         angles, _ = theirs.ss_response(series, orders * point.speed)
@@ -73,7 +74,7 @@ def beside() -> list[str]:
     differs = np.abs(ours - other).max() / np.abs(other).max()
     rows = []
     for what, own, their, apart in (
-        ("natural modes", lambda: natural_modes(engine.torsion), theirs.undamped_modal_analysis, modes),
+        ("natural modes", lambda: natural_modes(chain_of(engine)), theirs.undamped_modal_analysis, modes),
         (f"response in {len(orders)} orders", lambda: twist(engine, point), their_response, differs),
     ):
         a, b = 1e3 * seconds(own), 1e3 * seconds(their)

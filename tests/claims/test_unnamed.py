@@ -16,7 +16,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem import dependence, measure
 from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Needs, kinds
 from laufruhe.problem.channels.kinds import ON_BLOCK, LoadChannel
-from laufruhe.problem.decision import Kind
+from laufruhe.problem.decision import KINDS, Kind
 from laufruhe.problem.dependence import Dependence, depends
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.loads import PointLoads
@@ -56,7 +56,7 @@ class WorstTwentieth(Norm):
 
 @pytest.fixture
 def resultant(monkeypatch: pytest.MonkeyPatch) -> LoadChannel:
-    monkeypatch.setitem(CHANNELS, RESULTANT.name, RESULTANT)  # type: ignore[arg-type]
+    monkeypatch.setitem(CHANNELS._fill(), RESULTANT.name, RESULTANT)  # type: ignore[attr-defined]
     for norm in NORMS.values():
         monkeypatch.setitem(measure.MEASURES, f"{norm.name} {RESULTANT}", (RESULTANT, norm))  # type: ignore[arg-type]
     return RESULTANT
@@ -113,13 +113,13 @@ def test_no_bound_counts_what_it_does_not_name(resultant: LoadChannel, monkeypat
 
 def test_unknown_is_neither_constant_nor_affine(resultant: LoadChannel, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = laufruhe.load(SPRINGS)
-    for kind in Kind:
+    for kind in KINDS.values():
         assert dependence.dependence(resultant, kind, problem) is Dependence.UNKNOWN
         assert depends(resultant, {kind}, problem)
     # of the same name, and not the channel that the table is of
     monkeypatch.setitem(kinds._KNOWN, MOUNT_FORCE.name, MOUNT_FORCE)
     other = replace(MOUNT_FORCE, signal=_resultant)
-    assert dependence.dependence(other, Kind.TORSION, problem) is Dependence.UNKNOWN
+    assert dependence.dependence(other, Kind.FLYWHEEL, problem) is Dependence.UNKNOWN
     assert [method.name for method in METHODS if method.suits(problem)] == [METHODS[-1].name]
 
 

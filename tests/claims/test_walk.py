@@ -176,7 +176,7 @@ def resultant(loads: PointLoads) -> Spectrum:
 def transmitted(monkeypatch: pytest.MonkeyPatch) -> None:
     """The resultant of the forces on all mounts, as a channel that says no more of itself than it must."""
     channel = LoadChannel("transmitted force", "N", ON_BLOCK, Needs.MOUNTS, signal=resultant)
-    monkeypatch.setitem(CHANNELS, channel.name, channel)  # type: ignore[arg-type]
+    monkeypatch.setitem(CHANNELS._fill(), channel.name, channel)  # type: ignore[attr-defined]
     for norm in NORMS.values():
         monkeypatch.setitem(MEASURES, f"{norm.name} {channel.name}", (channel, norm))  # type: ignore[arg-type]
 

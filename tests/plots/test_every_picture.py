@@ -15,7 +15,7 @@ import ready
 from cli import scenes
 from lanes import first_fast
 from laufruhe.plots import figure, names, style
-from laufruhe.plots.results import firings, torque, twist_modes
+from laufruhe.plots.results import firings, torque
 from laufruhe.plots.style import page
 from laufruhe.plots.words import FAINT, INK, READ, beside, contrast, grouped, ink_on, legible, spread, typeset, wrapped
 from laufruhe.present.pictures import PICTURES, rows_of
@@ -63,7 +63,7 @@ def test_no_picture_has_a_fault(name: str) -> None:
 
 @pytest.mark.slow
 def test_every_picture_is_looked_at() -> None:
-    kinds = {of: importlib.import_module(f"laufruhe.plots.results.{of}") for of in PICTURES}
+    kinds = {of: importlib.import_module(picture.module) for of, picture in PICTURES.items()}
     assert {of for of, kind in kinds.items() if any(kind.applies(solved(name)) for name in MODELS)} == set(PICTURES)
 
 
@@ -91,7 +91,6 @@ def lab(colour: str, eye: str) -> np.ndarray:
 SIDE_BY_SIDE = {
     "before and after": (style.BEFORE, style.AFTER),
     "torque": tuple(torque.COLOURS.values()),
-    "modes of twist": twist_modes.COLOURS,
     "firings": (*firings.BEST, *firings.NEXT),
     "series of studies": tuple(getattr(style, str(name).upper()) for name in picture.SERIES[:6]),
 }

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 from laufruhe import units
 from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.nested import at, put
-from laufruhe.files.problem_file import extension_keys, file_model
+from laufruhe.files.problem_file import EXTENSION_KEYS, file_model
 from laufruhe.files.rotors import name_of_unbalance
 from laufruhe.files.study_tables import keys_of
 
@@ -150,7 +150,7 @@ def _named(tables: Mapping[str, Any]) -> Iterator[tuple[str, Keys]]:
         yield shaft.get("name", ""), ("engine", "shafts", k)
     if "rim" in tables.get("flywheel", {}):
         yield "flywheel", ("flywheel", "rim")
-    for name, key in extension_keys().items():
+    for name, key in EXTENSION_KEYS.items():
         if name in tables:
             yield from key.numbers(tables[name])
     for k, geared in enumerate(tables.get("geared_inertias", ())):

@@ -135,14 +135,12 @@ class ProblemFile(Table):
         return [*given, *(["fidelity.kinematics"] if self.fidelity.kinematics == "auto" else [])]
 
 
-@cache
-def extension_keys() -> Mapping[str, Key]:
-    """Return the tables that extensions add, by their names."""
-    return extended("keys", Key, ())
+EXTENSION_KEYS: Mapping[str, Key] = extended("keys", Key, ())
+"""Tables that extensions add, by their names."""
 
 
 @cache
 def file_model() -> type[ProblemFile]:
     """Return the model of a problem file with the tables of extensions."""
-    added: dict[str, Any] = {key.name: (key.annotation | None, None) for key in extension_keys().values()}
+    added: dict[str, Any] = {key.name: (key.annotation | None, None) for key in EXTENSION_KEYS.values()}
     return create_model("ProblemFile", __base__=ProblemFile, __doc__=ProblemFile.__doc__, __module__=__name__, **added)

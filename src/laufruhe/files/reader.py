@@ -35,7 +35,7 @@ from laufruhe.files.open_numbers import without_open
 from laufruhe.files.open_parts import check_factors, leads_of, piston_masses
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
-from laufruhe.files.problem_file import Given, ProblemFile, extension_keys, file_model
+from laufruhe.files.problem_file import EXTENSION_KEYS, Given, ProblemFile, file_model
 from laufruhe.files.quantities import followed
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.run_up import run_of
@@ -312,7 +312,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     run = run_of(file.run_up, found.block, found.mounts, [point.name for point in points])
     geared, of_geared = geared_of(file.geared_inertias)
     engine = Engine(
-        file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, None, wheel, run, gear, geared,
+        file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, wheel, run, gear, geared,
         load_cases_of(file.load_cases, found.block),
     )  # fmt: skip
     of_sizes = _sizes(file, table, told_bearings, bearings, gear)
@@ -332,7 +332,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         extras=assembly_of(file.assembly, engine, path.parent),
     )
     given = Given(file, throws, path.parent)
-    for name, key in extension_keys().items():
+    for name, key in EXTENSION_KEYS.items():
         if (own := getattr(file, name)) is not None:
             problem = key.read(own, problem, given)
     scene = Scene(problem.engine, points)

@@ -192,7 +192,7 @@ class RunPeaks:
         units = [(k, way) for k, domain in enumerate(self._domains) for way in domain.set.directions]
         values = [[0.0] * len(opened)] + [[way if j == k else 0.0 for j in range(len(opened))] for k, way in units]
         point = point_of(run, problem.points)
-        plain = replace(problem.engine, bearings=(), flywheel=None, torsion=None, run=None)
+        plain = replace(problem.engine, bearings=(), flywheel=None, extras=(), run=None)
         designs = [problem.numbers(value, opened).engine(plain) if opened else plain for value in values]
         loads = [run_loads(design, point, problem.fidelity) for design in designs]
         out = []

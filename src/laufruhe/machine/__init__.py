@@ -13,11 +13,9 @@ from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.machine.run import Run
 from laufruhe.machine.running_gear import Bolts, PistonPin, RunningGear, Shank, Webs
 from laufruhe.machine.slider_crank import SliderCrank
-from laufruhe.machine.torsion import Absorber, Disc, Section, Torsion
 
 __all__ = [
     "CRANKSHAFT",
-    "Absorber",
     "Arms",
     "Bearing",
     "Block",
@@ -26,7 +24,6 @@ __all__ = [
     "Chambers",
     "Charge",
     "Cycle",
-    "Disc",
     "Engine",
     "Flywheel",
     "GasModel",
@@ -42,13 +39,11 @@ __all__ = [
     "Rotor",
     "Run",
     "RunningGear",
-    "Section",
     "Seiliger",
     "Shaft",
     "Shank",
     "SliderCrank",
     "Steam",
-    "Torsion",
     "Webs",
     "Wiebe",
 ]

@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
 from functools import cached_property, lru_cache
+from typing import TypeVar
 
 from laufruhe.errors import ModelError
 from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.block import Block
 from laufruhe.machine.chambers import GasModel
+from laufruhe.machine.extra import Extra
 from laufruhe.machine.flywheel import Flywheel
 from laufruhe.machine.geared import GearedInertia
 from laufruhe.machine.load_case import LoadCase
@@ -22,9 +24,10 @@ from laufruhe.machine.rotor import Rotor, Shaft
 from laufruhe.machine.run import Run
 from laufruhe.machine.running_gear import Moving, RunningGear, Size
 from laufruhe.machine.slider_crank import SliderCrank
-from laufruhe.machine.torsion import Torsion
 from laufruhe.numerics.spectrum import as_order
 from laufruhe.numerics.turns import as_turn, cis, direction, within
+
+E = TypeVar("E", bound=Extra)
 
 
 class Cycle(Enum):
@@ -84,8 +87,6 @@ class Engine:
         The body that elastic mounts carry; without one the mounts are rigid.
     bearings
         Main bearings of its shafts; empty where nothing is asked of them.
-    torsion
-        Discs and shafts that its crankshaft twists between; None where nothing is asked of them.
     flywheel
         What turns with the crank; None where nothing is asked of it.
     run
@@ -96,6 +97,8 @@ class Engine:
         Shares of the inertia of all that turns on shafts of other speeds.
     load_cases
         Loads that are held, under which mounts give way.
+    extras
+        Parts that extensions add, one of a class.
     """
 
     name: str
@@ -105,12 +108,12 @@ class Engine:
     mounts: tuple[Mount, ...] = ()
     block: Block | None = None
     bearings: tuple[Bearing, ...] = ()
-    torsion: Torsion | None = None
     flywheel: Flywheel | None = None
     run: Run | None = None
     gear: RunningGear | None = None
     geared: tuple[GearedInertia, ...] = ()
     load_cases: tuple[LoadCase, ...] = ()
+    extras: tuple[Extra, ...] = ()
 
     def __post_init__(self) -> None:
         for kind in ("slider_cranks", "rotors", "mounts", "bearings", "geared"):
@@ -143,6 +146,14 @@ class Engine:
                 f"{part.name} fires at {math.degrees(part.firing_angle):g} deg, "
                 f"{math.degrees(math.remainder(crank_angle, math.tau)):g} deg from its dead centre"
             )
+
+    def extra(self, kind: type[E]) -> E | None:
+        """Return the part that an extension adds of a class; None where there is none."""
+        return next((one for one in self.extras if isinstance(one, kind)), None)
+
+    def with_extra(self, extra: Extra) -> Engine:
+        """Return the engine with a part of an extension in place of that of its class."""
+        return replace(self, extras=(*(one for one in self.extras if type(one) is not type(extra)), extra))
 
     @cached_property
     def moving(self) -> Moving:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
-from laufruhe.machine import Engine, OperatingPoint, SliderCrank
+from laufruhe.machine import Cycle, Engine, OperatingPoint, SliderCrank
 from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import EXACT, Fidelity
@@ -27,6 +28,20 @@ def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     masses = fidelity.kept(star_loads(engine, point.speed, lambda part: (_of_masses(part, fidelity),)))
     total = masses if gas is None else masses + fidelity.kept(gas_loads(engine, gas, fidelity))
     return total.each(lambda wrench: wrench @ ROLL)
+
+
+def cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity = EXACT) -> ComplexArray:
+    """Return the coefficients of one cylinder's torque by order of the cycle [N m], counted from its firing (T1)."""
+    first = replace(part, name="cylinder", x=0.0, throw=part.bank + part.fires_at, firing_angle=0.0)
+    return _cylinder_torque(cycle, first, replace(point, name="", weight=1.0), fidelity)
+
+
+@lru_cache(maxsize=256)
+def _cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity) -> ComplexArray:
+    found = crank_torque(Engine("one cylinder", cycle, (part,)), point, fidelity)
+    series = found.rebased(cycle.base_order).coefficients
+    series.setflags(write=False)
+    return series
 
 
 def _of_masses(part: SliderCrank, fidelity: Fidelity) -> Effect:

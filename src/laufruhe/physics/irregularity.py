@@ -84,7 +84,7 @@ class Swing:
 
 def swing_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Swing:
     """Work and inertia over the cycle; rotors, mounts and the flywheel itself are not in them."""
-    bare = replace(engine, rotors=(), mounts=(), bearings=(), flywheel=None, torsion=None, geared=())
+    bare = replace(engine, rotors=(), mounts=(), bearings=(), flywheel=None, extras=(), geared=())
     return _found_swing(bare, point, fidelity)
 
 

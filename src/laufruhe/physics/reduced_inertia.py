@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
-from laufruhe.machine import Engine, SliderCrank, Torsion
+from laufruhe.machine import Engine, SliderCrank
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.mechanism import reduced
 
@@ -30,15 +29,8 @@ def _reduced_inertia(part: SliderCrank) -> float:
     return part.rotating_mass * part.crank_radius**2 + float(np.mean(inertia * np.ones(_STEPS)))
 
 
-def turned_by(chain: Torsion, before: Sequence[SliderCrank], after: Sequence[SliderCrank]) -> Torsion:
-    """The chain with other pistons and rods in place of those that its discs have (V1)."""
-    more = {a.name: reduced_inertia(b) - reduced_inertia(a) for a, b in zip(before, after, strict=True)}
-    discs = (replace(d, inertia=d.inertia + sum(more[name] for name in d.cylinders)) for d in chain.discs)
-    return replace(chain, discs=tuple(discs))
-
-
 def turning_inertia(engine: Engine, fidelity: Fidelity) -> float | None:
-    """Inertia beside pistons and rods [kg m2], of an uneven speed, the flywheel, or the discs of the crankshaft.
+    """Inertia beside pistons and rods [kg m2], of an uneven speed, the flywheel, or a part of an extension.
 
     None where none of these is told.
     """
@@ -46,10 +38,5 @@ def turning_inertia(engine: Engine, fidelity: Fidelity) -> float | None:
         return fidelity.crank_inertia
     if engine.flywheel is not None:
         return engine.flywheel.inertia
-    return None if engine.torsion is None else inertia_of_discs(engine.torsion, engine.slider_cranks)
-
-
-def inertia_of_discs(chain: Torsion, parts: Sequence[SliderCrank]) -> float:
-    """Of all discs without pistons and rods [kg m2] (V14); rings of absorbers slip, and are not counted."""
-    swinging = sum(reduced_inertia(part) - part.rotating_mass * part.crank_radius**2 for part in parts)
-    return sum(disc.inertia for disc in chain.discs) - swinging
+    told = (extra.turning_inertia(engine.slider_cranks) for extra in engine.extras)
+    return next((inertia for inertia in told if inertia is not None), None)

@@ -45,7 +45,7 @@ def runs_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run)
     ModelError
         If the engine stands on no elastic mounts.
     """
-    return _found_runs(replace(engine, bearings=(), flywheel=None, torsion=None, run=None), point, fidelity, run)
+    return _found_runs(replace(engine, bearings=(), flywheel=None, extras=(), run=None), point, fidelity, run)
 
 
 @lru_cache(maxsize=32)

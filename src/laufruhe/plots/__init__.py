@@ -18,7 +18,6 @@ from matplotlib.figure import Figure
 
 from laufruhe.errors import refused
 from laufruhe.numerics.processes import in_twins
-from laufruhe.physics.torsion import chain_of
 from laufruhe.plots.letters import prepare
 from laufruhe.plots.style import as_svg, save
 from laufruhe.present.pictures import PICTURES
@@ -33,12 +32,12 @@ def figures(result: Result) -> Iterator[tuple[str, Figure]]:
 
 def names(result: Result) -> list[str]:
     """Pictures that this result fills, in the order of a report."""
-    return [name for name in PICTURES if import_module(f"{__name__}.results.{name}").applies(result)]
+    return [name for name in PICTURES if import_module(PICTURES[name].module).applies(result)]
 
 
 def figure(result: Result, name: str) -> Figure:
     """One picture of a result, by its name among `laufruhe.present.pictures.PICTURES`."""
-    picture = import_module(f"{__name__}.results.{name}") if name in PICTURES else None
+    picture = import_module(PICTURES[name].module) if name in PICTURES else None
     if picture is None or not picture.applies(result):
         known = ", ".join(names(result))
         raise refused("name", f'"{name}"', "is no picture of this result", f"one of {known}", "figure")
@@ -53,10 +52,9 @@ def _words(result: Result) -> Iterator[str]:
     yield from (problem.title, problem.source)
     named: list[Any] = [*problem.points, *problem.limits, *problem.decisions]
     named += [*engine.cylinders, *engine.mounts, *engine.rotors, *engine.bearings]
-    if engine.torsion is not None:
-        chain = chain_of(engine)
-        named += [*chain.discs, *chain.sections]
     yield from (one.name for one in named)
+    for extra in engine.extras:
+        yield from extra.labels
 
 
 def draw(result: Result, folder: Path, kinds: Sequence[str] = ("png",)) -> tuple[str, ...]:
@@ -72,7 +70,7 @@ def draw_and_show(result: Result, folder: Path, kinds: Sequence[str], wanted: It
 def get_ready() -> None:
     """Import all that draws."""
     for name in PICTURES:
-        import_module(f"{__name__}.results.{name}")
+        import_module(PICTURES[name].module)
 
 
 def draw_in_shares(result: Result, folder: Path, kinds: Sequence[str], count: int) -> dict[str, str]:

@@ -11,11 +11,17 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
 from laufruhe.physics.reduced_inertia import turning_inertia
-from laufruhe.physics.torsion import has_torsion
-from laufruhe.problem.channels import CRANK_PIN_FORCE, FRICTION_POWER, MAIN_BEARING_FORCE, MOUNT_FORCE, LoadChannel
-from laufruhe.problem.channels.torsional import SHAFT_STRESS, SHAFT_TORQUE
+from laufruhe.problem.channels import (
+    CHANNELS,
+    CRANK_PIN_FORCE,
+    FRICTION_POWER,
+    MAIN_BEARING_FORCE,
+    MOUNT_FORCE,
+    LoadChannel,
+)
 from laufruhe.problem.evaluation import Evaluation, samples_of
 from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import limit_values
 from laufruhe.solvers.result import Result
@@ -45,21 +51,19 @@ MOUNTS = Places("mounts", MOUNT_FORCE, "Mount forces", "mount")
 BEARINGS = Places("main_bearings", MAIN_BEARING_FORCE, "Main-bearing forces", "bearing")
 PINS = Places("crank_pins", CRANK_PIN_FORCE, "Crank-pin forces", "pin of")
 FRICTION = Places("friction", FRICTION_POWER, "Friction power of main bearings", "bearing")
-SHAFTS = Places("shaft_torque", SHAFT_TORQUE, "Torque in the crankshaft", "section")
-STRESSES = Places("shaft_stress", SHAFT_STRESS, "Shear stress of the crankshaft", "section")
 
 
 def places_of(result: Result) -> list[Places]:
-    """What this result shows: inside the crankcase what is asked, all where bearings and their friction are given."""
+    """Return what a result shows by places; inside the crankcase what is asked, and all where bearings are given."""
     engine, problem = result.problem.engine, result.problem
     asked, inside = {measure.channel for measure in problem.measures}, has_bearing_loads(engine, problem.fidelity)
     shown = [MOUNTS] if engine.mounts else []
     rubs = all(bearing.friction is not None for bearing in engine.bearings)
     given = {BEARINGS: bool(engine.bearings), PINS: bool(engine.bearings), FRICTION: bool(engine.bearings) and rubs}
     shown += [places for places, known in given.items() if inside and (known or places.channel in asked)]
-    if not has_torsion(engine, problem.fidelity):
-        return shown
-    return [*shown, SHAFTS, *([STRESSES] if STRESSES.channel.places(engine) else [])]
+    loads = [Measure(channel).load for channel in CHANNELS.values() if channel.title and not problem.fidelity.is_uneven]
+    found = [load for load in loads if load.needs.of(engine) and load.places(engine)]
+    return [*shown, *(Places(load.name.replace(" ", "_"), load, load.title, load.place) for load in found)]
 
 
 def hardest_point(result: Result) -> int:

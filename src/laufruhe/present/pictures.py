@@ -1,6 +1,38 @@
 """Pictures of a result in the order of a report, a line each: `plots.results` has a file of that name to draw it."""
 
-PICTURES = {
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from laufruhe.extension import extended
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture of a result.
+
+    Attributes
+    ----------
+    name
+        Of its files.
+    caption
+        Words under it.
+    home
+        Module with `applies` and `figure`, which take a result; a file of that name in `plots.results` by default.
+    """
+
+    name: str
+    caption: str
+    home: str = ""
+
+    @property
+    def module(self) -> str:
+        """Return the address of the module that draws it."""
+        return self.home or f"laufruhe.plots.results.{self.name}"
+
+
+_CAPTIONS = {
     "engine": "The engine to scale, from the front and from beside; what is open is marked.",
     "star": "The best crank stars, from the front and from the side.",
     "firings": "Firing orders of the best stars over one working cycle.",
@@ -13,8 +45,6 @@ PICTURES = {
     "torque": "Torque of gas, pistons and rods, its work and its orders, and the speed that a flywheel makes of it.",
     "chambers": "Volume, pressure and torque of each chamber of a rotor over three turns of the shaft.",
     "bearings": "Force on each main bearing over a cycle, as block and crankshaft feel it, and where they wear.",
-    "twist_modes": "How the crankshaft swings in its natural modes, and the speeds at which orders meet them.",
-    "twist_response": "Torque in the crankshaft over crank speed, with the speeds at which a limit bars it.",
     "spectrum": "What orders of crank speed the loads are made of.",
     "transmissibility": "Force on the elastic mounts over that on the same mounts if they gave no way.",
     "campbell": "Orders of crank speed against natural frequencies: where they cross, speed is critical.",
@@ -24,20 +54,20 @@ PICTURES = {
     "assembly": "The best assembly of measured parts beside those at random.",
     "trade": "What slightly uneven firing buys.",
 }
+PICTURES: Mapping[str, Picture] = extended("pictures", Picture, [Picture(*each) for each in _CAPTIONS.items()])
 
 SHEETS = (
     "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "run-up", "rankings",
 )  # fmt: skip
 """Curves and tables of a result as files: `report.tables` fills them in full precision."""
 CURVES = (
-    "torque", "indicator", "chambers", "twist-response", "twist-modes", "critical-speeds", "uneven-firing", "shares",
+    "torque", "indicator", "chambers", "uneven-firing", "shares",
     "willans", "bearings-on-crank", "wear", "turning-parts", "mount-critical-speeds",
 )  # fmt: skip
 """Further ones, which `report.curves` fills."""
 PRINTED = (
     "reach", "assembly", "objectives-in-order", "equal-optima", "weights", "balance-factors", "under-tolerance",
-    "tolerances", "crankshaft-torque", "crankshaft-modes", "strongest-critical-speeds-as-given",
-    "strongest-critical-speeds-as-decided", "barred-speeds", "load-cases", "through-resonance",
+    "tolerances", "crankshaft-torque", "load-cases", "through-resonance",
 )  # fmt: skip
 """Tables of the report that are files as they are printed."""
 

@@ -15,6 +15,7 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.drives import (
     DAMPING,
+    KINDS,
     LAG,
     LOSS,
     NUMBERS_OF_MOUNT,
@@ -35,6 +36,7 @@ from laufruhe.problem.sets import Set, Value
 
 __all__ = [
     "DAMPING",
+    "KINDS",
     "LAG",
     "LOSS",
     "NUMBERS_OF_MOUNT",

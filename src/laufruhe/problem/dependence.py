@@ -11,9 +11,9 @@ from collections.abc import Collection, Mapping
 from enum import StrEnum
 
 from laufruhe.errors import ModelError
-from laufruhe.extension import extensions
+from laufruhe.extension import extensions, objects
 from laufruhe.problem.channels import CHANNELS, Channel
-from laufruhe.problem.decision import Kind
+from laufruhe.problem.decision import KINDS, Kind
 from laufruhe.problem.problem import Problem
 
 
@@ -56,86 +56,87 @@ _LETTERS = {
 }
 _COLUMNS = (
     Kind.UNBALANCE, Kind.SHARE, Kind.PISTON, Kind.PLACE, Kind.SIZE, Kind.LEAD, Kind.STAR, Kind.STIFFNESS, Kind.MOUNT,
-    Kind.FLYWHEEL, Kind.TORSION,
+    Kind.FLYWHEEL,
 )  # fmt: skip
 # of an engine on elastic mounts at an even speed; `dependence` says what is different elsewhere
 _TABLE = """
-                                    U S P  x Z L  *  k M  F T
-shaking force                       a a a  b m >  >  0 0  0 0
-rocking couple                      a a a  b m >  >  0 0  0 0
-roll moment                         a a a  b m >  >  0 0  0 0
-surging force                       a a a  b m >  >  0 0  0 0
-swaying couple                      a a a  b m >  >  0 0  0 0
-mount force                         a a a  b m >  >  s s  0 0
-mount travel                        a a a  b m >  >  s s  0 0
-main-bearing force                  a a a  v m >  >  0 0  0 0
-main-bearing pressure               a a a  v m >  >  0 0  0 0
-main-bearing pressure times speed   a a a  v m >  >  0 0  0 0
-hammer blow                         a a a  v m >  >  0 0  0 0
-friction power                      a a a  v m >  >  0 0  0 0
-web stress                          a a a  s m s  >  0 0  0 0
-journal torsion stress              a a a  s m >  >  0 0  0 0
-journal stress                      a a a  s m s  >  0 0  0 0
-crank-pin force                     0 0 a  0 m s  >  0 0  0 0
-crank-pin pressure                  0 0 a  0 m s  >  0 0  0 0
-crank-pin bending stress            a 0 a  0 m s  >  0 0  0 0
-side force                          0 0 a  0 m s  >  0 0  0 0
-rod force                           0 0 a  0 m s  >  0 0  0 0
-rod stress                          0 0 a  0 m s  >  0 0  0 0
-share of the buckling load          0 0 a  0 m s  >  0 0  0 0
-bolt stress                         0 0 a  0 m s  >  0 0  0 0
-piston-pin pressure                 0 0 a  0 m s  >  0 0  0 0
-piston-pin bending stress           0 0 a  0 m s  >  0 0  0 0
-piston-pin deflection               0 0 a  0 m s  >  0 0  0 0
-piston-pin ovality                  0 0 a  0 m s  >  0 0  0 0
-crank torque                        0 0 a  0 m >  >  0 0  0 0
-stored work                         0 0 a  0 m >  >  0 0  0 0
-shaft twist                         0 0 s  0 s 0  >  0 0  0 s
-shaft torque                        0 0 s  0 s 0  >  0 0  0 s
-shaft stress                        0 0 s  0 s 0  >  0 0  0 s
-counterweight mass                  a 0 a  0 0 0  a  0 0  0 0
-balancer mass                       a 0 a  0 0 0  a  0 0  0 0
-added mass                          a 0 a  0 0 0  a  0 0  0 0
-shaft distance                      0 0 0  s 0 0  0  0 0  0 0
-shaft clearance                     0 0 0  s 0 0  0  0 0  0 0
-envelope radius                     0 0 0  c 0 0  0  0 0  0 0
-static sag                          0 0 0  0 0 0  0  c s  0 0
-natural frequencies                 0 0 0  0 0 0  0  + s  0 0
-kinetic-energy decoupling           0 0 0  0 0 0  0  s s  0 0
-decoupling shortfall                0 0 0  0 0 0  0  s s  0 0
-torque-roll residual                0 0 0  0 0 0  0  c s  0 0
-raw torque-roll residual            0 0 0  0 0 0  0  c s  0 0
-total stiffness                     0 0 0  0 0 0  0  a s  0 0
-static travel                       0 0 0  0 0 0  0  s s  0 0
-static mount force                  0 0 0  0 0 0  0  s s  0 0
-transmissibility                    s s s  s s s  s  s s  0 0
-degree of irregularity              0 0 s  0 s w  w  0 0  - -
-flywheel inertia                    0 0 0  0 0 0  0  0 0  + +
-flywheel mass                       0 0 0  0 0 0  0  0 0  + 0
-rim stress                          0 0 0  0 0 0  0  0 0  + 0
-arm stress                          0 0 0  0 s s  0  0 0  + 0
-apex speed                          0 0 0  0 0 0  0  0 0  0 0
-apex acceleration                   0 0 0  0 0 0  0  0 0  0 0
-run-up force                        s s s  s s s  s  s s  s s
-run-up travel                       s s s  s s s  s  s s  s s
-run-up twist                        s s s  s s s  s  s s  s s
-throw clearance                     0 0 0  0 - 0  0  0 0  0 0
-running-gear mass                   0 0 0  0 + 0  0  0 0  0 0
-torsional frequencies               0 0 s  0 s 0  0  0 0  0 s
-critical speeds                     0 0 s  0 s 0  0  0 0  0 s
-absorber heat                       0 0 s  0 s 0  w  0 0  0 s
+                                    U S P  x Z L  *  k M  F
+shaking force                       a a a  b m >  >  0 0  0
+rocking couple                      a a a  b m >  >  0 0  0
+roll moment                         a a a  b m >  >  0 0  0
+surging force                       a a a  b m >  >  0 0  0
+swaying couple                      a a a  b m >  >  0 0  0
+mount force                         a a a  b m >  >  s s  0
+mount travel                        a a a  b m >  >  s s  0
+main-bearing force                  a a a  v m >  >  0 0  0
+main-bearing pressure               a a a  v m >  >  0 0  0
+main-bearing pressure times speed   a a a  v m >  >  0 0  0
+hammer blow                         a a a  v m >  >  0 0  0
+friction power                      a a a  v m >  >  0 0  0
+web stress                          a a a  s m s  >  0 0  0
+journal torsion stress              a a a  s m >  >  0 0  0
+journal stress                      a a a  s m s  >  0 0  0
+crank-pin force                     0 0 a  0 m s  >  0 0  0
+crank-pin pressure                  0 0 a  0 m s  >  0 0  0
+crank-pin bending stress            a 0 a  0 m s  >  0 0  0
+side force                          0 0 a  0 m s  >  0 0  0
+rod force                           0 0 a  0 m s  >  0 0  0
+rod stress                          0 0 a  0 m s  >  0 0  0
+share of the buckling load          0 0 a  0 m s  >  0 0  0
+bolt stress                         0 0 a  0 m s  >  0 0  0
+piston-pin pressure                 0 0 a  0 m s  >  0 0  0
+piston-pin bending stress           0 0 a  0 m s  >  0 0  0
+piston-pin deflection               0 0 a  0 m s  >  0 0  0
+piston-pin ovality                  0 0 a  0 m s  >  0 0  0
+crank torque                        0 0 a  0 m >  >  0 0  0
+stored work                         0 0 a  0 m >  >  0 0  0
+counterweight mass                  a 0 a  0 0 0  a  0 0  0
+balancer mass                       a 0 a  0 0 0  a  0 0  0
+added mass                          a 0 a  0 0 0  a  0 0  0
+shaft distance                      0 0 0  s 0 0  0  0 0  0
+shaft clearance                     0 0 0  s 0 0  0  0 0  0
+envelope radius                     0 0 0  c 0 0  0  0 0  0
+static sag                          0 0 0  0 0 0  0  c s  0
+natural frequencies                 0 0 0  0 0 0  0  + s  0
+kinetic-energy decoupling           0 0 0  0 0 0  0  s s  0
+decoupling shortfall                0 0 0  0 0 0  0  s s  0
+torque-roll residual                0 0 0  0 0 0  0  c s  0
+raw torque-roll residual            0 0 0  0 0 0  0  c s  0
+total stiffness                     0 0 0  0 0 0  0  a s  0
+static travel                       0 0 0  0 0 0  0  s s  0
+static mount force                  0 0 0  0 0 0  0  s s  0
+transmissibility                    s s s  s s s  s  s s  0
+degree of irregularity              0 0 s  0 s w  w  0 0  -
+flywheel inertia                    0 0 0  0 0 0  0  0 0  +
+flywheel mass                       0 0 0  0 0 0  0  0 0  +
+rim stress                          0 0 0  0 0 0  0  0 0  +
+arm stress                          0 0 0  0 s s  0  0 0  +
+apex speed                          0 0 0  0 0 0  0  0 0  0
+apex acceleration                   0 0 0  0 0 0  0  0 0  0
+run-up force                        s s s  s s s  s  s s  s
+run-up travel                       s s s  s s s  s  s s  s
+run-up twist                        s s s  s s s  s  s s  s
+throw clearance                     0 0 0  0 - 0  0  0 0  0
+running-gear mass                   0 0 0  0 + 0  0  0 0  0
 """
 
 
 def _row(line: str) -> tuple[str, dict[Kind, Dependence]]:
-    name, letters = line.split("  ", 1)
-    kinds = zip(_COLUMNS, letters.split(), strict=True)
-    return name, {kind: _LETTERS[letter] for kind, letter in kinds}
+    name, words = line.split("  ", 1)
+    letters = [word for word in words.split() if "=" not in word]
+    row = dict(zip(_COLUMNS, map(_LETTERS.__getitem__, letters), strict=True)) if letters else {}
+    further = (word.split("=") for word in words.split() if "=" in word)
+    # a kind that is not installed moves nothing
+    return name, row | {KINDS[kind]: _LETTERS[letter] for kind, letter in further if kind in KINDS}
 
 
-def _with_added(own: Mapping[str, Mapping[Kind, Dependence]]) -> dict[str, Mapping[Kind, Dependence]]:
-    """Return the table with the lines of extensions, which may speak of no channel but their own."""
-    found, without = dict(own), set(CHANNELS).difference(own)
+def _with_added(own: Mapping[str, dict[Kind, Dependence]]) -> dict[str, Mapping[Kind, Dependence]]:
+    """Return the table with the lines of extensions, of their own channels or of their own kinds."""
+    found, without = dict[str, Mapping[Kind, Dependence]](), set(CHANNELS).difference(own)
+    found |= {
+        name: row | {kind: Dependence.NONE for kind in KINDS.values() if kind.is_alone and kind not in row}
+        for name, row in own.items()
+    }
     for extension in extensions():
         for line in extension.dependences:
             try:
@@ -143,11 +144,12 @@ def _with_added(own: Mapping[str, Mapping[Kind, Dependence]]) -> dict[str, Mappi
             except (KeyError, ValueError):
                 rule = f"{line!r} is no line of dependences; give a channel, two blanks and {len(_COLUMNS)} letters"
                 raise ModelError(f"extension '{extension.name}': {rule}") from None
-            if name not in without:
+            if name in without:
+                without.remove(name)
+            elif name not in own or not row.keys() <= {kind for _, kind in objects(extension, "kinds")}:
                 rule = f"'{name}' is no channel without dependences; leave its line out"
                 raise ModelError(f"extension '{extension.name}': {rule}")
-            found[name] = row
-            without.remove(name)
+            found[name] = {**found.get(name, {}), **row}
     return found
 
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from enum import IntEnum
 from typing import Any, ClassVar, Protocol
 
+from laufruhe.extension import extended
 from laufruhe.machine import Engine, Flywheel, Mount, Rotor, SliderCrank
 from laufruhe.machine.leads import led
 from laufruhe.numerics.namespaces import NUMBERS
-from laufruhe.physics.reduced_inertia import turned_by
 from laufruhe.physics.rigid_body import turned_axes
 from laufruhe.problem.sets import Value
 
@@ -19,32 +18,79 @@ STIFFNESS, LOSS, DAMPING, POSITION, TURNED = slice(0, 3), 3, slice(4, 7), slice(
 LAG, NUMBERS_OF_MOUNT = 13, 14
 
 
-class Kind(IntEnum):
-    """Kinds of what may be open, by what a method has to know of them; of several the last one counts."""
+@dataclass(frozen=True, order=True)
+class Kind:
+    """A kind of what may be open, by what a method has to know of it.
 
-    UNBALANCE = 1
+    Attributes
+    ----------
+    rank
+        Of several kinds the highest one counts.
+    name
+        In messages, and of the table of a problem file that its numbers stand in where it is of an extension.
+    words
+        Of its numbers, in the plural.
+    is_alone
+        Whether no channel of the core depends on it but those that a line of dependences names.
+    """
+
+    rank: float
+    name: str
+    words: str = field(default="", compare=False)
+    is_alone: bool = field(default=False, compare=False)
+
+    UNBALANCE: ClassVar[Kind]
     """Every load is affine in it (P1)."""
-    PLACE = 2
+    PLACE: ClassVar[Kind]
     """Every load is affine in it while the unbalances are held (P8)."""
-    STIFFNESS = 3
+    STIFFNESS: ClassVar[Kind]
     """K is linear in it."""
-    MOUNT = 4
-    STAR = 5
+    MOUNT: ClassVar[Kind]
+    STAR: ClassVar[Kind]
     """Of the phasing: no number."""
-    FLYWHEEL = 6
+    FLYWHEEL: ClassVar[Kind]
     """Nothing but the flywheel and how evenly the crank turns feels it."""
-    PISTON = 7
+    PISTON: ClassVar[Kind]
     """Every load is affine in it, not so the inertia that turns."""
-    TORSION = 8
-    """Nothing but the twist of the crankshaft feels it."""
-    SIZE = 9
+    SIZE: ClassVar[Kind]
     """Of the running gear: stresses fall with it, and masses follow (Z2)."""
-    SHARE = 10
+    SHARE: ClassVar[Kind]
     """Of inertia on a geared shaft: the roll moment is affine in it while the masses of the pistons are held."""
-    LEAD = 11
+    LEAD: ClassVar[Kind]
     """Of a geared shaft: every load of order h that it carries comes earlier by h times as much (P13)."""
-    NUMBER = 12
+    NUMBER: ClassVar[Kind]
     """Any other number of the problem file: nothing is known of what depends on it, so everything may."""
+
+    def __hash__(self) -> int:
+        # the same in every process, and so is the order of sets
+        return hash(self.rank)
+
+    def __reduce__(self) -> tuple[Callable[[str], Kind], tuple[str]]:
+        # a kind is one and the same in every process
+        return _kind, (self.name,)
+
+
+Kind.UNBALANCE = Kind(1, "unbalance", "unbalances")
+Kind.PLACE = Kind(2, "place", "places of shafts")
+Kind.STIFFNESS = Kind(3, "stiffness", "stiffness")
+Kind.MOUNT = Kind(4, "mount", "other numbers of mounts")
+Kind.STAR = Kind(5, "star", "stars, firing orders, shafts")
+Kind.FLYWHEEL = Kind(6, "flywheel", "flywheel", is_alone=True)
+Kind.PISTON = Kind(7, "piston", "masses of pistons")
+Kind.SIZE = Kind(9, "size", "sizes")
+Kind.SHARE = Kind(10, "share", "shares of geared inertia")
+Kind.LEAD = Kind(11, "lead", "leads")
+Kind.NUMBER = Kind(12, "number", "other numbers of the file")
+
+KINDS: Mapping[str, Kind] = extended("kinds", Kind, (
+    Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.FLYWHEEL, Kind.PISTON, Kind.SIZE,
+    Kind.SHARE, Kind.LEAD, Kind.NUMBER,
+))  # fmt: skip
+"""Kinds by their names, with those of extensions."""
+
+
+def _kind(name: str) -> Kind:
+    return KINDS[name]
 
 
 @dataclass
@@ -95,14 +141,12 @@ class Numbers:
         if Kind.PISTON in kinds:
             parts = tuple(self._loaded(part) for part in parts)
         flywheel = given.flywheel and self.flywheel(given.flywheel)
-        torsion = given.torsion and given.torsion.moved(self.of_kind(Kind.TORSION, given.torsion.numbers))
-        found = replace(
-            given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel, geared=geared, torsion=torsion
-        )
+        found = replace(given, slider_cranks=parts, rotors=rotors, mounts=mounts, flywheel=flywheel, geared=geared)
         if Kind.SIZE in kinds:
             found = found.resized(self.of_kind(Kind.SIZE, given.moving.sizes))
-        if torsion is not None and kinds & {Kind.PISTON, Kind.SIZE}:
-            found = replace(found, torsion=turned_by(torsion, given.slider_cranks, found.slider_cranks))
+        for extra in given.extras:
+            changes = {key: change for (kind, key), change in self.changes.items() if kind.name == extra.name}
+            found = found.with_extra(extra.moved(changes, given.slider_cranks, found.slider_cranks))
         leads = {shaft: change for (kind, shaft), change in self.changes.items() if kind is Kind.LEAD}
         return led(found, leads) if leads else found
 
@@ -207,8 +251,7 @@ class NumberDrive:
     ----------
     key
         What tells it from others of its kind: of the flywheel its place among its numbers, of a mass of a slider-crank
-        the names of both, of the running gear its size, of a lead its shaft, of a share its geared inertia, of the
-        crankshaft the names of the disc, section or absorber and of the number.
+        the names of both, of the running gear its size, of a lead its shaft, of a share its geared inertia.
     """
 
     kind: Kind

@@ -140,11 +140,6 @@ class Measure:
         return self.channel.of_loads and self.channel.is_number and not self.is_mounting
 
     @property
-    def is_twist(self) -> bool:
-        """Whether it is of the crankshaft's twist, which rotors do not load."""
-        return self.is_load and not self.load.feels_unbalances
-
-    @property
     def lever(self) -> int | None:
         """Power of a throw's place that its loads grow with; None where they do not add up by places alone."""
         return self.load.lever if self.is_load else None

@@ -1,4 +1,4 @@
-"""Curves of pictures as sheets: torque, chambers, twist, shares, friction, bearings and their wear, critical speeds."""
+"""Curves of pictures as sheets: torque, chambers, shares, friction, bearings and their wear, critical speeds."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.irregularity import swing_of
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torque import torque_parts
-from laufruhe.physics.torsion import chain_of
 from laufruhe.physics.willans import FrictionTest
 from laufruhe.present.chambers import indicator_of, points_with_chambers, rotor_chambers, rotors_of
 from laufruhe.present.measures import (
@@ -32,8 +31,6 @@ from laufruhe.present.measures import (
 )
 from laufruhe.present.mounting import critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import RPM
-from laufruhe.present.torsion import facts_of as torsion_of
-from laufruhe.present.torsion import is_twisted, speed_range, speeds_between, torque_over_speed
 from laufruhe.present.twins import KINDS, is_twin, parts_of
 from laufruhe.problem.curves import STEPS
 from laufruhe.report.sheet import Cells, Sheet, Sheets
@@ -77,42 +74,6 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, angles: 
         at = engine.cycle.angle * np.arange(len(speeds)) / len(speeds)
         columns["speed [rpm]"] = np.interp(angles, at, speeds, period=engine.cycle.angle)
     return columns
-
-
-def _twist_response(result: Result) -> Sheet:
-    """Half of the peak to peak torque in every section of the crankshaft, over its speed."""
-    speeds = speeds_between(result.final, *speed_range(result))
-    head, columns = ["speed [rpm]"], [RPM * speeds]
-    for name, design in result.designs.items():
-        sections = [section.name for section in chain_of(design.engine).sections]
-        head += [f"{name}: alternating torque in {section} [N m]" for section in sections]
-        columns += list(torque_over_speed(design, speeds).T)
-    return Sheet(head, np.column_stack(columns).tolist())
-
-
-def _twist_modes(result: Result) -> Sheet:
-    """Swing of every disc in every natural mode of the crankshaft."""
-    rows = []
-    for name, design in result.designs.items():
-        modes = torsion_of(design, *speed_range(result)).modes
-        discs = [disc.name for disc in chain_of(design.engine).discs]
-        for m, frequency in enumerate(modes.frequencies.tolist()):
-            rows += [
-                [name, m + 1, frequency, disc, swing]
-                for disc, swing in zip(discs, modes.shapes[:, m].tolist(), strict=True)
-            ]
-    return Sheet(["design", "mode", "natural frequency [Hz]", "disc", "swing"], rows)
-
-
-def _critical_speeds(result: Result) -> Sheet:
-    """Where orders meet natural modes of the crankshaft: all of them."""
-    rows = [
-        [name, RPM * each.speed, each.order, each.mode, each.vector_sum, each.is_main,
-         math.nan if each.torque is None else each.torque]
-        for name, design in result.designs.items()
-        for each in torsion_of(design, *speed_range(result)).criticals
-    ]  # fmt: skip
-    return Sheet(["design", "speed [rpm]", "order", "mode", "vector sum", "main order", "torque [N m]"], rows)
 
 
 def _uneven_firing(result: Result) -> Sheet:
@@ -256,9 +217,6 @@ CURVES: Sheets = {
     "torque": (lambda result: asks_torque(result) and has_loads(result), _torque),
     "indicator": (points_with_chambers, _indicator),
     "chambers": (lambda result: rotors_of(result.final.engine), _chambers),
-    "twist-response": (is_twisted, _twist_response),
-    "twist-modes": (is_twisted, _twist_modes),
-    "critical-speeds": (is_twisted, _critical_speeds),
     "uneven-firing": (has_ranking, _uneven_firing),
     "shares": (lambda result: result.details, _shares),
     "willans": (lambda result: result.problem.friction, _willans),

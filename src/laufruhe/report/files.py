@@ -10,13 +10,14 @@ import secrets
 import shutil
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from laufruhe.errors import InputError, printed, refused
 from laufruhe.numerics.locks import held
 from laufruhe.present.pictures import CURVES, PICTURES, PRINTED, SHEETS
+from laufruhe.report.section import EXTENSION_SECTIONS
 from laufruhe.report.strict_json import is_ours
 
 RESULT = "result.json"
@@ -25,16 +26,21 @@ PAGE, BOOK = "report.html", "tables.xlsx"
 MOTION = "engine.gif"
 KINDS = ("png", "svg")
 """Of picture files."""
-RESULT_FILES = (
-    RESULT, REPORT, PAGE, BOOK, MOTION,
-    *(f"{name}.{kind}" for name in PICTURES for kind in KINDS),
-    *(f"{name}.csv" for name in (*SHEETS, *CURVES, *PRINTED)),
-)  # fmt: skip
 MADE = ".laufruhe.json"
 """What stands in a folder of results beside them: the command that made them, and their names."""
 _NEXT = f"{MADE}-next"
 _SWAP = 2
 _HERE = -100
+
+
+def result_files() -> tuple[str, ...]:
+    """Return the names of all files that a result may have."""
+    added = [(*section.printed, *section.sheets) for section in EXTENSION_SECTIONS.values()]
+    return (
+        RESULT, REPORT, PAGE, BOOK, MOTION,
+        *(f"{name}.{kind}" for name in PICTURES for kind in KINDS),
+        *(f"{name}.csv" for name in (*SHEETS, *CURVES, *PRINTED, *sum(added, ()))),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -60,7 +66,7 @@ class Set:
     folder: Path
     option: str
     verb: str
-    names: Collection[str] = RESULT_FILES
+    names: Collection[str] = field(default_factory=result_files)
     adds: bool = False
     beside: Collection[str] = ()
 
@@ -154,7 +160,7 @@ def staged_file(path: Path, option: str) -> Iterator[Path]:
         If `path` cannot be written, or is a file that Laufruhe did not make.
     """
     path = path.resolve()
-    place = Set(path, option, "")
+    place = Set(path, option, "", ())
     if path.exists() and not path.is_file() and not path.is_dir():
         # a device or a pipe takes text, and must not be replaced by a file
         yield path

@@ -14,17 +14,15 @@ from laufruhe.physics.balance_factor import balance_factors
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.static_cases import settled
 from laufruhe.physics.torque import torque_facts
-from laufruhe.physics.torsion import absorber_heat, chain_of
 from laufruhe.physics.wrench import WRENCH
 from laufruhe.present.measures import is_met, limits_of, moment_orders, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.present.run_up import run_of, run_point, runs_up, shown_runs
-from laufruhe.present.torsion import barred_ranges, is_twisted, speed_range
-from laufruhe.present.torsion import facts_of as torsion_of
 from laufruhe.problem.channels import LoadChannel, mounting_in
 from laufruhe.problem.evaluation import Evaluation, measured, over, samples_of
 from laufruhe.problem.static_load import static_part
 from laufruhe.prove.certificate import Proof
+from laufruhe.report.section import EXTENSION_SECTIONS
 from laufruhe.report.strict_json import strict
 from laufruhe.report.versions import versions
 from laufruhe.report.wording import why_star
@@ -69,7 +67,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
         "shaking": max((point["shaking"] for point in points), key=_hardness),
         "points": [{key: point[key] for key in own} for point in points],
         **(_on_mounts(result) if is_elastic(result) else {}),
-        **({"torsion": _torsion(result)} if is_twisted(result) else {}),
+        **{name: section.record(result) for name, section in EXTENSION_SECTIONS.items() if section.applies(result)},
         **_running(result),
         **_phasing(result),
         **({} if result.details is None else result.details.record()),
@@ -240,28 +238,6 @@ def _modes(design: Evaluation) -> Record:
     }
 
 
-def _torsion(result: Result) -> Record:
-    """Of the crankshaft as decided; speeds of the crank in rad/s."""
-    design, problem = result.final, result.problem
-    chain, reach = chain_of(design.engine), speed_range(result)
-    facts = torsion_of(design, *reach)
-    heat = [absorber_heat(design.engine, point, problem.fidelity) for point in problem.points]
-    return {
-        "discs": [_of(disc, "name inertia") for disc in chain.discs],
-        "sections": [_of(section, "name stiffness") for section in chain.sections],
-        "frequencies": _plain(facts.modes.frequencies),
-        "shapes": facts.modes.shapes.T.tolist(),
-        "vector_sums": [_plain(sums) for sums in facts.sums],
-        **_of(facts, "orders main_orders=main"),
-        "speeds": list(reach),
-        "critical_speeds": [_of(each, "speed order mode vector_sum main=is_main torque") for each in facts.criticals],
-        "barred": [_of(each, "limit lowest highest") for each in barred_ranges(result, design)],
-        "absorbers": [
-            {"name": each.name, "heat": [float(at[k]) for at in heat]} for k, each in enumerate(chain.absorbers)
-        ],
-    }
-
-
 def _on_mounts(result: Result) -> Record:
     """Of a block on elastic mounts; travel of every mount, and the force on it, under each load held (C2)."""
     mounting, told = mounting_in(result.final.engine), "motion travel force on_stops"
@@ -285,7 +261,11 @@ def _phasing(result: Result) -> Record:
     if result.phasing is None:
         return {}
     points = [_of(p, "allowed deviation value lower_bound throws kkt_residual") for p in result.phasing.trade]
-    found = {**_of(result.phasing, "designs looked_at method even_value"), "trade": points, "why": why_star(result)}
+    found = {
+        **_of(result.phasing, "designs looked_at method even_value"),
+        "trade": points,
+        "why": why_star(result),
+    }
     return {"ranking": [{"rank": k, **_star(star)} for k, star in enumerate(result.phasing.ranking, 1)],
             "phasing": found}  # fmt: skip
 
@@ -301,7 +281,11 @@ def _ranks(result: Result) -> Record:
     """`free_decisions`, and `objectives` where several were minimised in order: what each leaves equal."""
     names = "name unit initial least lower_bound gap final limit price"
     found = [
-        {**_of(rank, names), "proof": str(rank.proof), "equal": [_of(d, "name unit low high") for d in rank.equal]}
+        {
+            **_of(rank, names),
+            "proof": str(rank.proof),
+            "equal": [_of(d, "name unit low high") for d in rank.equal],
+        }
         for rank in result.ranks
     ]
     free = None if result.free is None else [_of(one, "name unit low high") for one in result.free]

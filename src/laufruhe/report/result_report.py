@@ -36,7 +36,7 @@ def _blocks(result: Result, pictures: Sequence[str], command: str) -> Iterator[B
     yield Heading("Result")
     yield Paragraph(headline(result))
     yield from map(Paragraph, told(result))
-    yield from (Illustration(name, PICTURES[name]) for name in pictures)
+    yield from (Illustration(name, PICTURES[name].caption) for name in pictures)
     yield from tables_of(result)
     yield Heading("Proof")
     yield Paragraph(explained(result))

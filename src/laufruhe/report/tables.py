@@ -25,6 +25,7 @@ from laufruhe.problem.evaluation import measured
 from laufruhe.report import files
 from laufruhe.report.curves import CURVES
 from laufruhe.report.grid import Grid
+from laufruhe.report.section import EXTENSION_SECTIONS
 from laufruhe.report.sections import tables_of as printed_tables
 from laufruhe.report.sheet import Sheet, Sheets
 from laufruhe.report.workbook import write_book
@@ -40,7 +41,8 @@ MANY = 5_000
 
 def sheets_of(result: Result) -> dict[str, Sheet]:
     """All sheets that a result fills, by name: SI, but for degrees and rpm where their heads say so."""
-    made = {name: of(result) for name, (applies, of) in _SHEETS.items() if applies(result)}
+    sheets = [_SHEETS, *(section.sheets for section in EXTENSION_SECTIONS.values())]
+    made = {name: of(result) for each in sheets for name, (applies, of) in each.items() if applies(result)}
     return {name: sheet for name, sheet in made.items() if sheet.rows} | _printed(result)
 
 

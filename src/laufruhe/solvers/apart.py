@@ -26,14 +26,13 @@ from laufruhe.solvers.values import ObjectiveValue
 
 Solve = Callable[[Problem], Result]
 Kinds = frozenset[Kind]
-_ALONE = (Kind.FLYWHEEL, Kind.TORSION)
 
 
 def _groups(problem: Problem) -> list[Kinds]:
     """Kinds of what is open that belong together, what moves everything else the last of them."""
-    kinds = {decision.kind for decision in problem.decisions}
-    alone = [frozenset({kind}) for kind in _ALONE if kind in kinds]
-    return [*alone, frozenset(kinds - set(_ALONE))]
+    kinds = frozenset(decision.kind for decision in problem.decisions)
+    alone = sorted(kind for kind in kinds if kind.is_alone)
+    return [*(frozenset({kind}) for kind in alone), kinds.difference(alone)]
 
 
 def is_apart(problem: Problem) -> bool:
@@ -64,8 +63,9 @@ def solve_apart(problem: Problem, solve: Solve) -> Result:
     for group, result in by_group.items():
         if Kind.FLYWHEEL in group:
             engine = replace(engine, flywheel=result.final.engine.flywheel)
-        if Kind.TORSION in group:
-            engine = replace(engine, torsion=result.final.engine.torsion)
+        for extra in result.final.engine.extras:
+            if any(kind.name == extra.name for kind in group):
+                engine = engine.with_extra(extra)
     limits = {
         limit: shown for result in found for limit, shown in zip(result.problem.limits, result.limits, strict=True)
     }

@@ -9,7 +9,7 @@ from typing import Any
 
 from laufruhe.numerics.norms import Norm
 from laufruhe.numerics.processes import called
-from laufruhe.problem.channels import ABSORBER_HEAT, IRREGULARITY, Channel
+from laufruhe.problem.channels import Channel
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence, kinds_of
 from laufruhe.problem.measure import Measure
@@ -18,10 +18,8 @@ from laufruhe.prove.certificate import Reach
 from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.result import Result
 
-# of stars and choices of shafts: masses are those of the shafts that are built
-BUILT = (Dependence.SHIFT, Dependence.AFFINE)
-TOLD_APART = frozenset({IRREGULARITY, ABSORBER_HEAT})
-"""Numbers that the search of stars decides beside loads."""
+# of stars and choices of shafts: masses are those of the shafts that are built, numbers of a signal are told apart
+BUILT = (Dependence.SHIFT, Dependence.AFFINE, Dependence.SWING)
 
 
 def is_pointwise(norm: Norm) -> bool:

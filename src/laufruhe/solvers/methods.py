@@ -19,7 +19,6 @@ from laufruhe.numerics.progress import Listener, listening, tell
 from laufruhe.numerics.witness import collected
 from laufruhe.problem.channels import (
     AT_EACH_MOUNT,
-    FLYWHEEL_INERTIA,
     FREQUENCIES,
     IRREGULARITY,
     MOUNT_FORCE,
@@ -29,10 +28,9 @@ from laufruhe.problem.channels import (
     OF_RUNS,
     OF_SHAFT_PLACES,
     OF_SIZES,
-    TORSIONAL,
     Channel,
 )
-from laufruhe.problem.decision import Kind
+from laufruhe.problem.decision import KINDS, Kind
 from laufruhe.problem.dependence import Dependence, depends, kinds_of
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit
@@ -46,7 +44,7 @@ from laufruhe.solvers.conclusion import KEPT, Shown, concluded, judged, none_wit
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import beyond_mounts
 from laufruhe.solvers.in_order import solve_in_order
-from laufruhe.solvers.method import BUILT, TOLD_APART, Method, by_home, is_pointwise
+from laufruhe.solvers.method import BUILT, Method, by_home, is_pointwise
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex
 from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.relaxed import solve_relaxed
@@ -114,7 +112,7 @@ def _tells_stars_apart(problem: Problem) -> bool:
 
 
 _U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.FLYWHEEL
-_T, _Z, _Q = Kind.TORSION, Kind.SIZE, Kind.PISTON
+_Z, _Q = Kind.SIZE, Kind.PISTON
 _AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependence.SHIFT,)
 _PLACED = (Dependence.BIAFFINE, Dependence.BENT)
 _OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *OF_RUNS}
@@ -127,9 +125,6 @@ _OWN: tuple[Method, ...] = (
     Method("boxes of the flywheel", {_F: ()}, Reach.WHOLE, ".boxes.flywheel:solve_flywheel",
            knows=frozenset(OF_FLYWHEEL), still=lambda _: False,
            proves="the optimum"),
-    Method("boxes of discs and shafts", {_T: ()}, Reach.NEAR, ".boxes.torsion:solve_torsion", True,
-           frozenset({*TORSIONAL, IRREGULARITY, FLYWHEEL_INERTIA}), is_pointwise,
-           proves="the optimum of root mean squares of two or three; else a local one"),
     Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, Reach.WHOLE, _CONES, True,
            proves="the optimum"),
     Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, Reach.WHOLE, _CONES, True,
@@ -145,7 +140,7 @@ _OWN: tuple[Method, ...] = (
            ".boxes.places:solve_places", True, OF_SHAFT_PLACES, is_pointwise,
            proves="the optimum, as far as the boxes go (P8)"),
     Method("stars, each with cones", {_S: BUILT, _U: _AFFINE}, Reach.WHOLE, _STARS, True,
-           TOLD_APART, is_pointwise,
+           norms=is_pointwise,
            proves="the optimum; where throws leave the even steps as far as boxes of throws, bank angle and split "
            "pins go (S29, S30)"),
     Method("boxes of sizes", {_Z: _MASSES, _U: _AFFINE}, Reach.WHOLE, ".boxes.sizes:solve_sizes", True, _OF_SIZES,
@@ -162,21 +157,22 @@ _OWN: tuple[Method, ...] = (
            proves="mostly the optimum of up to four numbers, often of six; else a bound"),
     Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE, _JOINT, False, _OF_MOUNTS, is_pointwise,
            proves="mostly the optimum of up to five numbers of the mounts (E69); else a local one, with a bound"),
-    Method("flywheel, crankshaft and the rest apart", dict.fromkeys(set(Kind) - {_S}, tuple(Dependence)), Reach.ASIDE,
+    Method("flywheel, crankshaft and the rest apart",
+           dict.fromkeys(sorted(set(KINDS.values()) - {_S}), tuple(Dependence)), Reach.ASIDE,
            ".methods:solve_each_apart", norms=lambda _: True, also=is_apart,
            proves="what each of them proves"),
     Method("local programs of sizes and mounts", {_Z: _MASSES, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
            ".mounts.sizes:solve_mounted_sizes", False, _OF_SIZES | _OF_MOUNTS, _is_of_lengths, also=_minimises_loads,
            proves="a local optimum, with the bound of any masses that the sizes may have (Z15)"),
     Method("stars, each with a smooth program", {_S: BUILT, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
-           ".mounts.stars:solve_star_mounts", False, _OF_MOUNTS | TOLD_APART, is_pointwise, also=_tells_stars_apart,
+           ".mounts.stars:solve_star_mounts", False, _OF_MOUNTS, is_pointwise, also=_tells_stars_apart,
            proves="a local optimum, with a bound"),
     Method("local programs, places at their corners",
            {_U: _AFFINE, _P: _PLACED, _Q: _AFFINE, _Z: _MASSES, Kind.LEAD: _SHIFT}, Reach.WHOLE,
            ".methods:solve_with_places", True, OF_SHAFT_PLACES | _OF_SIZES | {IRREGULARITY},
            also=_closes_without_places,
            proves="what is proven of the rest with places at the corners of their bounds (P20)"),
-    Method("local programs of all numbers", dict.fromkeys(Kind, tuple(Dependence)), Reach.ASIDE,
+    Method("local programs of all numbers", dict.fromkeys(KINDS.values(), tuple(Dependence)), Reach.ASIDE,
            ".methods:solve_all_numbers", norms=lambda _: True,
            proves="a local optimum by exact evaluations, without a bound; of stars each of 60 at most"),
 )  # fmt: skip

@@ -59,7 +59,7 @@ def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
             for rotor in engine.rotors
         ),
         bearings=tuple(bearing.scaled(k) for bearing in engine.bearings),
-        torsion=None if engine.torsion is None else engine.torsion.scaled(k, m),
+        extras=tuple(extra.scaled(k, m) for extra in engine.extras),
         gear=None if engine.gear is None else engine.gear.scaled(k, m / k**3),
         mounts=tuple(
             mount.each(lambda m: replace(m, position=(m.position[0] * k, m.position[1] * k, m.position[2] * k)))

@@ -7,7 +7,7 @@ from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach
-from laufruhe.solvers.method import BUILT, TOLD_APART, Method, is_pointwise
+from laufruhe.solvers.method import BUILT, Method, is_pointwise
 
 
 def is_long(problem: Problem) -> bool:
@@ -22,8 +22,7 @@ LONG_CRANKS = Method(
     Reach.WHOLE,
     "laufruhe.extensions.long_cranks.solve:solve_long_cranks",
     True,
-    TOLD_APART,
-    is_pointwise,
+    norms=is_pointwise,
     also=is_long,
     proves="the optimum of up to sixteen throws with nothing else open, and of cranks without couples; else a bound",
     before="stars, each with cones",

@@ -204,7 +204,7 @@ def picture(source: Source, asked: Asked, k: int) -> dict[str, Any]:
     if result is None or k >= len(names):
         return {"done": True}
     image = inlined(as_svg(plots.figure(result, names[k])))
-    return {"name": names[k], "caption": PICTURES[names[k]], "image": image, "of": len(names)}
+    return {"name": names[k], "caption": PICTURES[names[k]].caption, "image": image, "of": len(names)}
 
 
 def _settled(result: Result, tables: Mapping[str, Any], position: int) -> dict[str, Any]:

@@ -34,7 +34,6 @@ STILL: Mapping[Kind, str] = {
     Kind.MOUNT: "these mounts",
     Kind.STAR: "this crank",
     Kind.FLYWHEEL: "this flywheel",
-    Kind.TORSION: "this crankshaft",
     Kind.SIZE: "these sizes",
     Kind.LEAD: "these phases of geared shafts",
 }
@@ -115,7 +114,7 @@ class Scene:
             *(["later objectives"] if whole.ranks else []),
             *([f"the limit{'s' if len(unread) > 1 else ''} on {listed(unread)}"] if unread else []),
         ]
-        phrases = dict.fromkeys(STILL.get(kind, "these other numbers") for kind in sorted(still))
+        phrases = dict.fromkeys(STILL.get(kind, f"the {kind.words}") for kind in sorted(still))
         return Simpler(tuple(phrases), tuple(left_out))
 
     def _reads(self, limit: Limit) -> bool:

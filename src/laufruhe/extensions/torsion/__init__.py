@@ -2,4 +2,27 @@
 
 from laufruhe.extension import Extension
 
-EXTENSION = Extension("torsion", keys=("laufruhe.extensions.torsion.file:KEY",))
+_HERE = "laufruhe.extensions.torsion"
+_CHANNELS = "SHAFT_TWIST", "SHAFT_TORQUE", "SHAFT_STRESS", "TORSIONAL_FREQUENCIES", "CRITICAL_SPEEDS", "ABSORBER_HEAT"
+EXTENSION = Extension(
+    "torsion",
+    keys=(f"{_HERE}.file:KEY",),
+    kinds=(f"{_HERE}.machine:TORSION",),
+    channels=tuple(f"{_HERE}.channels:{name}" for name in _CHANNELS),
+    dependences=(
+        "shaft twist            0 0 s  0 s 0  >  0 0  0  torsion=s",
+        "shaft torque           0 0 s  0 s 0  >  0 0  0  torsion=s",
+        "shaft stress           0 0 s  0 s 0  >  0 0  0  torsion=s",
+        "torsional frequencies  0 0 s  0 s 0  0  0 0  0  torsion=s",
+        "critical speeds        0 0 s  0 s 0  0  0 0  0  torsion=s",
+        "absorber heat          0 0 s  0 s 0  w  0 0  0  torsion=s",
+        "degree of irregularity  torsion=-",
+        "flywheel inertia  torsion=+",
+        "run-up force  torsion=s",
+        "run-up travel  torsion=s",
+        "run-up twist  torsion=s",
+    ),
+    methods=(f"{_HERE}.solver:METHOD",),
+    sections=(f"{_HERE}.section:SECTION",),
+    pictures=(f"{_HERE}.pictures:MODES", f"{_HERE}.pictures:RESPONSE"),
+)

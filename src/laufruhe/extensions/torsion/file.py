@@ -10,15 +10,15 @@ from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 from pydantic import Field
 
 from laufruhe import units
+from laufruhe.extensions.torsion.machine import STEEL, TORSION, Absorber, Disc, Section, Torsion, stiffness_of
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, blamed_on, nearest, one_of
 from laufruhe.files.fields import Name, Number, OneOrEach, Open, Table
 from laufruhe.files.nested import Place
 from laufruhe.files.problem_file import Given, Key
-from laufruhe.machine import CRANKSHAFT, Absorber, Disc, Section, SliderCrank, Torsion
+from laufruhe.machine import CRANKSHAFT, SliderCrank
 from laufruhe.machine.layouts import Throw
-from laufruhe.machine.torsion import STEEL, stiffness_of
-from laufruhe.physics.reduced_inertia import inertia_of_discs, reduced_inertia
+from laufruhe.physics.reduced_inertia import reduced_inertia
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
 from laufruhe.problem.problem import Problem
 
@@ -118,7 +118,7 @@ class _Opened:
     def number(self, value: float | Open, key: str, unit: str, name: str, parts: Sequence[str]) -> float:
         """The number that some parts have, or start from."""
         given = Open.of(value)
-        drives = (NumberDrive(Kind.TORSION, (part, key)) for part in parts)
+        drives = (NumberDrive(TORSION, (part, key)) for part in parts)
         self.decisions += given.decisions(f"torsion.{name}.{key}", unit, *drives)
         return given.start
 
@@ -127,8 +127,7 @@ def _read(table: TorsionTable, problem: Problem, given: Given) -> Problem:
     """Return the problem with the chain, and with what of it is open."""
     chain, decisions = _chain(table, problem.engine.slider_cranks, given.throws)
     _check_inertia(chain, decisions, problem, "fidelity.crank_inertia" if given.file.flywheel is None else "flywheel")
-    engine = replace(problem.engine, torsion=chain)
-    return replace(problem, engine=engine, decisions=(*problem.decisions, *decisions))
+    return replace(problem, engine=problem.engine.with_extra(chain), decisions=(*problem.decisions, *decisions))
 
 
 def _chain(
@@ -281,9 +280,9 @@ def _check_inertia(chain: Torsion, decisions: Sequence[Decision], problem: Probl
         if own.kind is Kind.FLYWHEEL:
             rule = "is open, and the discs of [torsion] tell the inertia of all that turns"
             raise Refused(own.name, None, rule, "leave [flywheel] out, and open a disc")
-        if any(key in discs for key in own.keys(Kind.TORSION)):
+        if any(key in discs for key in own.keys(TORSION)):
             raise Refused(where, None, f"gives an inertia that follows from {own.name}, which is open", "leave it out")
-    told, least = wheel.inertia, inertia_of_discs(chain, problem.engine.slider_cranks)
+    told, least = wheel.inertia, chain.turning_inertia(problem.engine.slider_cranks)
     most = least + sum(absorber.inertia for absorber in chain.absorbers)
     if not least * (1.0 - _ROUNDED) <= told <= most * (1.0 + _ROUNDED):
         of_discs = units.shown(least, "kg m^2")

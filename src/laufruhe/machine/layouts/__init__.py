@@ -3,6 +3,8 @@
 Cylinders are counted from the front (C3).
 """
 
+from collections.abc import Mapping
+
 from laufruhe.extension import extended
 from laufruhe.machine.layouts.base import Asked, Key, LayoutKind, rod_of
 from laufruhe.machine.layouts.boxer import Boxer, boxer
@@ -16,7 +18,7 @@ from laufruhe.machine.layouts.radial import Radial
 from laufruhe.machine.layouts.rotary import Rotary
 from laufruhe.machine.layouts.vee import Vee, vee
 
-LAYOUTS: dict[str, LayoutKind] = extended(
+LAYOUTS: Mapping[str, LayoutKind] = extended(
     "layouts",
     LayoutKind,
     (Inline(), Vee(), Boxer(), OpposedPiston(), Delta(), Radial(), Rotary(), Parts()),

@@ -69,11 +69,9 @@ from laufruhe.problem.channels.sizes import (
     Where,
     inside,
 )
-from laufruhe.problem.channels.torsional import ABSORBER_HEAT, TORSIONAL
 from laufruhe.problem.loads import PointLoads
 
 __all__ = [
-    "ABSORBER_HEAT",
     "AT_EACH_MOUNT",
     "DECOUPLING",
     "DECOUPLING_SHORTFALL",
@@ -99,7 +97,6 @@ __all__ = [
     "STATIC_TRAVEL",
     "STORED_WORK",
     "TORQUE_ROLL",
-    "TORSIONAL",
     "TOTAL_STIFFNESS",
     "TRANSMISSIBILITY",
     "Channel",
@@ -200,5 +197,4 @@ CHANNELS: Mapping[str, Channel] = extended("channels", Channel, (
     HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,
     SIDE_FORCE, FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS,
     ADDED_MASS, *OF_MOUNTING, *OF_RUNS, *OF_APEXES, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES,
-    *TORSIONAL,
 ))  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
@@ -16,7 +17,6 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.linear_run import Response
 from laufruhe.physics.mount_numbers import AxisResidual, Band
 from laufruhe.physics.strength import Factor
-from laufruhe.physics.torsion import Factors, Resonance, unit_factors
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import PointLoads
@@ -24,7 +24,7 @@ from laufruhe.problem.loads import PointLoads
 OfWheel: TypeAlias = Callable[[Flywheel], float]
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 ON_BLOCK = ("operating_points", "orders", "alternating")
-AT_SECTIONS, AT_WEBS = ((*ON_BLOCK, at) for at in ("sections", "webs"))
+AT_WEBS = (*ON_BLOCK, "webs")
 AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
     (*ON_BLOCK, "direction_weights", at) for at in ("mounts", "bearings", "cylinders")
 )
@@ -66,14 +66,8 @@ class Needs:
     MOUNTS = Need(lambda e: e.mounts, "mounts", "add [mounts], or ask for a shaking force")
     ELASTIC = Need(lambda e: e.block, "elastic mounts", 'add [mounts] with kind = "elastic", and [block]')
     BEARINGS = Need(lambda e: e.bearings, "main bearings", "list them in [[main_bearings]]")
-    TORSION = Need(lambda e: e.torsion, "the discs and shafts of the crankshaft", "add [torsion]")
-    DIAMETERS = Need(
-        lambda e: e.torsion and any(section.diameter is not None for section in e.torsion.sections),
-        "the diameter of a shaft",
-        "give one in [torsion]",
-    )
     FLYWHEEL = Need(
-        lambda e: e.flywheel or e.torsion,
+        lambda e: e.flywheel or any(extra.turning_inertia(e.slider_cranks) is not None for extra in e.extras),
         "a flywheel",
         "add [flywheel] with an inertia or a rim, [torsion], or fidelity.crank_inertia",
     )
@@ -93,8 +87,9 @@ _KNOWN: dict[str, Channel] = {}
 
 
 def known(name: str) -> Channel:
-    """The channel of a name."""
-    return _KNOWN[name]
+    """Return the channel of a name; those of extensions are imported where they are not yet."""
+    found: Channel = _KNOWN.get(name) or import_module("laufruhe.problem.channels").CHANNELS[name]
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,10 +130,11 @@ class Channel:
         What turning about the torque-roll axis lacks to be a mode, if it is of that.
     open_frequency
         Whether the frequency wanted may lie anywhere in a band.
-    of_modes
-        Speeds and orders that it counts natural modes of the crankshaft at, if it is of these.
     places
         Names of the places that it is measured at, by which a file may narrow it; none where that is the block.
+    title, place
+        Of a load: of the table in which every report shows it where the engine has what it needs and turns evenly, and
+        of a place there; none where it is shown only if it is asked.
     span
         Least and largest of its numbers while shafts stand between their places in two engines, if it is of these.
     """
@@ -156,13 +152,14 @@ class Channel:
     of_run: Callable[[Response], NDArray[np.float64]] | None = None
     of_engine: Callable[[Engine], float] | None = None
     of_torque: bool = False
-    of_modes: Callable[[Asked, Answered], Sequence[Resonance]] | None = None
     of_constant_stiffness: bool = False
     of_shares: bool = False
     of_cases: Callable[[Any], Any] | None = None
     of_axis: Callable[[Block, Band], AxisResidual] | None = None
     open_frequency: bool = False
     places: Callable[[Engine], Sequence[str]] = lambda _: ()
+    title: str = ""
+    place: str = ""
     span: Callable[[Asked, Engine, Engine], Sequence[Span]] = lambda *_: ()
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False
@@ -224,10 +221,10 @@ class LoadChannel(Channel):
         Power of a throw's place that its load grows with; None where loads do not add up by places alone.
     of_wrench
         Whether it follows from the wrench on the block alone; what does not say so counts as a load inside.
+    feels_unbalances
+        Whether rotors load it, and the loads of each throw add up; else it is of cylinders and what they twist.
     adds_up
         Whether its places are added up, so that no norm but the mean over the cycle has a meaning.
-    factors
-        Of a twist of the crankshaft, what its places make of that of each section.
     of_sizes
         Factors of sizes that it is a load inside the crankcase times, of each place or component (Z1).
     """
@@ -238,12 +235,10 @@ class LoadChannel(Channel):
     feels_gas: bool = True
     lever: int | None = None
     of_wrench: bool = False
+    feels_unbalances: bool = True
     adds_up: bool = False
-    factors: Factors = unit_factors
     of_sizes: Factor | None = None
     is_load: ClassVar[bool] = True
-    feels_unbalances: ClassVar[bool] = True
-    """Whether rotors load it, and the loads of each throw add up; else it is of cylinders and what they twist."""
 
     def factors_of(self, engine: Engine, point: OperatingPoint) -> NDArray[np.float64] | None:
         """Its factors at every place and component; None where sizes move it by their masses alone."""
@@ -265,15 +260,6 @@ class LoadChannel(Channel):
     def norms(self) -> Collection[str]:
         """All, or the mean where places are added up."""
         return (MEAN.name,) if self.adds_up else tuple(NORMS)
-
-
-@dataclass(frozen=True, eq=False)
-class TwistChannel(LoadChannel):
-    """A load that makes the crankshaft twist: of when every cylinder fires, and of no unbalance."""
-
-    keys: tuple[str, ...] = AT_SECTIONS
-    needs: Need = Needs.TORSION
-    feels_unbalances: ClassVar[bool] = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,14 +298,6 @@ class MountChannel(NumberChannel):
 
     needs: Need = Needs.ELASTIC
     is_mounting: ClassVar[bool] = True
-
-
-@dataclass(frozen=True, eq=False)
-class TorsionChannel(NumberChannel):
-    """Numbers of the discs and shafts of the crankshaft."""
-
-    needs: Need = Needs.TORSION
-    minimised: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,9 +25,8 @@ import numpy as np
 from laufruhe.machine import CRANKSHAFT, Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.turns import as_turn
-from laufruhe.physics.crank_torque import crank_torque
+from laufruhe.physics.crank_torque import crank_torque, cylinder_torque
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.torsion import cylinder_torque
 from laufruhe.physics.uneven_speed import moving_inertia
 
 SAMPLED = 1e-4

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from laufruhe.report.grid import Grid
+from laufruhe.report.section import EXTENSION_SECTIONS
 from laufruhe.report.sections import (
     assembly,
     decisions,
@@ -17,17 +18,18 @@ from laufruhe.report.sections import (
     run_up,
     stars,
     torque,
-    torsion,
     weights,
 )
 from laufruhe.solvers.result import Result
 
 SECTIONS = (
-    reach, stars, assembly, ranks, decisions, weights, robust, limits, mounts, torque, torsion, modes, load_cases,
+    reach, stars, assembly, ranks, decisions, weights, robust, limits, mounts, torque, modes, load_cases,
     run_up, orders,
 )  # fmt: skip
 
 
 def tables_of(result: Result) -> list[Grid]:
     """Every table that this result fills, in the order of a report."""
-    return [grid for section in SECTIONS for grid in section.tables(result) if grid.rows]
+    own = [section.tables(result) for section in SECTIONS]
+    added = [section.tables(result) for section in EXTENSION_SECTIONS.values() if section.applies(result)]
+    return [grid for grids in (*own, *added) for grid in grids if grid.rows]

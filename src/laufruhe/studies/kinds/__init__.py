@@ -11,7 +11,7 @@ from laufruhe.extension import extended
 from laufruhe.studies.part import Part
 
 
-def _found() -> dict[str, type[Part]]:
+def _found() -> Mapping[str, type[Part]]:
     """Every subclass of `Part` in these modules that has a kind, by its name."""
     modules = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
     classes = [one for module in modules for one in vars(module).values() if isinstance(one, type)]

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 
-from laufruhe.physics.torsion import natural_modes, shaft_torque, vector_sums
+import laufruhe
+from laufruhe.extensions.torsion.facts import torque_over_speed
+from laufruhe.extensions.torsion.modes_picture import COLOURS
+from laufruhe.extensions.torsion.physics import chain_of, natural_modes, shaft_torque, vector_sums
 from laufruhe.plots import names
-from laufruhe.present.torsion import torque_over_speed
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.report.json_result import as_dict
 from laufruhe.report.sections import tables_of
+from laufruhe.report.tables import sheets_of
+from laufruhe.solvers import state
 from laufruhe.solvers.result import Result
+from plots.test_every_picture import SEEN, lab
+from problem_files import PROBLEMS
 from ready import solved
 
 
@@ -30,7 +37,7 @@ def record(result: Result) -> dict:
 
 def test_modes_and_critical_speeds(result: Result, record: dict) -> None:
     found, engine = record["torsion"], result.final.engine
-    modes = natural_modes(engine.torsion)
+    modes = natural_modes(chain_of(engine))
     assert found["frequencies"] == pytest.approx(modes.frequencies)
     assert np.array(found["shapes"]) == pytest.approx(modes.shapes.T)
     assert np.array(found["vector_sums"]) == pytest.approx(vector_sums(engine, found["orders"], modes))
@@ -78,7 +85,7 @@ def test_torque_over_speed_is_that_of_the_points(result: Result) -> None:
 
 def test_places_and_tables(result: Result, record: dict) -> None:
     names = [each["name"] for each in record["shaft_torque"]]
-    assert names == [section.name for section in result.final.engine.torsion.sections]
+    assert names == [section.name for section in chain_of(result.final.engine).sections]
     assert record["shaft_stress"][1]["max"] == pytest.approx(
         record["shaft_torque"][1]["max"] * 16.0 / (math.pi * 0.048**3), rel=1e-9
     )
@@ -95,3 +102,29 @@ def test_places_and_tables(result: Result, record: dict) -> None:
 
 def test_pictures(result: Result) -> None:
     assert {"twist_modes", "twist_response"} <= set(names(result))
+
+
+@pytest.mark.slow
+def test_files_of_numbers_hold_what_is_drawn() -> None:
+    result = state(laufruhe.load(PROBLEMS / "inline-five-torsion.toml"))
+    found = sheets_of(result)
+    assert {"crankshaft-modes", "strongest-critical-speeds-as-given"} <= set(found)
+    # at every speed of the curve the torque is that of the operating point, were it there
+    sheet = found["twist-response"]
+    chain = chain_of(result.final.engine)
+    assert sheet.head[1:] == [f"as given: alternating torque in {section.name} [N m]" for section in chain.sections]
+    speeds, torque = np.array(sheet.rows)[:, 0], np.array(sheet.rows)[:, 1:]
+    k = len(speeds) // 2
+    point = replace(result.problem.points[0], speed=float(speeds[k]) * math.tau / 60.0)
+    signal = shaft_torque(result.final.engine, point, result.problem.fidelity).sample(2880)
+    assert torque[k] == pytest.approx(0.5 * np.ptp(signal, axis=0), rel=2e-3)
+    modes = found["twist-modes"].rows
+    assert len(modes) == len(chain.discs) * len({row[1] for row in modes})
+    assert max(abs(row[4]) for row in modes) == pytest.approx(1.0)
+    assert len(found["critical-speeds"].rows) > len(found["strongest-critical-speeds-as-given"].rows)
+
+
+@pytest.mark.parametrize("eye", SEEN)
+def test_colours_of_modes_differ(eye: str) -> None:
+    shown = [lab(colour, eye) for colour in COLOURS]
+    assert min(float(np.linalg.norm(a - b)) for a, b in combinations(shown, 2)) > 12.0

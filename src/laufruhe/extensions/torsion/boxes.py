@@ -18,17 +18,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Flywheel, Torsion
+from laufruhe.extensions.torsion.channels import ABSORBER_HEAT, FACTORS, RESONANCES
+from laufruhe.extensions.torsion.coordinates import TwistCoordinates
+from laufruhe.extensions.torsion.machine import Torsion
+from laufruhe.extensions.torsion.physics import Resonance, dynamic_stiffness, inertias, receptances, throw_torques
+from laufruhe.machine import Flywheel
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 from laufruhe.physics.reduced_inertia import turning_inertia
-from laufruhe.physics.torsion import Resonance, dynamic_stiffness, inertias, receptances, throw_torques
-from laufruhe.problem import channels
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.boxes.twist_coordinates import TwistCoordinates
 from laufruhe.prove.mounts.box_norms import Under, root_under
 from laufruhe.prove.mounts.box_series import Answer, Expansion, Sides, directions_of, inverses, mapped, series
 from laufruhe.prove.mounts.ranges import SLACK
@@ -36,8 +37,6 @@ from laufruhe.prove.mounts.ranges import SLACK
 # orders whose share of the squares is less, in the middle of the bounds and at their corners, are left out
 LEAST_SHARE = 1e-10
 MOST_CORNERS = 16
-HEATS = frozenset({channels.ABSORBER_HEAT})
-"""Channels that are squares of the swing of absorbers."""
 _SAME = 1e-9
 
 
@@ -82,7 +81,7 @@ class _OfInertia:
 
     def least(self, chains: Sequence[Torsion]) -> float:
         """On a box, of the chains of its lower corner, centre and upper corner."""
-        inertia = turning_inertia(replace(self._engine, torsion=chains[0 if self._rises else -1]), self._fidelity)
+        inertia = turning_inertia(self._engine.with_extra(chains[0 if self._rises else -1]), self._fidelity)
         return 0.0 if inertia is None else self._number(Flywheel(inertia))
 
 
@@ -107,11 +106,11 @@ class TwistBoxes:
         self._constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
         self._terms = [(t.weight, t.measure) for t in problem.objective if _is_square(t.measure)]
         self._limits = [(limit.maximum, limit.measure) for limit in problem.limits if _is_square(limit.measure)]
-        self._heat = [limit for limit in problem.limits if limit.measure.channel in HEATS]
+        self._heat = [limit for limit in problem.limits if limit.measure.channel is ABSORBER_HEAT]
         self._numbers = [
             (limit, resonance)
-            for limit in problem.limits if limit.measure.channel.of_modes is not None
-            for resonance in limit.measure.channel.of_modes(limit.measure, evaluation)
+            for limit in problem.limits if limit.measure.channel in RESONANCES
+            for resonance in RESONANCES[limit.measure.channel](limit.measure, evaluation)
         ]  # fmt: skip
         self._turning = [(t.weight, _OfInertia(t.measure, evaluation)) for t in problem.objective if _turns(t.measure)]
         self._uneven = [(x.maximum, _OfInertia(x.measure, evaluation)) for x in problem.limits if _turns(x.measure)]
@@ -235,12 +234,10 @@ class TwistBoxes:
         self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, twist: Expansion, chosen: Indices
     ) -> Answer:
         """What a measure makes of the twist of the chosen sections in every order."""
-        root = np.sqrt(inertias(chains[1]))
+        root, factors = np.sqrt(inertias(chains[1])), FACTORS[measure.channel]
         twisted = _apart(len(chains[1].sections), len(root))
         apart = twisted / root
-        low, here, high = (
-            measure.load.factors(chain, lines.orders, lines.loads.point.speed)[:, chosen, None] for chain in chains
-        )
+        low, here, high = (factors(chain, lines.orders, lines.loads.point.speed)[:, chosen, None] for chain in chains)
         # each factor is of its own stiffness, and bends one way: so much the secant may be off
         turn, bend = 0.5 * (high - low), np.abs(here - 0.5 * (high + low))[..., 0]
         owners = self.coordinates.owners[:, chosen, None]
@@ -256,9 +253,9 @@ class TwistBoxes:
 
     def _mean(self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, chosen: Indices) -> Answer:
         """The same of order zero, each section of its own stiffness alone."""
-        zero, speed = np.zeros(1), lines.loads.point.speed
+        zero, speed, factors = np.zeros(1), lines.loads.point.speed, FACTORS[measure.channel]
         low, here, high = (
-            ((receptances(chain, zero, speed)[0] @ lines.mean) * measure.load.factors(chain, zero, speed)[0])[chosen]
+            ((receptances(chain, zero, speed)[0] @ lines.mean) * factors(chain, zero, speed)[0])[chosen]
             for chain in chains
         )
         slopes = self.coordinates.owners[:, chosen] * (0.5 * (high - low))
@@ -304,7 +301,7 @@ def _turns(measure: Measure) -> bool:
 
 
 def _is_square(measure: Measure) -> bool:
-    return measure.is_twist and measure.norm.is_euclidean
+    return measure.channel in FACTORS and measure.norm.is_euclidean
 
 
 def _least(terms: Sequence[tuple[float, Under]]) -> float:

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 import laufruhe
+from claims.test_broken_bounders import first_times, scaled
+from laufruhe.errors import BoundError
+from laufruhe.extensions.torsion.boxes import TwistBoxes
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import divide
-from laufruhe.prove.boxes.twist import TwistBoxes
 from laufruhe.prove.certificate import Proof
+from problem_files import PROBLEMS
 
 INPUTS = Path(__file__).parent / "inputs"
 
@@ -57,3 +60,10 @@ def test_orders_that_answer_most_choose_the_sides_of_three_numbers() -> None:
     bound = divide(boxes, low, high, least, problem.tolerance * least, 600).bound
     # by the gain of any order the same boxes left four fifths
     assert 0.7 * least <= bound <= least
+
+
+@pytest.mark.slow
+def test_a_broken_bounder_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    scaled(TwistBoxes, "_bound", first_times(1.01))(monkeypatch)
+    with pytest.raises(BoundError, match="contradicts a known design"):
+        laufruhe.solve(PROBLEMS / "inline-five-damper.toml")

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import laufruhe
+from laufruhe.extensions.torsion.physics import chain_of
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models.firing_model import FiringModel
 from laufruhe.load_models.pair_tables import PairObjective
@@ -175,7 +176,7 @@ def test_orders_of_one_star_are_told_apart() -> None:
 def test_the_engine_seen_from_behind() -> None:
     """Discs, shafts and cylinders in the reverse order: the optimum is the same, its order reversed."""
     problem = problem_of(tables())
-    chain = problem.engine.torsion
+    chain = chain_of(problem.engine)
     assert chain is not None
     assert problem.phasing is not None
     names = [part.name for part in problem.engine.slider_cranks]
@@ -186,7 +187,7 @@ def test_the_engine_seen_from_behind() -> None:
 
     def turned(candidate: Any) -> Problem:
         found = realise(candidate)
-        return replace(found, engine=replace(found.engine, torsion=behind))
+        return replace(found, engine=found.engine.with_extra(behind))
 
     phasing = replace(problem.phasing, realise=turned)
     again = laufruhe.solve(replace(turned_problem(problem, behind), phasing=phasing))
@@ -195,7 +196,7 @@ def test_the_engine_seen_from_behind() -> None:
 
 
 def turned_problem(problem: Problem, chain: Any) -> Problem:
-    return replace(problem, engine=replace(problem.engine, torsion=chain))
+    return replace(problem, engine=problem.engine.with_extra(chain))
 
 
 def test_a_peak_between_the_angles_breaks_its_limit() -> None:

@@ -7,9 +7,16 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar, Self
 
 from laufruhe.errors import ModelError
+from laufruhe.machine import SliderCrank
+from laufruhe.machine.extra import Extra
+from laufruhe.physics.reduced_inertia import reduced_inertia
+from laufruhe.problem.drives import Kind
+
+TORSION = Kind(8, "torsion", "discs and shafts of the crankshaft", is_alone=True)
+"""Numbers that nothing but the twist of the crankshaft and the inertia of all that turns depends on."""
 
 STEEL = 80e9
 """Shear modulus of a shaft [Pa] where none is given."""
@@ -140,7 +147,7 @@ class Absorber:
 
 
 @dataclass(frozen=True)
-class Torsion:
+class Torsion(Extra):
     """A chain of discs from front to rear, with absorbers on it.
 
     Attributes
@@ -162,6 +169,7 @@ class Torsion:
     absorbers: tuple[Absorber, ...] = ()
     output: str = ""
     speeds: tuple[float, float] | None = None
+    name: ClassVar[str] = TORSION.name
 
     def __post_init__(self) -> None:
         names = [disc.name for disc in self.discs] + [absorber.name for absorber in self.absorbers]
@@ -195,19 +203,37 @@ class Torsion:
             found |= {(absorber.name, key): getattr(absorber, key) for key in ("inertia", "stiffness", "damping")}
         return found
 
-    def moved(self, numbers: Mapping[tuple[str, str], Any]) -> Torsion:
-        """With these numbers in place of its own."""
-        return replace(
-            self,
-            discs=tuple(replace(d, inertia=numbers[d.name, "inertia"]) for d in self.discs),
-            sections=tuple(s.moved(numbers[s.name, "stiffness"], numbers[s.name, "diameter"]) for s in self.sections),
-            absorbers=tuple(
-                replace(a, **{key: numbers[a.name, key] for key in ("inertia", "stiffness", "damping")})
-                for a in self.absorbers
-            ),
-        )
+    def moved(
+        self, changes: Mapping[tuple[str, str], float], before: Sequence[SliderCrank], after: Sequence[SliderCrank]
+    ) -> Self:
+        """Return the chain with changes of its numbers, and other pistons and rods in place of those of its discs."""
+        found = self
+        if changes:
+            own = {key: value + changes[key] if key in changes else value for key, value in self.numbers.items()}
+            absorbed = ("inertia", "stiffness", "damping")
+            found = replace(
+                self,
+                discs=tuple(replace(d, inertia=own[d.name, "inertia"]) for d in self.discs),
+                sections=tuple(s.moved(own[s.name, "stiffness"], own[s.name, "diameter"]) for s in self.sections),
+                absorbers=tuple(replace(a, **{key: own[a.name, key] for key in absorbed}) for a in self.absorbers),
+            )
+        if after != before:
+            more = {a.name: reduced_inertia(b) - reduced_inertia(a) for a, b in zip(before, after, strict=True)}
+            discs = (replace(d, inertia=d.inertia + sum(more[name] for name in d.cylinders)) for d in found.discs)
+            found = replace(found, discs=tuple(discs))
+        return found
 
-    def scaled(self, length: float, mass: float) -> Torsion:
+    def turning_inertia(self, parts: Sequence[SliderCrank], /) -> float:
+        """Return the inertia of all discs without pistons and rods [kg m2] (V14); rings of absorbers slip."""
+        swinging = sum(reduced_inertia(part) - part.rotating_mass * part.crank_radius**2 for part in parts)
+        return sum(disc.inertia for disc in self.discs) - swinging
+
+    @property
+    def labels(self) -> Sequence[str]:
+        """Return the names of discs and sections."""
+        return [*(disc.name for disc in self.discs), *(section.name for section in self.sections)]
+
+    def scaled(self, length: float, mass: float) -> Self:
         """The same in another size and of the same material: stiffness grows as the cube of length."""
         inertia, stiffness = mass * length**2, length**3
         damping = math.sqrt(inertia * stiffness)

@@ -10,14 +10,14 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from laufruhe.physics.torsion import chain_of
+from laufruhe.extensions.torsion.channels import TORSIONAL_FREQUENCIES
+from laufruhe.extensions.torsion.facts import TorsionFacts, facts_of, is_twisted, speed_range
+from laufruhe.extensions.torsion.physics import chain_of
 from laufruhe.plots.speed_axis import LIMIT, limits_on, mark_points
 from laufruhe.plots.style import AFTER, GREEN, ORANGE, entry, entry_of_dots, headed, page, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, fitted, spread
 from laufruhe.present.measures import changed
 from laufruhe.present.numbers import RPM, number
-from laufruhe.present.torsion import TorsionFacts, facts_of, is_twisted, speed_range
-from laufruhe.problem.channels.torsional import TORSIONAL_FREQUENCIES
 from laufruhe.solvers.result import Result
 
 MOST_MODES, MOST_NAMES, LARGEST = 3, 16, 11.0

@@ -7,12 +7,12 @@ from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from laufruhe.physics.torsion import chain_of
+from laufruhe.extensions.torsion.facts import barred_ranges, is_twisted, speed_range, speeds_between, torque_over_speed
+from laufruhe.extensions.torsion.physics import chain_of
 from laufruhe.plots.speed_axis import LIMIT, mark_points
 from laufruhe.plots.style import entry, headed, page, series_of, styled
 from laufruhe.plots.words import FAINT
 from laufruhe.present.numbers import RPM, number
-from laufruhe.present.torsion import barred_ranges, is_twisted, speed_range, speeds_between, torque_over_speed
 from laufruhe.solvers.result import Result
 
 applies = is_twisted

@@ -12,10 +12,10 @@ import pytest
 
 import laufruhe
 from lanes import first_fast
-from laufruhe.machine import Absorber, Disc, Section, Torsion
-from laufruhe.physics.torsion import critical_modes, natural_modes
+from laufruhe.extensions.torsion.boxes import TwistBoxes
+from laufruhe.extensions.torsion.machine import Absorber, Disc, Section, Torsion
+from laufruhe.extensions.torsion.physics import critical_modes, natural_modes
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.prove.boxes.twist import TwistBoxes
 
 INPUTS = Path(__file__).parent / "inputs"
 RPM = 30.0 / math.pi

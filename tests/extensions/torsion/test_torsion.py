@@ -11,13 +11,10 @@ from scipy.linalg import eigh
 
 import laufruhe
 from laufruhe.errors import ModelError
-from laufruhe.machine import Absorber, Disc, Engine, OperatingPoint, Section, SliderCrank, Torsion
-from laufruhe.machine.torsion import stiffness_of
-from laufruhe.physics.crank_torque import crank_torque
-from laufruhe.physics.fidelity import EXACT
-from laufruhe.physics.reduced_inertia import inertia_of_discs, reduced_inertia, turned_by
-from laufruhe.physics.torsion import (
+from laufruhe.extensions.torsion.machine import Absorber, Disc, Section, Torsion, stiffness_of
+from laufruhe.extensions.torsion.physics import (
     absorber_heat,
+    chain_of,
     critical_speed,
     main_orders,
     natural_modes,
@@ -29,6 +26,10 @@ from laufruhe.physics.torsion import (
     twist,
     vector_sums,
 )
+from laufruhe.machine import Engine, OperatingPoint, SliderCrank
+from laufruhe.physics.crank_torque import crank_torque
+from laufruhe.physics.fidelity import EXACT
+from laufruhe.physics.reduced_inertia import reduced_inertia
 from laufruhe.physics.uneven_speed import moving_inertia
 from problem_files import PROBLEMS
 
@@ -125,8 +126,8 @@ def test_discs_and_pistons_hold_the_energy_of_all_that_turns() -> None:
     engine = laufruhe.load(PROBLEMS / "inline-five-damper.toml").engine
     angles = 2.0 * math.pi * np.arange(720) / 720
     of_pistons = moving_inertia(engine, EXACT, angles)[0]
-    own = engine.torsion
-    beside = inertia_of_discs(own, engine.slider_cranks)
+    own = chain_of(engine)
+    beside = own.turning_inertia(engine.slider_cranks)
     assert float(np.mean(beside + of_pistons)) == pytest.approx(sum(disc.inertia for disc in own.discs), rel=1e-12)
 
 
@@ -137,7 +138,7 @@ def test_any_mechanism_drives_its_throw(name: str) -> None:
     discs = [Disc("front", 0.01), Disc("rear", 0.3)]
     parts = [Disc(part.name, 0.02, cylinders=(part.name,)) for part in problem.engine.slider_cranks]
     own = (discs[0], *parts, discs[1])
-    engine = replace(problem.engine, torsion=Torsion(own, tuple(Section(d.name, 1e5) for d in own[1:])))
+    engine = problem.engine.with_extra(Torsion(own, tuple(Section(d.name, 1e5) for d in own[1:])))
     together = throw_torques(engine, problem.points[0]).coefficients.sum(axis=1)
     whole = crank_torque(engine, problem.points[0]).rebased(engine.cycle.base_order).coefficients
     count = min(len(together), len(whole))
@@ -148,10 +149,10 @@ def test_any_mechanism_drives_its_throw(name: str) -> None:
 def test_other_pistons_turn_with_their_throws(five: tuple[Engine, OperatingPoint]) -> None:
     engine, _ = five
     heavier = tuple(replace(part, reciprocating_mass=part.reciprocating_mass + 0.1) for part in engine.slider_cranks)
-    moved = turned_by(engine.torsion, engine.slider_cranks, heavier)
+    moved = chain_of(engine).moved({}, engine.slider_cranks, heavier)
     expected = reduced_inertia(heavier[0]) - reduced_inertia(engine.slider_cranks[0])
-    assert moved.discs[3].inertia - engine.torsion.discs[3].inertia == pytest.approx(expected)
-    assert moved.discs[0] == engine.torsion.discs[0]
+    assert moved.discs[3].inertia - chain_of(engine).discs[3].inertia == pytest.approx(expected)
+    assert moved.discs[0] == chain_of(engine).discs[0]
 
 
 def test_throws_together_have_the_torque_of_the_crank(five: tuple[Engine, OperatingPoint]) -> None:
@@ -164,7 +165,7 @@ def test_throws_together_have_the_torque_of_the_crank(five: tuple[Engine, Operat
 def test_every_disc_obeys_its_torques(five: tuple[Engine, OperatingPoint]) -> None:
     """J q'' = T + what the shafts beside it bring - what the cylinder's friction takes, in every order."""
     engine, point = five
-    own, torques = engine.torsion, throw_torques(engine, point)
+    own, torques = chain_of(engine), throw_torques(engine, point)
     orders = torques.orders[1:]
     rate = (orders * point.speed)[:, None]
     passed = shaft_torque(engine, point).coefficients[1:]
@@ -186,7 +187,7 @@ def test_the_load_takes_the_mean(five: tuple[Engine, OperatingPoint]) -> None:
     each = throw_torques(engine, point).coefficients[0].real
     mean = shaft_torque(engine, point).coefficients[0].real
     assert mean == pytest.approx(np.cumsum(each)[:-1], abs=1e-9 * each.sum())
-    driven = replace(engine, torsion=replace(engine.torsion, output="throw 2"))
+    driven = engine.with_extra(replace(chain_of(engine), output="throw 2"))
     forward = shaft_torque(driven, point).coefficients[0].real
     assert forward == pytest.approx(mean - np.array([0, 0, *[each.sum()] * 4]), abs=1e-9 * each.sum())
 
@@ -204,7 +205,7 @@ def test_what_is_put_in_is_turned_to_heat(seed: int) -> None:
     own, speed = random_chain(seed), 200.0
     cylinder = SliderCrank("one", 0.0, 0.045, 0.16, 0.6)
     own = replace(own, discs=(*own.discs[:3], replace(own.discs[3], cylinders=("one",)), *own.discs[4:]))
-    engine = Engine("e", laufruhe.load(PROBLEMS / "inline-five-torsion.toml").engine.cycle, (cylinder,), torsion=own)
+    engine = Engine("e", laufruhe.load(PROBLEMS / "inline-five-torsion.toml").engine.cycle, (cylinder,), extras=(own,))
     point = OperatingPoint("p", speed)
     torques = throw_torques(engine, point)
     orders, driven = torques.orders[1:], torques.coefficients[1:, 3]
@@ -278,7 +279,7 @@ def test_main_orders_do_not_hang_on_the_firing_order() -> None:
         tables["engine"] |= {"firing_order": order}
         tables["engine"].pop("throws", None)
         engine = laufruhe.files.reader.load_tables(tables, PROBLEMS / "five.toml").engine
-        modes = natural_modes(engine.torsion)
+        modes = natural_modes(chain_of(engine))
         sums.append(vector_sums(engine, (0.5, 1.0, 1.5, 2.5, 5.0), modes))
         assert main_orders(engine, 6.0) == (2.5, 5.0)
         assert sums[-1][3] == pytest.approx(np.abs(modes.shapes[1:6].sum(axis=0)))

@@ -9,10 +9,8 @@ from functools import lru_cache
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import OperatingPoint
-from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.roots import parted
-from laufruhe.physics.torsion import (
+from laufruhe.extensions.torsion.channels import FACTORS, HIGHEST
+from laufruhe.extensions.torsion.physics import (
     TorsionalModes,
     chain_of,
     critical_modes,
@@ -26,7 +24,9 @@ from laufruhe.physics.torsion import (
     throw_torques,
     vector_sums,
 )
-from laufruhe.problem.channels.torsional import HIGHEST
+from laufruhe.machine import OperatingPoint
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.roots import parted
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, load_rows
@@ -169,7 +169,7 @@ def barred_ranges(result: Result, design: Evaluation) -> tuple[Barred, ...]:
 def _barred(design: Evaluation, limits: tuple[Limit, ...], low: float, high: float) -> tuple[Barred, ...]:
     found = []
     for limit in limits:
-        if limit.measure.is_twist:
+        if limit.measure.channel in FACTORS:
             ranges = _ranges(_exceeds(design, limit), speeds_between(design, low, high))
             found += [Barred(limit.name, *ends) for ends in ranges]
     return tuple(found)

@@ -9,10 +9,10 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import InputError
+from laufruhe.extensions.torsion.machine import Torsion, stiffness_of
+from laufruhe.extensions.torsion.physics import chain_of
 from laufruhe.files.reader import load_tables, tables_of
-from laufruhe.machine import Torsion
-from laufruhe.machine.torsion import stiffness_of
-from laufruhe.physics.reduced_inertia import inertia_of_discs, reduced_inertia
+from laufruhe.physics.reduced_inertia import reduced_inertia
 from laufruhe.problem.problem import Problem
 from problem_files import PROBLEMS
 
@@ -26,8 +26,7 @@ def changed(**torsion: Any) -> Problem:
 
 
 def chain(problem: Problem) -> Torsion:
-    assert problem.engine.torsion is not None
-    return problem.engine.torsion
+    return chain_of(problem.engine)
 
 
 def test_a_disc_at_every_throw_with_its_pistons() -> None:
@@ -113,7 +112,7 @@ def test_the_inertia_of_all_that_turns_follows_from_the_discs() -> None:
     tables = tables_of(READY)
     tables["constraints"] = [{"limit": "degree of irregularity", "max": "0.05"}]
     engine = load_tables(tables, Path("five.toml")).engine
-    discs = inertia_of_discs(chain(load_tables(tables, Path("five.toml"))), engine.slider_cranks)
+    discs = chain(load_tables(tables, Path("five.toml"))).turning_inertia(engine.slider_cranks)
     assert discs == pytest.approx(5 * (0.006 + 0.5 * 0.045**2) + 0.008 + 0.14, rel=1e-12)
     told = {"flywheel": {"inertia": f"{1.005 * discs:.6g} kg m^2"}}
     assert load_tables({**tables, **told}, Path("five.toml")).engine.flywheel is not None

@@ -8,12 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from laufruhe.extensions.torsion.boxes import TwistBoxes
+from laufruhe.extensions.torsion.channels import ABSORBER_HEAT, FACTORS, RESONANCES
+from laufruhe.extensions.torsion.machine import TORSION
+from laufruhe.problem.channels import FLYWHEEL_INERTIA, IRREGULARITY
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided, divide
-from laufruhe.prove.boxes.twist import TwistBoxes
 from laufruhe.prove.certificate import Reach
 from laufruhe.solvers.conclusion import KEPT, Design, concluded, known_of, none_within
+from laufruhe.solvers.method import Method, is_pointwise
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, proven, searched, shown
 
@@ -56,3 +60,11 @@ def solve_torsion(problem: Problem) -> Result:
 
 def _most_boxes(problem: Problem) -> int:
     return problem.search.boxes_or(MOST_BOXES if len(problem.decisions) <= MOST_OPEN else 0)
+
+
+METHOD = Method(
+    "boxes of discs and shafts", {TORSION: ()}, Reach.NEAR, "laufruhe.extensions.torsion.solver:solve_torsion", True,
+    frozenset({*FACTORS, *RESONANCES, ABSORBER_HEAT, IRREGULARITY, FLYWHEEL_INERTIA}), is_pointwise,
+    proves="the optimum of root mean squares of two or three; else a local one",
+    before="flywheel, crankshaft and the rest apart",
+)  # fmt: skip

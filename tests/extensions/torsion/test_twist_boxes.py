@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from lanes import first_fast
+from laufruhe.extensions.torsion.boxes import TwistBoxes
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.boxes.twist import TwistBoxes
 from problem_files import PROBLEMS
 
 INERTIA = {"between": ["0.002 kg m^2", "0.008 kg m^2"], "start": "0.004 kg m^2"}

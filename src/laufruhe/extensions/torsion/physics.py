@@ -12,18 +12,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Protocol, TypeAlias
 
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import CRANKSHAFT, Absorber, Cycle, Engine, OperatingPoint, SliderCrank, Torsion
+from laufruhe.extensions.torsion.machine import Absorber, Torsion
+from laufruhe.machine import CRANKSHAFT, Cycle, Engine, OperatingPoint, SliderCrank
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.numerics.turns import as_turn, phasors
-from laufruhe.physics.crank_torque import crank_torque
+from laufruhe.physics.crank_torque import cylinder_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
 
 Factors: TypeAlias = Callable[[Torsion, Array, float], ComplexArray]
@@ -191,14 +192,15 @@ def chain_of(engine: Engine) -> Torsion:
     ModelError
         If it has none.
     """
-    if engine.torsion is None:
+    found = engine.extra(Torsion)
+    if found is None:
         raise ModelError("twist of the crankshaft needs its discs and shafts; add [torsion]")
-    return engine.torsion
+    return found
 
 
 def has_torsion(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
     """Whether the twist of the crankshaft is modelled: of one crankshaft whose speed is taken as even."""
-    return engine.torsion is not None and not fidelity.is_uneven
+    return engine.extra(Torsion) is not None and not fidelity.is_uneven
 
 
 def throw_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -211,6 +213,9 @@ def throw_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
     """
     if fidelity.is_uneven:
         raise ModelError("twist is modelled about an even crank speed; leave crank_inertia out")
+    for part in engine.slider_cranks:
+        if part.shaft != CRANKSHAFT:
+            raise ModelError(f"{part.name} works on shaft '{part.shaft.name}'; twist is modelled of one crankshaft")
     driven = tuple(disc.cylinders for disc in chain_of(engine).discs)
     return _throw_torques(engine.cycle, engine.slider_cranks, driven, point, fidelity)
 
@@ -233,22 +238,6 @@ def _throw_torques(
         total[: len(own), k] += own * phasors([-as_turn(part.firing_angle) / cycle.turns], np.arange(len(own)))[:, 0]
     total.setflags(write=False)
     return Spectrum(cycle.base_order, total)
-
-
-def cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity = EXACT) -> ComplexArray:
-    """Coefficients of one cylinder's torque by order of the cycle [N m], counted from its firing (T1)."""
-    if part.shaft != CRANKSHAFT:
-        raise ModelError(f"{part.name} works on shaft '{part.shaft.name}'; twist is modelled of one crankshaft")
-    first = replace(part, name="cylinder", x=0.0, throw=part.bank + part.fires_at, firing_angle=0.0)
-    return _cylinder_torque(cycle, first, replace(point, name="", weight=1.0), fidelity)
-
-
-@lru_cache(maxsize=256)
-def _cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity) -> ComplexArray:
-    found = crank_torque(Engine("one cylinder", cycle, (part,)), point, fidelity)
-    series = found.rebased(cycle.base_order).coefficients
-    series.setflags(write=False)
-    return series
 
 
 def receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:

@@ -6,10 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from laufruhe.machine import Section, Torsion
+from laufruhe.extensions.torsion.machine import TORSION, Section, Torsion
+from laufruhe.extensions.torsion.physics import Resonance, chain_of
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.torsion import Resonance, chain_of
-from laufruhe.problem.decision import Kind
 from laufruhe.problem.problem import Problem
 
 
@@ -27,7 +26,7 @@ class TwistCoordinates:
     def __init__(self, problem: Problem) -> None:
         self.problem, self._chain = problem, chain_of(problem.engine)
         # of every decision names of parts of the crankshaft, and of the number of each
-        self._keys: list[tuple[tuple[str, str], ...]] = [decision.keys(Kind.TORSION) for decision in problem.decisions]
+        self._keys: list[tuple[tuple[str, str], ...]] = [decision.keys(TORSION) for decision in problem.decisions]
         self.lower = self.of(np.array([decision.lower for decision in problem.decisions]))
         self.upper = self.of(np.array([decision.upper for decision in problem.decisions]))
         self.owners = np.array(

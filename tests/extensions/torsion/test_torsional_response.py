@@ -11,8 +11,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import laufruhe
-from laufruhe.machine import Absorber, Engine, OperatingPoint
-from laufruhe.physics.torsion import natural_modes, shaft_torque, throw_torques, twist
+from laufruhe.extensions.torsion.machine import Absorber
+from laufruhe.extensions.torsion.physics import chain_of, natural_modes, shaft_torque, throw_torques, twist
+from laufruhe.machine import Engine, OperatingPoint
 from problem_files import PROBLEMS
 
 DAMPER = Absorber("damper", "pulley", 0.006, damping=3.0)
@@ -22,15 +23,15 @@ DAMPER = Absorber("damper", "pulley", 0.006, damping=3.0)
 def damped() -> tuple[Engine, OperatingPoint]:
     """The ready five-cylinder with a viscous damper, and what springs lose left to the rings and the cylinders."""
     problem = laufruhe.load(PROBLEMS / "inline-five-torsion.toml")
-    own = problem.engine.torsion
+    own = chain_of(problem.engine)
     sections = tuple(replace(section, loss_factor=0.0, damping=2.0) for section in own.sections)
     chain = replace(own, sections=sections, absorbers=(DAMPER,))
-    return replace(problem.engine, torsion=chain), problem.points[0]
+    return problem.engine.with_extra(chain), problem.points[0]
 
 
 def assembly(engine: Engine) -> opentorsion.Assembly:
     """The same chain in openTorsion: the damper's ring last."""
-    own = engine.torsion
+    own = chain_of(engine)
     count = len(own.discs)
     discs = [opentorsion.Disk(k, I=d.inertia, c=d.damping) for k, d in enumerate(own.discs)]
     shafts = [opentorsion.Shaft(k, k + 1, k=s.stiffness, c=s.damping) for k, s in enumerate(own.sections)]
@@ -43,17 +44,17 @@ def assembly(engine: Engine) -> opentorsion.Assembly:
 def test_natural_frequencies_of_open_torsion(damped: tuple[Engine, OperatingPoint]) -> None:
     engine, _ = damped
     rubber = replace(DAMPER, stiffness=4e4)
-    engine = replace(engine, torsion=replace(engine.torsion, absorbers=(rubber,)))
+    engine = engine.with_extra(replace(chain_of(engine), absorbers=(rubber,)))
     squares, _ = assembly(engine).undamped_modal_analysis()
     theirs = np.sort(np.sqrt(np.abs(squares)))[1:] / math.tau
-    assert natural_modes(engine.torsion).frequencies == pytest.approx(theirs, rel=1e-9)
+    assert natural_modes(chain_of(engine)).frequencies == pytest.approx(theirs, rel=1e-9)
 
 
 def test_forced_response_of_open_torsion(damped: tuple[Engine, OperatingPoint]) -> None:
     """Every order at once: angles from its receptance, twists of the chain from ours."""
     engine, point = damped
     torques = throw_torques(engine, point)
-    count, orders = len(engine.torsion.discs), torques.orders[1:40]
+    count, orders = len(chain_of(engine).discs), torques.orders[1:40]
     excitation = np.zeros((count + 1, len(orders)), dtype=complex)
     excitation[:count] = torques.coefficients[1:40].T
     angles, _ = assembly(engine).ss_response(excitation, orders * point.speed)
@@ -65,7 +66,7 @@ def test_forced_response_of_open_torsion(damped: tuple[Engine, OperatingPoint]) 
 def test_chain_integrated_in_time(damped: tuple[Engine, OperatingPoint]) -> None:
     """Runge and Kutta from rest until the start has died away: the orders, static twist and all."""
     engine, point = damped
-    own, torques = engine.torsion, throw_torques(engine, point)
+    own, torques = chain_of(engine), throw_torques(engine, point)
     count = len(own.discs)
     matrices = assembly(engine)
     inverse, none, one = np.linalg.inv(matrices.M), np.zeros((count + 1, count + 1)), np.eye(count + 1)

@@ -1,0 +1,98 @@
+"""What can be asked of the crankshaft's twist (V4-V12)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeAlias
+
+from laufruhe.extensions.torsion import physics
+from laufruhe.extensions.torsion.machine import Torsion
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.problem.asking import Answered, Asked
+from laufruhe.problem.channels.kinds import ON_BLOCK, Channel, LoadChannel, Need, NumberChannel, of_what_moves
+from laufruhe.problem.loads import PointLoads
+
+Resonances: TypeAlias = Callable[[Asked, Answered], Sequence[physics.Resonance]]
+CHAIN = Need(lambda e: e.extra(Torsion), "the discs and shafts of the crankshaft", "add [torsion]")
+DIAMETERS = Need(
+    lambda e: (chain := e.extra(Torsion)) and any(section.diameter is not None for section in chain.sections),
+    "the diameter of a shaft",
+    "give one in [torsion]",
+)
+HIGHEST = 12.0
+"""Order up to which main orders count where none are named."""
+
+
+def _names_of_sections(engine: Engine) -> Sequence[str]:
+    return [section.name for section in physics.chain_of(engine).sections]
+
+
+def _names_of_stressed(engine: Engine) -> Sequence[str]:
+    return [section.name for section in physics.chain_of(engine).sections if section.diameter is not None]
+
+
+def _of_shafts(
+    name: str, unit: str, signal: Callable[[Engine, OperatingPoint, Fidelity], Spectrum],
+    title: str = "", places: Callable[[Engine], Sequence[str]] = _names_of_sections, needs: Need = CHAIN,
+) -> LoadChannel:  # fmt: skip
+    found = of_what_moves(
+        name, lambda moving, at: signal(moving, at.point, at.fidelity).each(lambda values: values[:, :, None])
+    )
+    keys = (*ON_BLOCK, "sections")
+    return LoadChannel(
+        name, unit, keys, needs, signal=found, places=places, feels_unbalances=False, title=title, place="section"
+    )
+
+
+def _points(measure: Asked, evaluation: Answered) -> list[PointLoads]:
+    return [at for at in evaluation.loads if measure.points is None or at.point.name in measure.points]
+
+
+def _at_speeds(measure: Asked, evaluation: Answered) -> Sequence[physics.Resonance]:
+    """List the speeds that count: a pendulum has another spring at each."""
+    speeds = dict.fromkeys(at.point.speed for at in _points(measure, evaluation))
+    return [physics.AtSpeed(speed) for speed in speeds]
+
+
+def _in_orders(measure: Asked, evaluation: Answered) -> Sequence[physics.Resonance]:
+    """List the orders that count: a pendulum has another inertia in each."""
+    orders = measure.orders or physics.main_orders(evaluation.engine, HIGHEST)
+    return [physics.InOrder(order) for order in orders if order > 0.0]
+
+
+def _of_modes(name: str, unit: str, keys: tuple[str, ...], resonances: Resonances) -> NumberChannel:
+    """Return the channel of numbers that natural modes have."""
+
+    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
+        chain = physics.chain_of(evaluation.engine)
+        return [float(x) for own in resonances(measure, evaluation) for x in own.numbers(chain)]
+
+    sides = ("min", "max", "outside")
+    return NumberChannel(name, unit, keys, CHAIN, sides, minimised=False, values=values, of_loads=False)
+
+
+def _heat(measure: Asked, evaluation: Answered) -> Sequence[float]:
+    """Return the most that any absorber has to give off at any point that counts."""
+    found = [physics.absorber_heat(evaluation.engine, at.point, at.fidelity) for at in _points(measure, evaluation)]
+    return (max((float(heat) for each in found for heat in each), default=0.0),)
+
+
+SHAFT_TWIST = _of_shafts("shaft twist", "rad", physics.twist)
+SHAFT_TORQUE = _of_shafts("shaft torque", "N m", physics.shaft_torque, "Torque in the crankshaft")
+SHAFT_STRESS = _of_shafts(
+    "shaft stress", "Pa", physics.shaft_stress, "Shear stress of the crankshaft", _names_of_stressed, DIAMETERS
+)
+TORSIONAL_FREQUENCIES = _of_modes("torsional frequencies", "Hz", ("operating_points",), _at_speeds)
+CRITICAL_SPEEDS = _of_modes("critical speeds", "rad/s", ("operating_points", "orders"), _in_orders)
+ABSORBER_HEAT = NumberChannel("absorber heat", "W", ("operating_points",), CHAIN, minimised=False, values=_heat)
+
+FACTORS: Mapping[Channel, physics.Factors] = {
+    SHAFT_TWIST: physics.unit_factors,
+    SHAFT_TORQUE: physics.section_stiffness,
+    SHAFT_STRESS: physics.stress_factors,
+}
+"""What each place of a load makes of the twist of its section."""
+RESONANCES: Mapping[Channel, Resonances] = {TORSIONAL_FREQUENCIES: _at_speeds, CRITICAL_SPEEDS: _in_orders}
+"""Speeds and orders that natural modes are counted at."""

@@ -1,0 +1,14 @@
+"""Pictures of the crankshaft's twist."""
+
+from laufruhe.present.pictures import Picture
+
+MODES = Picture(
+    "twist_modes",
+    "How the crankshaft swings in its natural modes, and the speeds at which orders meet them.",
+    "laufruhe.extensions.torsion.modes_picture",
+)
+RESPONSE = Picture(
+    "twist_response",
+    "Torque in the crankshaft over crank speed, with the speeds at which a limit bars it.",
+    "laufruhe.extensions.torsion.response_picture",
+)

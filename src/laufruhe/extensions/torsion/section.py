@@ -1,0 +1,150 @@
+"""Natural modes of the crankshaft's twist, the speeds at which orders meet them, and speeds that are barred."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from laufruhe.errors import counted
+from laufruhe.extensions.torsion.facts import (
+    TorsionFacts,
+    barred_ranges,
+    facts_of,
+    is_twisted,
+    speed_range,
+    speeds_between,
+    torque_over_speed,
+)
+from laufruhe.extensions.torsion.physics import absorber_heat, chain_of
+from laufruhe.present.measures import changed
+from laufruhe.present.numbers import DASH, RPM, number
+from laufruhe.report.grid import Grid
+from laufruhe.report.section import Section
+from laufruhe.report.sheet import Sheet
+from laufruhe.solvers.result import Result
+
+MOST_MODES, MOST_CRITICALS = 4, 8
+
+
+def _tables(result: Result) -> list[Grid]:
+    """Modes, the critical speeds that twist it most, before and after, and barred ranges."""
+    reach = speed_range(result)
+    before, after = facts_of(result.initial, *reach), facts_of(result.final, *reach)
+    criticals = [_criticals(before, "as given"), *([_criticals(after, "as decided")] if changed(result) else [])]
+    return [_modes(result, after), *criticals, _barred(result)]
+
+
+def _modes(result: Result, facts: TorsionFacts) -> Grid:
+    names = [disc.name for disc in chain_of(result.final.engine).discs]
+    shown = range(min(MOST_MODES, len(facts.modes.frequencies)))
+    swings = [[f"{swing:+.3f}" for swing in shape] for shape in facts.modes.shapes.T]
+    rows = tuple((f"{m + 1}", number(float(facts.modes.frequencies[m])), *swings[m]) for m in shown)
+    rest = len(facts.modes.frequencies) - len(shown)
+    more = f" {counted(rest, 'higher mode')} in result.json." if rest else ""
+    note = f"Undamped. Angle of every disc, the largest of each mode one.{more}"
+    return Grid("Natural modes of the crankshaft", ("mode", "Hz", *names), rows, note=note, sheet="crankshaft-modes")
+
+
+def _criticals(facts: TorsionFacts, which: str) -> Grid:
+    rows = tuple(
+        (number(each.speed * RPM), f"{each.order:g}" + (" main" if each.is_main else ""), f"{each.mode}",
+         number(each.vector_sum, 3, 1.0), DASH if each.torque is None else number(each.torque))
+        for each in facts.criticals[:MOST_CRITICALS]
+    )  # fmt: skip
+    main = ", ".join(f"{order:g}" for order in facts.main)
+    note = (
+        f"The {len(rows)} that twist it most of {len(facts.criticals)} in the range looked at. Vector sum: swings "
+        f"of the throws, each when its cylinder fires, added up. Main orders ({main}) have the same for every firing "
+        "order. Torque: amplitude of that order in the section that it loads most."
+    )
+    head = ("rpm", "order", "mode", "vector sum", "torque [N m]")
+    sheet = f"strongest-critical-speeds-{which.replace(' ', '-')}"
+    return Grid(f"Critical speeds of the crankshaft {which}", head, rows, note=note, sheet=sheet)
+
+
+def _barred(result: Result) -> Grid:
+    rows = tuple(
+        (each.limit, f"{number(each.lowest * RPM)} to {number(each.highest * RPM)}")
+        for each in barred_ranges(result, result.final)
+    )
+    low, high = (number(speed * RPM) for speed in speed_range(result))
+    note = f"Between {low} and {high} rpm, with the load of the operating points: where the limit would be exceeded."
+    return Grid("Barred speed ranges", ("limit", "rpm"), rows, note=note, sheet="barred-speeds")
+
+
+def _record(result: Result) -> Mapping[str, Any]:
+    """Return the numbers of the crankshaft as decided; speeds of the crank in rad/s."""
+    design, problem = result.final, result.problem
+    chain, reach = chain_of(design.engine), speed_range(result)
+    facts = facts_of(design, *reach)
+    heat = [absorber_heat(design.engine, point, problem.fidelity) for point in problem.points]
+    return {
+        "discs": [{"name": disc.name, "inertia": disc.inertia} for disc in chain.discs],
+        "sections": [{"name": section.name, "stiffness": section.stiffness} for section in chain.sections],
+        "frequencies": facts.modes.frequencies.tolist(),
+        "shapes": facts.modes.shapes.T.tolist(),
+        "vector_sums": [sums.tolist() for sums in facts.sums],
+        "orders": list(facts.orders),
+        "main_orders": list(facts.main),
+        "speeds": list(reach),
+        "critical_speeds": [
+            {"speed": each.speed, "order": each.order, "mode": each.mode, "vector_sum": each.vector_sum,
+             "main": each.is_main, "torque": each.torque}
+            for each in facts.criticals
+        ],
+        "barred": [asdict(each) for each in barred_ranges(result, design)],
+        "absorbers": [
+            {"name": each.name, "heat": [float(at[k]) for at in heat]} for k, each in enumerate(chain.absorbers)
+        ],
+    }  # fmt: skip
+
+
+def _twist_response(result: Result) -> Sheet:
+    """Return half of the peak to peak torque in every section of the crankshaft, over its speed."""
+    speeds = speeds_between(result.final, *speed_range(result))
+    head, columns = ["speed [rpm]"], [RPM * speeds]
+    for name, design in result.designs.items():
+        sections = [section.name for section in chain_of(design.engine).sections]
+        head += [f"{name}: alternating torque in {section} [N m]" for section in sections]
+        columns += list(torque_over_speed(design, speeds).T)
+    return Sheet(head, np.column_stack(columns).tolist())
+
+
+def _twist_modes(result: Result) -> Sheet:
+    """Return the swing of every disc in every natural mode of the crankshaft."""
+    rows = []
+    for name, design in result.designs.items():
+        modes = facts_of(design, *speed_range(result)).modes
+        discs = [disc.name for disc in chain_of(design.engine).discs]
+        for m, frequency in enumerate(modes.frequencies.tolist()):
+            rows += [
+                [name, m + 1, frequency, disc, swing]
+                for disc, swing in zip(discs, modes.shapes[:, m].tolist(), strict=True)
+            ]
+    return Sheet(["design", "mode", "natural frequency [Hz]", "disc", "swing"], rows)
+
+
+def _critical_speeds(result: Result) -> Sheet:
+    """Return all speeds at which orders meet natural modes of the crankshaft."""
+    rows = [
+        [name, RPM * each.speed, each.order, each.mode, each.vector_sum, each.is_main,
+         math.nan if each.torque is None else each.torque]
+        for name, design in result.designs.items()
+        for each in facts_of(design, *speed_range(result)).criticals
+    ]  # fmt: skip
+    return Sheet(["design", "speed [rpm]", "order", "mode", "vector sum", "main order", "torque [N m]"], rows)
+
+
+SECTION = Section(
+    "torsion", is_twisted, _tables, _record,
+    ("crankshaft-modes", "strongest-critical-speeds-as-given", "strongest-critical-speeds-as-decided", "barred-speeds"),
+    {
+        "twist-response": (is_twisted, _twist_response),
+        "twist-modes": (is_twisted, _twist_modes),
+        "critical-speeds": (is_twisted, _critical_speeds),
+    },
+)  # fmt: skip

@@ -1,0 +1,38 @@
+"""Parts that extensions add to an engine."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar, Self
+
+from laufruhe.machine.slider_crank import SliderCrank
+
+
+class Extra(ABC):
+    """A part that an extension adds to an engine; equal parts are equal and hash alike.
+
+    Attributes
+    ----------
+    name
+        Of the kind of decision that moves its numbers.
+    """
+
+    name: ClassVar[str]
+
+    @abstractmethod
+    def moved(self, changes: Mapping[Any, float], before: Sequence[SliderCrank], after: Sequence[SliderCrank]) -> Self:
+        """Return the part with changes of its numbers, and with other slider-cranks in place of those before."""
+
+    @abstractmethod
+    def scaled(self, length: float, mass: float) -> Self:
+        """Return the part of an engine whose lengths and masses are so many times as large."""
+
+    def turning_inertia(self, _parts: Sequence[SliderCrank], /) -> float | None:
+        """Return the inertia of all that turns beside pistons and rods [kg m2]; None where it gives none."""
+        return None
+
+    @property
+    def labels(self) -> Sequence[str]:
+        """Return the names that pictures may show."""
+        return ()

@@ -1,0 +1,44 @@
+"""What extensions add to reports: tables, files of numbers, and an entry of result.json."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from laufruhe.extension import extended
+from laufruhe.report.grid import Grid
+from laufruhe.report.sheet import Sheets
+from laufruhe.solvers.result import Result
+
+
+@dataclass(frozen=True)
+class Section:
+    """Tables and numbers of one capability.
+
+    Attributes
+    ----------
+    name
+        Key in result.json.
+    applies
+        Return whether a result has any of it.
+    tables
+        Return the tables of the report.
+    record
+        Return the entry of result.json.
+    printed
+        Names of the tables that are files as they are printed.
+    sheets
+        Further files of numbers.
+    """
+
+    name: str
+    applies: Callable[[Result], bool]
+    tables: Callable[[Result], Sequence[Grid]]
+    record: Callable[[Result], Mapping[str, Any]]
+    printed: tuple[str, ...] = ()
+    sheets: Sheets = field(default_factory=dict)
+
+
+EXTENSION_SECTIONS: Mapping[str, Section] = extended("sections", Section, ())
+"""Sections of extensions by their names."""
