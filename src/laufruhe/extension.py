@@ -21,7 +21,7 @@ from laufruhe.errors import ModelError
 GROUP = "laufruhe.extensions"
 Tables = Literal[
     "norms", "channels", "kinds", "layouts", "methods", "quantities", "provers", "reductions", "study_kinds",
-    "commands", "keys", "pictures", "sections",
+    "commands", "keys", "notes", "pictures", "sections",
 ]  # fmt: skip
 
 
@@ -58,6 +58,8 @@ class Extension:
         Objects of `typer.models.CommandInfo`; their modules are imported by `laufruhe --help`, so they import little.
     keys
         Objects of `laufruhe.files.problem_file.Key`: tables of a problem file.
+    notes
+        Objects of `laufruhe.files.problem_file.Note`: what a file may write at any number.
     sections
         Objects of `laufruhe.report.section.Section`: tables and numbers of a result.
     pictures
@@ -77,6 +79,7 @@ class Extension:
     study_kinds: tuple[str, ...] = ()
     commands: tuple[str, ...] = ()
     keys: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
     sections: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
 
@@ -84,7 +87,8 @@ class Extension:
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {"economics": "economics", "replication": "replication", "tolerance": "robust"},
     "commands": {"page": "served_page"},
-    "keys": {"torsion": "torsion"},
+    "keys": {"torsion": "torsion", "tolerances": "robust", "robust": "robust", "assembly": "robust"},
+    "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
 }
 """Extensions of this package by what they add to tables: whoever asks for it without the folder is told its name."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -66,10 +67,14 @@ def test_a_file_or_command_that_needs_it_is_refused_by_its_name(table: Tables, n
     (tmp_path / "study.toml").write_text(STUDY.format(name), encoding="utf-8")
     problem = PROBLEMS / f"{MAIN}.toml"
     (tmp_path / "problem.toml").write_text(f"{problem.read_text(encoding='utf-8')}\n[{name}]\n", encoding="utf-8")
+    mass = '{ between = ["1 kg", "2 kg"], tolerance = "1 %" }' if name == "tolerance" else f'"2 kg {name} 1 %"'
+    noted = re.sub(r"reciprocating_mass = .*", f"reciprocating_mass = {mass}", problem.read_text(encoding="utf-8"))
+    (tmp_path / "note.toml").write_text(noted, encoding="utf-8")
     words = {
         "study_kinds": ("study", tmp_path / "study.toml"),
         "commands": (name, problem),
         "keys": ("solve", tmp_path / "problem.toml"),
+        "notes": ("solve", tmp_path / "note.toml"),
     }
     refused = run(environment, "-m", "laufruhe", *words[table])
     assert refused.returncode == 2

@@ -172,7 +172,6 @@ def test_a_share_of_the_first_is_given_up_for_the_second(tmp_path: Path) -> None
          "objective[1].terms: is a weighted sum before other objectives"),
         ('"added mass"', '"added moss"', "objective[2].minimise"),
         ("samples = 120", 'kinematics = "auto"', "fidelity.kinematics: needs a single objective"),
-        ("[fidelity]", "[robust]\n[fidelity]", "robust: needs a single objective, and there are 2"),
     ],
 )  # fmt: skip
 def test_refusals(old: str, new: str, said: str, tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ from pydantic import (
 from pydantic_core import PydanticCustomError, core_schema
 
 from laufruhe import units
+from laufruhe.extension import HOMES, extensions, lack
 from laufruhe.machine.crank_names import CRANKS
 from laufruhe.problem.decision import Decision, Drive
 from laufruhe.problem.sets import Interval
@@ -134,7 +135,7 @@ class Number:
             try:
                 return units.parse(given, self.unit)
             except units.UnitError as error:
-                raise refusal(str(error)) from None
+                raise refusal(_without_note(given) or str(error)) from None
         if self.unit and self.plain is None:
             raise refusal(f"has no unit, {units.dimension_name(self.unit)} needs one; {units.advice(self.unit)}")
         value = given * (1.0 if self.plain is None else self.plain)
@@ -164,7 +165,9 @@ class Number:
             raise refusal("cannot be left open here; give a number")
         if unknown := set(given) - {"between", "start"}:
             rule = f"has an unknown key '{min(unknown)}'"
-            raise refusal(f"{rule}; write {{ between = [low, high] }}, start = ... is optional")
+            raise refusal(
+                _without_note(min(unknown)) or f"{rule}; write {{ between = [low, high] }}, start = ... is optional"
+            )
         pair = given.get("between")
         if not isinstance(pair, list) or len(pair) != 2:
             raise refusal("needs two bounds; write { between = [low, high] }")
@@ -183,6 +186,12 @@ class Number:
         except PydanticCustomError as error:
             shown = f'"{given}"' if isinstance(given, str) else given
             raise refusal(f"{what} {shown}: {error.message()}") from None
+
+
+def _without_note(text: str) -> str:
+    """Return what is wrong with a note that is of an extension that is not there; empty of any other text."""
+    home = next((home for mark, home in HOMES["notes"].items() if mark in text), "")
+    return "" if not home or any(one.name == home for one in extensions()) else "; ".join(lack(home))
 
 
 @dataclass(frozen=True)

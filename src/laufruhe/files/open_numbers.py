@@ -14,10 +14,11 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, key_path, number_read
 from laufruhe.files.model_walk import annotations_at, number_at, tables_on
 from laufruhe.files.nested import Place, at, inside, put
-from laufruhe.files.problem_file import file_model
+from laufruhe.files.problem_file import Note, ProblemFile, file_model
 from laufruhe.files.rotors import FACTORS
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.problem.decision import AddressDrive, Decision
+from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval
 
 _SIZES = ("mass", "unbalance")
@@ -62,6 +63,13 @@ def without_open(tables: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[Decis
         found = put(found, place, own.start)
         decisions += [own.decision] if own.given.is_open else []
     return found, tuple(decisions)
+
+
+def _put(decisions: Sequence[Decision], problem: Problem, _: ProblemFile, __: Mapping[str, Any]) -> Problem:
+    return replace(problem, decisions=(*problem.decisions, *decisions))
+
+
+NOTE = Note("open numbers", without_open, _put)
 
 
 def _read(tables: Mapping[str, Any], place: Place, number: f.Number | None, node: dict[str, Any]) -> OpenNumber:

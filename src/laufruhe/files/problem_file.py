@@ -13,7 +13,6 @@ from pydantic import Field, create_model
 from laufruhe.extension import extended
 from laufruhe.files import fields as f
 from laufruhe.files.asked import ConstraintTable, ObjectiveTable
-from laufruhe.files.assembly import AssemblyTable
 from laufruhe.files.bearings import MainBearingTable
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fidelity import FidelityTable
@@ -31,7 +30,6 @@ from laufruhe.files.quantities import QuantitiesTable
 from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
 from laufruhe.files.run_up import RunUpTable
 from laufruhe.files.running_gear import RunningGearTable
-from laufruhe.files.tolerances import RobustTable, TolerancesTable
 from laufruhe.machine.layouts import Throw
 from laufruhe.problem.problem import Problem
 
@@ -72,12 +70,34 @@ class Key:
         objective and limits follow.
     numbers
         Return the labels of parts of the table in results, and the places of these parts in the file.
+    single
+        Whether it needs a single objective.
     """
 
     name: str
     annotation: Any
     read: Callable[[Any, Problem, Given], Problem]
     numbers: Callable[[Any], Iterable[tuple[str, Place]]] = lambda _: ()
+    single: bool = False
+
+
+@dataclass(frozen=True)
+class Note:
+    """A note that a file may write at any of its numbers.
+
+    Attributes
+    ----------
+    name
+        In words.
+    part
+        Return tables without such notes, and the notes; nothing where there are none.
+    put
+        Return the problem with what notes say: of these, of the problem, of the file and of its tables without notes.
+    """
+
+    name: str
+    part: Callable[[Mapping[str, Any]], tuple[dict[str, Any], Any]]
+    put: Callable[[Any, Problem, ProblemFile, Mapping[str, Any]], Problem]
 
 
 class SearchTable(Table):
@@ -124,14 +144,12 @@ class ProblemFile(Table):
     constraints: list[ConstraintTable] = Field(default_factory=list)
     fidelity: FidelityTable = Field(default_factory=FidelityTable)
     search: SearchTable = Field(default_factory=SearchTable)
-    tolerances: TolerancesTable | None = None
-    robust: RobustTable | None = None
-    assembly: AssemblyTable | None = None
 
     @property
     def single(self) -> list[str]:
         """What stands here that needs a single objective only."""
-        given = [key for key in ("assembly", "robust") if getattr(self, key) is not None]
+        keys = EXTENSION_KEYS.values()
+        given = [key.name for key in keys if key.single and getattr(self, key.name) is not None]
         return [*given, *(["fidelity.kinematics"] if self.fidelity.kinematics == "auto" else [])]
 
 

@@ -16,9 +16,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from laufruhe.errors import Complaint, InputError, ModelError, printed, refused, wrong_call
-from laufruhe.files import edits
+from laufruhe.extension import extended
+from laufruhe.files import edits, open_numbers
 from laufruhe.files.asked import limits_of, objectives_of
-from laufruhe.files.assembly import assembly_of
 from laufruhe.files.bearings import MainBearingTable, bearings_of, one_by_one
 from laufruhe.files.catalogue import with_catalogue
 from laufruhe.files.complaints import Refused, beside, complaints_of, in_file, key_path
@@ -30,18 +30,16 @@ from laufruhe.files.gas import gas_of, needs_bore
 from laufruhe.files.geared import geared_of
 from laufruhe.files.load_cases import load_cases_of
 from laufruhe.files.mounts import mounts_of
-from laufruhe.files.nested import inside, plain
-from laufruhe.files.open_numbers import without_open
+from laufruhe.files.nested import inside, plain, put
 from laufruhe.files.open_parts import check_factors, leads_of, piston_masses
 from laufruhe.files.operating_points import operating_points
 from laufruhe.files.phasing import is_open, opened
-from laufruhe.files.problem_file import EXTENSION_KEYS, Given, ProblemFile, file_model
+from laufruhe.files.problem_file import EXTENSION_KEYS, Given, Note, ProblemFile, file_model
 from laufruhe.files.quantities import followed
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.run_up import run_of
 from laufruhe.files.running_gear import size_decisions, weighed
 from laufruhe.files.scene import Scene
-from laufruhe.files.tolerances import over_of, parted, tolerances_of, with_numbers
 from laufruhe.files.toml_depth import line_deeper_than
 from laufruhe.files.toml_faults import toml_complaint
 from laufruhe.machine import Cycle, Engine, SliderCrank
@@ -53,7 +51,6 @@ from laufruhe.problem.drawing import Drawing
 from laufruhe.problem.drawing import Path as Place
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem, Search
-from laufruhe.problem.tolerance import Robust, Tolerances
 
 DEEPEST, MOST_ENTRIES, MOST_BYTES = 16, 1000, 1_000_000
 """Of a file: tables within tables, entries of one list or table, and bytes."""
@@ -96,19 +93,20 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
         raise refused("study", "", "makes this a study file", "use laufruhe study", path)
     try:
         with in_file(path):
-            plain, written = parted(tables)
-            closed, numbers = without_open(plain)
+            closed, found = dict(tables), {}
+            # a number that is open may have a note of an extension beside its bounds
+            for note in reversed(notes()):
+                closed, found[note] = note.part(closed)
             file = file_model().model_validate(followed(closed))
             problem = _of_file(file, path)
 
             def finished(own: Problem, candidate: Candidate | None) -> Problem:
-                rebuild = _Rebuilt(closed, path, candidate)
-                each = tolerances_of(written, file.tolerances, own, closed)
-                over = over_of(file.robust, each)
-                extras = own.extras if over is None else (*own.extras, Robust(Tolerances(each), over))
-                return replace(own, decisions=(*own.decisions, *numbers), rebuild=rebuild, extras=extras)
+                own = replace(own, rebuild=_Rebuilt(closed, path, candidate))
+                for note in notes():
+                    own = note.put(found[note], own, file, closed) if found[note] else own
+                return own
 
-            if numbers or written or file.tolerances is not None or file.robust is not None:
+            if any(found.values()):
                 problem = _of_every_star(problem, finished)
             _check_decided(problem.decisions, bool(problem.objective))
             _check_followed(problem)
@@ -117,6 +115,12 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
         raise InputError(str(path), complaints_of(error, file_model())) from None
     except ModelError as error:
         raise InputError(str(path), (Complaint.of(error, "engine"),)) from None
+
+
+@cache
+def notes() -> tuple[Note, ...]:
+    """Return what may stand at numbers of a file, in the order in which it is put into the problem."""
+    return tuple(extended("notes", Note, (open_numbers.NOTE,)).values())
 
 
 def _of_every_star(problem: Problem, finished: Callable[[Problem, Candidate | None], Problem]) -> Problem:
@@ -142,8 +146,6 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
     if file.geared_inertias and file.engine.throws is not None and file.engine.given_throws is None:
         rule = "are known of throws that are given, and engine.throws is open"
         raise Refused("geared_inertias", None, rule, "fix the throws, or leave them out")
-    if file.geared_inertias and file.assembly is not None:
-        raise Refused("geared_inertias", None, "are not known of [assembly]", "leave one of the two out")
     if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
         return _assembled(file, file.engine, path=path)
     closed = partial(_assembled, file, path=path)
@@ -199,8 +201,11 @@ class _Rebuilt:
 
     def __call__(self, changes: Mapping[Place, str | float]) -> Drawing:
         """As built."""
+        tables = self._plainly
+        for place, value in changes.items():
+            tables = put(tables, place, value)
         try:
-            found = _of_file(file_model().model_validate(followed(with_numbers(self._plainly, changes))), self.path)
+            found = _of_file(file_model().model_validate(followed(tables)), self.path)
             if self.candidate is not None and found.phasing is not None:
                 found = found.phasing.realise(self.candidate)
         except (ValidationError, Refused, ModelError) as error:
@@ -329,7 +334,6 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         mount_numbers=found.numbers,
         search=Search(**file.search.model_dump()),
         fires_together=table.fires_together,
-        extras=assembly_of(file.assembly, engine, path.parent),
     )
     given = Given(file, throws, path.parent)
     for name, key in EXTENSION_KEYS.items():

@@ -50,8 +50,6 @@ _CAPTIONS = {
     "campbell": "Orders of crank speed against natural frequencies: where they cross, speed is critical.",
     "modes": "Share of each motion in the kinetic energy of each natural mode.",
     "run_up": "Largest force and travel on any mount, and roll, while the engine runs up and is shut down.",
-    "robust": "The best drawing and the design decided, each built many times, and what each tolerance costs.",
-    "assembly": "The best assembly of measured parts beside those at random.",
     "trade": "What slightly uneven firing buys.",
 }
 PICTURES: Mapping[str, Picture] = extended("pictures", Picture, [Picture(*each) for each in _CAPTIONS.items()])
@@ -61,13 +59,13 @@ SHEETS = (
 )  # fmt: skip
 """Curves and tables of a result as files: `report.tables` fills them in full precision."""
 CURVES = (
-    "torque", "indicator", "chambers", "uneven-firing", "shares",
+    "torque", "indicator", "chambers", "uneven-firing",
     "willans", "bearings-on-crank", "wear", "turning-parts", "mount-critical-speeds",
 )  # fmt: skip
 """Further ones, which `report.curves` fills."""
 PRINTED = (
-    "reach", "assembly", "objectives-in-order", "equal-optima", "weights", "balance-factors", "under-tolerance",
-    "tolerances", "crankshaft-torque", "load-cases", "through-resonance",
+    "reach", "objectives-in-order", "equal-optima", "weights", "balance-factors", "crankshaft-torque", "load-cases",
+    "through-resonance",
 )  # fmt: skip
 """Tables of the report that are files as they are printed."""
 

@@ -35,8 +35,6 @@ from laufruhe.present.twins import KINDS, is_twin, parts_of
 from laufruhe.problem.curves import STEPS
 from laufruhe.report.sheet import Cells, Sheet, Sheets
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.tolerances.assembly_result import AssemblyResult
-from laufruhe.solvers.tolerances.result import SHARES, RobustResult
 
 DIRECTIONS = 180
 """In which wear is told."""
@@ -84,18 +82,6 @@ def _uneven_firing(result: Result) -> Sheet:
         for one in ranking_of(result).trade
     ]
     return Sheet(["allowed deviation [deg]", "deviation [deg]", f"objective [{unit}]", f"not under [{unit}]"], rows)
-
-
-def _shares(result: Result) -> Sheet:
-    """Share of engines built, or of assemblies, that stay below a value."""
-    unit, columns = objective_unit(result) or "-", dict[str, list[float]]()
-    if isinstance(result.details, RobustResult):
-        columns["best drawing"] = list(result.details.nominal.quantiles)
-        columns["decided"] = list(result.details.robust.quantiles)
-    if isinstance(result.details, AssemblyResult):
-        columns["assemblies at random"] = list(result.details.quantiles)
-    rows = [[100.0 * share, *values] for share, *values in zip(SHARES, *columns.values(), strict=True)]
-    return Sheet(["below [%]", *(f"{name} [{unit}]" for name in columns)], rows)
 
 
 def _indicator(result: Result) -> Sheet:
@@ -218,7 +204,6 @@ CURVES: Sheets = {
     "indicator": (points_with_chambers, _indicator),
     "chambers": (lambda result: rotors_of(result.final.engine), _chambers),
     "uneven-firing": (has_ranking, _uneven_firing),
-    "shares": (lambda result: result.details, _shares),
     "willans": (lambda result: result.problem.friction, _willans),
     "bearings-on-crank": (has_bearings, _on_crank),
     "wear": (has_bearings, _wear),

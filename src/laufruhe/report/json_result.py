@@ -70,7 +70,6 @@ def as_dict(result: Result, series: bool = False) -> Record:
         **{name: section.record(result) for name, section in EXTENSION_SECTIONS.items() if section.applies(result)},
         **_running(result),
         **_phasing(result),
-        **({} if result.details is None else result.details.record()),
         **_ranks(result),
         **_reached(result),
         "fidelity": {

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from laufruhe.errors import ModelError
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
@@ -100,10 +100,6 @@ class Details:
     def measured(self) -> Evaluation | None:
         """Evaluation that the objective is of; None for that of the design."""
         return None
-
-    def record(self) -> dict[str, Any]:
-        """Return its part of `result.json`, in SI."""
-        return {}
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

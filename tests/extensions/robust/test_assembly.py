@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 
 from laufruhe.errors import InputError, ModelError
-from laufruhe.extensions.robust.assembling import _Search
+from laufruhe.extensions.robust.assembly import Assembly, Lot, assembled
+from laufruhe.extensions.robust.assembly_solver import _Search
+from laufruhe.extensions.robust.result import AssemblyResult
 from laufruhe.files.reader import load
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.norms import MEAN, Grid
-from laufruhe.problem.assembly import Assembly, Lot, assembled
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.tolerances.assembly_result import AssemblyResult
 from problem_files import FOUR, MOUNTS
 
 THREE = FOUR.replace("[1, 3, 4, 2]", "[1, 3, 2]")

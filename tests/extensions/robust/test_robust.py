@@ -14,16 +14,16 @@ from scipy.optimize import minimize
 from laufruhe.errors import ModelError
 from laufruhe.extensions.robust.adversaries import EveryError, Found
 from laufruhe.extensions.robust.built_engines import BuiltEngines, values_of
-from laufruhe.extensions.robust.worst_least import SMALL, Least, _kept, _Program
+from laufruhe.extensions.robust.result import RobustResult
+from laufruhe.extensions.robust.solver import SMALL, Least, _kept, _Program
+from laufruhe.extensions.robust.tolerance import Over, Robust, Tolerances, built, tolerances_of, with_tolerances
 from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.tolerance import Over, Robust, Tolerances, built, tolerances_of, with_tolerances
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import KEPT, unbalances_of
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.tolerances.result import RobustResult
 from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft
 
 ENGINE = (

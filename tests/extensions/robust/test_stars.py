@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 import laufruhe
+from laufruhe.extensions.robust.result import RobustResult
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.tolerances.result import RobustResult
 from problem_files import changed
 
 FOUR = """

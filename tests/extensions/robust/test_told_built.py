@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import laufruhe
+from laufruhe.extensions.robust.result import RobustResult
+from laufruhe.extensions.robust.tolerance import built, tolerances_of
 from laufruhe.files.reader import load_tables
 from laufruhe.numerics.budget import limited
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.tolerance import built, tolerances_of
 from laufruhe.solvers import Status, solve
 from laufruhe.solvers.cones.unbalances import KEPT
-from laufruhe.solvers.tolerances.result import RobustResult
 
 ENGINE: dict[str, Any] = {
     "layout": "inline", "cycle": "two-stroke", "stroke": "100 mm", "rod_ratio": 0.3, "reciprocating_mass": "1 kg ± 5 %",

@@ -7,14 +7,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from laufruhe.cli import app
 from laufruhe.errors import InputError
+from laufruhe.extensions.robust.tolerance import Law, Scope, built, tolerances_of
 from laufruhe.files.reader import load
 from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.tolerance import Law, Scope, built, tolerances_of
-from problem_files import FOUR, MOUNTS, changed, shaft
+from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft
 
 TEXT = (
     changed(FOUR, "1.25 kg", "1.25 kg{}")
@@ -166,3 +168,27 @@ def test_one_line_for_what_is_wrong(tmp_path: Path, words: str, more: str, rule:
     (complaint,) = caught.value.complaints
     assert rule in f"{complaint.rule} {complaint.remedy}"
     assert complaint.remedy
+
+
+def test_several_objectives_are_refused(tmp_path: Path) -> None:
+    two = '[[objective]]\nminimise = "rms mount force"\n[[objective]]\nminimise = "maximum mount force"\n'
+    text = changed(TEXT, '[objective]\nminimise = "rms mount force"\n', two).format(" ± 1 %")
+    with pytest.raises(InputError, match="robust: needs a single objective, and there are 2"):
+        read(tmp_path, text + MOUNTS)
+
+
+def test_without_robust_it_is_checked_and_leaves_no_trace() -> None:
+    plain = load(TEXT.format(" ± 25 g") + MOUNTS)
+    assert plain == load(TEXT.format("") + MOUNTS)
+    with pytest.raises(InputError, match="whole mass or more"):
+        load(TEXT.format(" ± 2 kg") + MOUNTS)
+
+
+def test_check_refuses_what_solve_does(tmp_path: Path) -> None:
+    text = (PROBLEMS / "tractor-four-robust.toml").read_text(encoding="utf-8")
+    path = tmp_path / "heights.toml"
+    path.write_text(changed(text, '"-100 mm"]', '{ between = ["-200 mm", "0 mm"] }]'), encoding="utf-8")
+    for command in ("check", "solve"):
+        told = CliRunner().invoke(app, [command, str(path)])
+        assert told.exit_code == 2
+        assert "[robust] decides unbalances" in told.output

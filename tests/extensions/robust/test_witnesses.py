@@ -12,15 +12,15 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import BoundError
-from laufruhe.extensions.robust import assembling, worst_case
-from laufruhe.problem.assembly import Assembly, assembled
+from laufruhe.extensions.robust import assembly_solver, worst_case
+from laufruhe.extensions.robust.assembly import Assembly, assembled
+from laufruhe.extensions.robust.result import AssemblyResult
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove import certificate
 from laufruhe.prove.best_first import Over
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve, walk
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.tolerances.assembly_result import AssemblyResult
 from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft, written
 from ready import solved
 
@@ -81,7 +81,7 @@ def test_a_broken_bounder_of_built_engines(monkeypatch: pytest.MonkeyPatch, tmp_
 
 @pytest.mark.slow
 def test_a_broken_bounder_of_assemblies(monkeypatch: pytest.MonkeyPatch) -> None:
-    scaled(assembling._Search, "bound", lambda found: 1.001 * found)(monkeypatch)
+    scaled(assembly_solver._Search, "bound", lambda found: 1.001 * found)(monkeypatch)
     with pytest.raises(BoundError, match="contradicts a known design"):
         laufruhe.solve(PROBLEMS / "selective-assembly.toml")
 
@@ -89,7 +89,7 @@ def test_a_broken_bounder_of_assemblies(monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.mark.slow
 def test_parts_are_left_out_in_one_place_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever a search says of what is enough, its bound is that of all parts: the gap grows, and no more."""
-    monkeypatch.setattr(assembling._Search, "enough", property(lambda _: -math.inf))
+    monkeypatch.setattr(assembly_solver._Search, "enough", property(lambda _: -math.inf))
     found = laufruhe.solve(PROBLEMS / "selective-assembly.toml")
     assert found.certificate is not None
     assert found.certificate.kind is Proof.WITHIN_GAP
@@ -100,13 +100,13 @@ def test_parts_are_left_out_in_one_place_alone(monkeypatch: pytest.MonkeyPatch) 
 @pytest.fixture
 def pruned_assemblies(monkeypatch: pytest.MonkeyPatch) -> None:
     """Parts of the assemblies that may hold a better one are left out, and the others are kept."""
-    right = assembling._Search.parts
+    right = assembly_solver._Search.parts
 
     def turned(self: Any, taken: Any) -> Iterator[Any]:
         for part in right(self, taken):
             yield Over(self.enough) if isinstance(part, tuple) and part[0] < self.enough else part
 
-    monkeypatch.setattr(assembling._Search, "parts", turned)
+    monkeypatch.setattr(assembly_solver._Search, "parts", turned)
 
 
 @pytest.mark.slow

@@ -251,7 +251,7 @@ def test_a_number_of_the_file_is_held_where_it_stands_until_it_is_searched() -> 
     path = PROBLEMS / "single-stroke-offset.toml"
     first, held = follow(path), follow(path, edits=(Edit("fix", "engine.stroke", "130 mm"),))
     assert [slider["name"] for slider in first["model"]["sliders"]] == ["web.balance_factor"]
-    assert "for these other numbers" in first["claim"]["words"]
+    assert "for the other numbers of the file" in first["claim"]["words"]
     assert held["limits"][0]["value"] < 0.99 * first["limits"][0]["value"]
     found = settle(path)["claim"]
     assert found["kind"] == "found"

@@ -2,9 +2,13 @@
 
 from laufruhe.extension import Extension
 
-_HOME = "laufruhe.extensions.robust"
+_HERE = "laufruhe.extensions.robust"
 EXTENSION = Extension(
     "robust",
-    reductions=(f"{_HOME}.reductions:ASSEMBLY", f"{_HOME}.reductions:TOLERANCES"),
-    study_kinds=(f"{_HOME}.study:Tolerance",),
+    keys=tuple(f"{_HERE}.file:{name}" for name in ("TOLERANCES", "ROBUST", "ASSEMBLY")),
+    notes=(f"{_HERE}.file:NOTE",),
+    reductions=tuple(f"{_HERE}.reductions:{name}" for name in ("ASSEMBLY", "TOLERANCES")),
+    sections=tuple(f"{_HERE}.section:{name}" for name in ("ASSEMBLY", "TOLERANCES")),
+    pictures=tuple(f"{_HERE}.pictures:{name}" for name in ("TOLERANCES", "ASSEMBLY")),
+    study_kinds=(f"{_HERE}.study:Tolerance",),
 )

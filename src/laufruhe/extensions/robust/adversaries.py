@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from laufruhe.extensions.robust.built_engines import BuiltEngines, evaluated, values_of
 from laufruhe.extensions.robust.error_parts import Terms
+from laufruhe.extensions.robust.tolerance import built, tolerances_of
 from laufruhe.extensions.robust.worst_case import MOST_NODES, check_worst, worst_case
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.numerics.arrays import Array
@@ -18,7 +19,6 @@ from laufruhe.problem.evaluation import objective_value, told_at
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.problem.tolerance import built, tolerances_of
 from laufruhe.solvers.conclusion import KEPT
 
 QUICK = 1
@@ -60,30 +60,30 @@ class Found:
 
 
 def moved_limits(problem: Problem) -> tuple[Limit, ...]:
-    """Limits that errors move: masses are those of the drawing."""
+    """Return limits that errors move: masses are those of the drawing."""
     return tuple(limit for limit in problem.load_limits if limit.measure.is_load)
 
 
 def excess_of(limits: Sequence[tuple[Limit, float]]) -> float:
-    """Largest relative excess; negative where all have room."""
+    """Return the largest relative excess; negative where all have room."""
     return max(((value - limit.maximum) / (limit.maximum or 1.0) for limit, value in limits), default=0.0)
 
 
 def names_broken(limits: Sequence[tuple[Limit, float]]) -> tuple[str, ...]:
-    """Of limits that are passed by more than counts as kept."""
+    """Return the names of limits that are passed by more than counts as kept."""
     return tuple(limit.name for limit, value in limits if value > limit.maximum * (1.0 + KEPT))
 
 
 @dataclass(frozen=True, eq=False)
 class EveryError:
-    """All errors within the tolerances, every load affine in them (R4); limits are read at many angles (P7)."""
+    """Seek among all errors within the tolerances, every load affine in them (R4); read limits at many angles (P7)."""
 
     problem: Problem
     samples: int
     tolerance: float
 
     def at(self, values: Sequence[Value], proven: bool) -> Found:
-        """By branch and bound."""
+        """Return the worst engines, by branch and bound."""
         engines = BuiltEngines(self.problem, values, self.samples)
         columns, most = tolerances_of(self.problem).columns, MOST_NODES if proven else QUICK
         found = worst_case(engines.terms, columns, self.tolerance, most=most)
@@ -123,16 +123,16 @@ class DrawnEngines:
     models: list[AffineModel] = field(default_factory=list)
 
     def kept(self, which: NDArray[np.intp]) -> DrawnEngines:
-        """Some of them."""
+        """Return some of them."""
         models = [self.models[k] for k in which] if self.models else []
         return DrawnEngines(self.problem, self.errors[which], self.samples, models)
 
     def objective(self, values: Sequence[Value]) -> Array:
-        """Of every engine."""
+        """Return the objective of every engine."""
         return np.asarray(self._measured(values, None))
 
     def at(self, values: Sequence[Value], proven: bool) -> Found:  # noqa: ARG002
-        """All of them, exactly."""
+        """Return the worst of all of them, exactly."""
         worst = self._measured(values, None)
         errors, limits = [self.errors[int(np.argmax(worst))]], []
         for limit in moved_limits(self.problem):

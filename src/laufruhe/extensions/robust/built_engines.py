@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from laufruhe.extensions.robust.tolerance import Tolerances, built, tolerances_of
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.load_models.batch import by_feature
 from laufruhe.numerics.arrays import Array
@@ -14,11 +15,10 @@ from laufruhe.problem.evaluation import Evaluation, evaluate, over
 from laufruhe.problem.measure import Measure, bends_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.problem.tolerance import Tolerances, built, tolerances_of
 
 
 class BuiltEngines:
-    """The loads of one design as drawn, and what every error of a whole size adds.
+    """Loads of one design as drawn, and what every error of a whole size adds.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class BuiltEngines:
         self._built = [evaluated(built(problem, unit, own), values, samples) for unit in units]
 
     def norm(self, measure: Measure) -> AffineNorm:
-        """A measure over the errors."""
+        """Return the norm of a measure over the errors."""
         drawn, finer = self._built[0], measure.norm.refinement
         bends = None
         if measure.is_load:
@@ -54,7 +54,7 @@ class BuiltEngines:
 
     @property
     def terms(self) -> tuple[tuple[float, AffineNorm], ...]:
-        """Of the objective."""
+        """Weights and norms of the objective."""
         return tuple((term.weight, self.norm(term.measure)) for term in self.problem.objective)
 
 
@@ -64,7 +64,7 @@ def evaluated(own: Problem, values: Sequence[Value], samples: int) -> Evaluation
 
 
 def values_of(terms: Sequence[tuple[float, AffineNorm]], errors: Array) -> Array:
-    """Weighted sum of the norms of many engines, errors of shape (engines, columns)."""
+    """Return the weighted sum of the norms of many engines, errors of shape (engines, columns)."""
     features = np.concatenate([np.ones((len(errors), 1)), errors], axis=1)
     total = np.zeros(len(errors))
     for weight, norm in terms:

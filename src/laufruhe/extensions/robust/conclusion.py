@@ -10,18 +10,18 @@ import numpy as np
 
 from laufruhe.extensions.robust.adversaries import Adversary, Found, names_broken
 from laufruhe.extensions.robust.built_engines import BuiltEngines, evaluated, values_of
+from laufruhe.extensions.robust.result import CONFIDENCE, SHARE, SHARES, BuiltDesign, PricedTolerance, RobustResult
+from laufruhe.extensions.robust.tolerance import Over, Tolerance, built, robust_of, tolerances_of, with_tolerances
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.problem.tolerance import Over, Tolerance, built, robust_of, tolerances_of, with_tolerances
 from laufruhe.prove.certificate import Proof, certified
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, decided, decision_values, limit_values, none_within
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.tolerances.result import CONFIDENCE, SHARE, SHARES, BuiltDesign, PricedTolerance, RobustResult
 from laufruhe.solvers.values import LimitValue, ObjectiveValue
 
 CHECKED, CHECKED_CURVED = 20_000, 400
@@ -32,7 +32,7 @@ STEP = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """What holds a design: sets of errors, and the multipliers of their objectives and limits.
+    """Sets of errors that hold a design, and the multipliers of their objectives and limits.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ def compared(
     problem: Problem, seeker: Adversary, nominal: Sequence[Value], robust: Sequence[Value], found: Found,
     held: Held, scenarios: int,
 ) -> RobustResult:  # fmt: skip
-    """The best drawing and the design decided, each built many times, and the price of every tolerance."""
+    """Compare the best drawing and the design decided, each built many times, and the price of every tolerance."""
     over = robust_of(problem).over
     sample = _Sample.of(problem, over, seeker.samples)
     values = sample.values(problem, robust)
@@ -91,7 +91,7 @@ class _Sample:
         return cls(tolerances_of(problem).draw(random, count), over.seed, samples)
 
     def values(self, problem: Problem, values: Sequence[Value]) -> Array:
-        """Objective of every engine of a design; errors that loads are affine in are all taken at once."""
+        """Return the objective of every engine of a design; errors that loads are affine in are all taken at once."""
         if tolerances_of(problem).is_affine:
             return values_of(BuiltEngines(problem, values, self.samples).terms, self.errors)
         return np.array([_value(problem, values, z, self.samples) for z in self.errors])
@@ -121,7 +121,7 @@ def _design(
 
 
 def _at_most(exceeding: int, engines: int) -> float:
-    """Share of all engines that exceeds, at most, with CONFIDENCE (Clopper and Pearson, R10)."""
+    """Return the share of all engines that exceeds, at most, with CONFIDENCE (Clopper and Pearson, R10)."""
     from scipy.stats import beta
 
     return float(beta.ppf(CONFIDENCE, exceeding + 1, engines - exceeding)) if exceeding < engines else 1.0
@@ -130,7 +130,7 @@ def _at_most(exceeding: int, engines: int) -> float:
 def _priced(
     problem: Problem, values: Sequence[Value], held: Held, sample: _Sample, share: float
 ) -> tuple[PricedTolerance, ...]:
-    """Every tolerance with its price, the dearest first."""
+    """Return every tolerance with its price, the dearest first."""
     told = []
     for tolerance in tolerances_of(problem).each:
         wide, narrow = (_taken(problem, values, held, sample, share, tolerance, 1.0 + s) for s in (STEP, -STEP))
@@ -146,7 +146,7 @@ def _taken(
     problem: Problem, values: Sequence[Value], held: Held, sample: _Sample, share: float, tolerance: Tolerance,
     factor: float,
 ) -> float:  # fmt: skip
-    """What holds the design, with one tolerance so many times as wide and all else as it is (R11)."""
+    """Return the objective of what holds the design, with one tolerance so many times as wide (R11)."""
     moved = with_tolerances(problem, tolerances_of(problem).scaled(tolerance.name, factor))
     if robust_of(problem).over.share is not None:
         return float(np.quantile(sample.values(moved, values), share))
@@ -166,7 +166,7 @@ def _limited(own: LimitValue, worst: float, price: float, tolerance: float) -> L
 
 
 def none_built(problem: Problem, given: Found, conflict: tuple[str, ...], timing: dict[str, float]) -> Result:
-    """No design keeps its limits in every engine: which of them, and how the worst engines of the one given stand."""
+    """Return that no design keeps its limits in every engine, and how the worst engines of the one given stand."""
     found = none_within(problem, evaluate(problem), conflict, timing)
     return replace(found, limits=_in_the_worst(problem, found.limits, given, {}))
 
@@ -174,7 +174,7 @@ def none_built(problem: Problem, given: Found, conflict: tuple[str, ...], timing
 def _in_the_worst(
     problem: Problem, limits: Sequence[LimitValue], found: Found, prices: Mapping[Limit, float]
 ) -> tuple[LimitValue, ...]:
-    """Limits of a drawing as its worst engines stand to them."""
+    """Return limits of a drawing as its worst engines stand to them."""
     worst = dict(found.limits)
     return tuple(
         _limited(own, worst.get(limit, own.value), prices.get(limit, 0.0), problem.tolerance)
@@ -186,7 +186,7 @@ def robust_result(
     problem: Problem, design: Design, given: Found, found: Found, held: Held, shown: Shown, details: RobustResult,
     timing: dict[str, float],
 ) -> Result:  # fmt: skip
-    """The result of a design whose objective and limits are those of built engines; `given` is of the one given."""
+    """Return the result of a design for built engines; `given` is of the one given."""
     met = max(found.excess, design.excess) <= KEPT
     nothing = nothing_of(problem, design.evaluation.engine)
     certificate = certified(

@@ -27,7 +27,7 @@ TOUCHES, TURNS = 3, 6
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """One error that is still free: local numbers of it, in an interval of -1 to 1 each, or in the unit disc.
+    """Error that is still free: local numbers of it, in an interval of -1 to 1 each, or in the unit disc.
 
     Attributes
     ----------
@@ -45,11 +45,11 @@ class Block:
 
     @property
     def is_disc(self) -> bool:
-        """Whether its local numbers lie in the unit disc and not in intervals."""
+        """Return whether its local numbers lie in the unit disc and not in intervals."""
         return self.arc is None and len(self.spans) > 1
 
     def parts(self, centre: Array) -> list[tuple[Array, Block | None]]:
-        """Centres and free blocks that together hold every extreme point."""
+        """Return centres and free blocks that together hold every extreme point."""
         if len(self.spans) == 1:
             return [(_moved(centre, self.columns, end * self.spans[0]), None) for end in (1.0, -1.0)]
         if self.arc is None:
@@ -59,7 +59,7 @@ class Block:
 
 
 def _arc(centre: Array, columns: slice, middle: float, half: float) -> tuple[Array, Block]:
-    """The rectangle about an arc of the unit circle (R7)."""
+    """Return the rectangle about an arc of the unit circle (R7)."""
     along = np.array([np.cos(middle), np.sin(middle)])
     across = np.array([-along[1], along[0]])
     near = float(np.cos(half))
@@ -76,7 +76,7 @@ def _moved(centre: Array, columns: slice, by: Array) -> Array:
 
 
 def bounded(terms: Terms, centre: Array, blocks: Sequence[Block], enough: float, known: Known) -> Part:
-    """What no errors of a part exceed, and which block to divide next (R5, R6); no better than is enough."""
+    """Bound a part of the errors, and say which block to divide next (R5, R6); no better than is enough."""
     parts = [_Moved.of(weight, norm, centre, blocks, own) for (weight, norm), own in zip(terms, known, strict=True)]
     sizes = np.sum([part.sizes for part in parts], axis=0)
     apart = sum(part.alone for part in parts)
@@ -107,7 +107,7 @@ def bounded(terms: Terms, centre: Array, blocks: Sequence[Block], enough: float,
 
 
 def _errors(centre: Array, blocks: Sequence[Block], local: Array) -> Array:
-    """Errors of local numbers, on the circle where they are of a disc."""
+    """Return the errors of local numbers, on the circle where they are of a disc."""
     errors, at = centre.copy(), 0
     for block in blocks:
         width = len(block.spans)
@@ -129,7 +129,7 @@ class Part:
 
 @dataclass(frozen=True, eq=False)
 class _Moved:
-    """One norm about a centre, and what the blocks move.
+    """Norm about a centre, and what the blocks move.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ class _Moved:
     def of(
         cls, weight: float, norm: AffineNorm, centre: Array, blocks: Sequence[Block], known: dict[_Key, _Reach]
     ) -> _Moved:
-        """Of one term; what blocks reach does not change with the centre."""
+        """Return those of one term; the reach of blocks does not change with the centre."""
         rows, kind, grid = norm.rows(centre), norm.norm, norm.grid
         found = [_reach(norm, block, known) for block in blocks]
         ends = np.cumsum([0, *(each.move.shape[-1] for each in found)])
@@ -184,15 +184,15 @@ class _Moved:
         return cls(weight, norm, rows, joined, own, size, reaches, weight * sizes, weight * alone, farthest)
 
     def squares(self, touched: Array) -> tuple[Array, float] | None:
-        """Squares over the norm that touch it where rows are this long (R6)."""
+        """Return squares over the norm that touch it where rows are this long (R6)."""
         return self.norm.norm.majorant(self.norm.grid, touched)
 
     def lengths_at(self, local: Array) -> Array:
-        """Of the rows at some local numbers."""
+        """Return lengths of the rows at some local numbers."""
         return lengths(self.rows + self.moves @ local)
 
     def value_of(self, size: Array) -> float:
-        """The weighted norm of rows of these lengths; what lengths do not tell counts as nothing."""
+        """Return the weighted norm of rows of these lengths; a norm that needs more counts as nothing."""
         kind = self.norm.norm
         return self.weight * kind.value(self.norm.grid, size[:, None]) if kind.of_row_lengths else 0.0
 
@@ -200,7 +200,7 @@ class _Moved:
 def _over_squares(
     parts: Sequence[_Moved], touched: Sequence[Array], blocks: Sequence[Block]
 ) -> tuple[float, Array, Array]:
-    """Largest value of squares over the norms, where it stands, and what each block adds to it for want of better.
+    """Return the largest value of squares over the norms, where it stands, and what each block adds to it.
 
     Ends of intervals are tried all, so that between these the squares are exact; of what is left each block is bounded
     by itself.
@@ -244,7 +244,7 @@ def _over_squares(
 
 
 def _over_balls(pulls: Array, bend: Array, firsts: NDArray[np.int_]) -> tuple[Array, Array, Array]:
-    """What a . u + u . H u / 2 does not exceed where every u_b has the length one (R6a).
+    """Bound a . u + u . H u / 2 where every u_b has the length one (R6a).
 
     Parameters
     ----------
@@ -285,13 +285,13 @@ def _over_balls(pulls: Array, bend: Array, firsts: NDArray[np.int_]) -> tuple[Ar
 
 @cache
 def _signs(count: int) -> Array:
-    """All ends of so many intervals, shape (2^count, count)."""
+    """Return all ends of so many intervals, shape (2^count, count)."""
     return np.array(list(itertools.product((1.0, -1.0), repeat=count))).reshape(2**count, count)
 
 
 @dataclass(frozen=True, eq=False)
 class _Reach:
-    """What a block moves, shape (k, d, w), the longest that it moves each row, and the most that a norm grows by it."""
+    """Moves of a block, shape (k, d, w), the longest that it moves each row, and the most that a norm grows by it."""
 
     move: Array
     rows: Array
@@ -303,7 +303,7 @@ Known: TypeAlias = Sequence[dict[_Key, _Reach]]
 
 
 def _reach(norm: AffineNorm, block: Block, known: dict[_Key, _Reach]) -> _Reach:
-    """What a block moves, found once."""
+    """Return the reach of a block, found once."""
     key = block.columns.start, block.arc
     if key not in known:
         move = norm.slope[..., block.columns] @ block.spans

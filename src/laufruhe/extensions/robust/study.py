@@ -15,6 +15,8 @@ import numpy as np
 import xarray as xr
 from pydantic import Field, model_validator
 
+from laufruhe.extensions.robust.tolerance import AddedDrive, Error, PistonDrive, Tolerances
+from laufruhe.extensions.robust.tolerance import Tolerance as Cause
 from laufruhe.extensions.robust.worst_case import worst_case
 from laufruhe.files import fields as f
 from laufruhe.files.fields import Name, Table
@@ -30,8 +32,6 @@ from laufruhe.problem.drawing import Drawing
 from laufruhe.problem.evaluation import evaluate, over
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.tolerance import AddedDrive, Error, PistonDrive, Tolerances
-from laufruhe.problem.tolerance import Tolerance as Cause
 from laufruhe.studies import picture as p
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
@@ -68,7 +68,7 @@ class TolerancesTable(Table):
         return self
 
     def of(self, engine: Engine) -> Tolerances:
-        """What of an engine they move, one for each cause that has a size.
+        """Return what of an engine they move, one for each cause that has a size.
 
         Balancing planes stand from the first throw to the last, what is centred on the crank at
         the last: the end where power is taken off (C3).
@@ -87,7 +87,7 @@ class TolerancesTable(Table):
 
 
 def _left(name: str, x: float, most: float) -> Error:
-    """An unbalance at any angle."""
+    """Return an unbalance at any angle."""
     return Error(name, (AddedDrive(name, x, most),), 2)
 
 
@@ -96,7 +96,7 @@ def _built(engine: Engine, tolerances: Tolerances, errors: Array) -> Engine:
 
 
 def _added_forces(engine: Engine, speed: float, tolerances: Tolerances) -> Array:
-    """Lateral and vertical force that every error adds at its limit, shape (columns, angles, 2)."""
+    """Return the lateral and vertical force that every error adds at its limit, shape (columns, angles, 2)."""
     point, steps = OperatingPoint("", speed), ANGLES * engine.cycle.turns
     engines = [engine, *(_built(engine, tolerances, z) for z in np.eye(tolerances.count))]
     # over one and the same period: an engine without errors may repeat within it
@@ -106,7 +106,7 @@ def _added_forces(engine: Engine, speed: float, tolerances: Tolerances) -> Array
 
 
 def worst_parts(engine: Engine, speed: float, tolerances: TolerancesTable) -> dict[str, float]:
-    """Largest free force [N] of each kind of tolerance, all of that kind at their limits: no errors exceed it (R4).
+    """Bound the free force [N] of each kind of tolerance, all of that kind at their limits (R4).
 
     Unbalances may point anywhere, so the parts add up to the worst of all together.
     """
@@ -122,7 +122,7 @@ def worst_parts(engine: Engine, speed: float, tolerances: TolerancesTable) -> di
 
 
 def random_forces(engine: Engine, speed: float, tolerances: TolerancesTable, builds: int, seed: int) -> Array:
-    """Largest free force over the cycle [N] of each of many engines, the nominal force left out.
+    """Return the largest free force over the cycle [N] of each of many engines, the nominal force left out.
 
     Masses are even over their tolerance, unbalances even over their disc.
     """
@@ -134,13 +134,13 @@ def random_forces(engine: Engine, speed: float, tolerances: TolerancesTable, bui
 
 
 def built(engine: Engine, tolerances: TolerancesTable, random: np.random.Generator) -> Engine:
-    """One engine out of many, for the exact model."""
+    """Return one engine out of many, for the exact model."""
     found = tolerances.of(engine)
     return _built(engine, found, found.draw(random, 1)[0])
 
 
 def mean_mount_forces(problem: Problem, tolerances: TolerancesTable, builds: int, seed: int) -> tuple[float, Array]:
-    """Mean mount force [N] of the engine as drawn, and of each of many as built."""
+    """Return the mean mount force [N] of the engine as drawn, and of each of many as built."""
     random = np.random.default_rng(seed)
     drawn = evaluate(problem).value(MEAN_MOUNT_FORCE)
     engines = (built(problem.engine, tolerances, random) for _ in range(builds))
@@ -148,7 +148,7 @@ def mean_mount_forces(problem: Problem, tolerances: TolerancesTable, builds: int
 
 
 def spread(problem: Problem, tolerances: TolerancesTable, builds: int = 10_000, seed: int = 1964) -> Record:
-    """What tolerances do to the free force of one engine [N], at its crank speed [rad/s].
+    """Return what tolerances do to the free force of one engine [N], at its crank speed [rad/s].
 
     The largest over the cycle of the drawing (`nominal`), the worst that each cause adds, the mean of what is added at
     random, and what each share (SHARES) of engines stays below. Of the mean mount force the same, as drawn (`mount`)
@@ -206,11 +206,11 @@ class Tolerance(Part):
     marks: list[MarkTable] = Field(default_factory=list)
 
     def settings(self) -> dict[str, Any]:
-        """What random engines hang on; marks are for pictures."""
+        """Return what random engines hang on; marks are for pictures."""
         return self.model_dump(include={"kind", "tolerances", "engines", "seed"})
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """Every engine, at its one operating point."""
+        """Return every engine, at its one operating point."""
         for case in self.cases:
             if len(scenes.problem(Point(case)).points) != 1:
                 rule = f"has several in '{case.name}', and tolerances are studied at one"
@@ -218,11 +218,11 @@ class Tolerance(Part):
         return [Point(case) for case in self.cases]
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """The spread of one engine."""
+        """Return the spread of one engine."""
         return spread(scenes.problem(point), self.tolerances, self.engines, self.seed)
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Engines side by side, with what is claimed of them."""
+        """Return engines side by side, with what is claimed of them."""
         names, forces = [mark.name for mark in self.marks], [mark.force for mark in self.marks]
         shown = {"mark_names": names, "mark_forces": forces} if names else {}
         values = {name: variable("case", [one[name] for one in records], *words) for name, words in _WORDS.items()}
@@ -243,7 +243,7 @@ class Tolerance(Part):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Nominal, worst and random free forces of every engine [kp], cause by cause, and what was said."""
+        """Return nominal, worst and random free forces of every engine [kp], cause by cause, and what was said."""
         head = ["engine", "drawing [kp]", "worst sum [kp]", *(f"of it {cause} [kp]" for cause in CAUSES)]
         head += ["random: mean [kp]", "95 % below [kp]", "drawing over worst sum"]
         head += ["mean mount force, drawing [kp]", "95 % of built engines: at most"]
@@ -260,7 +260,7 @@ class Tolerance(Part):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Density over random engines, worst sum, and the free force of the drawing, a row an engine."""
+        """Return the density over random engines, worst sum, and the free force of the drawing, a row an engine."""
         rows = [data.sel(case=name) for name in data["case"].values]
         stated = np.atleast_1d(data.attrs.get("mark_forces", []))
         most = max([float(data["nominal"].max()), float(data["worst"].max()), *stated]) / GRAVITY
@@ -282,7 +282,7 @@ class Tolerance(Part):
 
 
 def verdicts(data: xr.Dataset) -> tuple[Verdict, ...]:
-    """What the source says of finer balancing, engine by engine, confirmed or not.
+    """Judge what the source says of finer balancing, engine by engine, confirmed or not.
 
     It promises nothing where tolerances hardly move the mean mount force: engines built
     without any could not be told from nineteen of twenty built with them (W1 of

@@ -49,12 +49,12 @@ class WorstCase:
 
 
 def value_at(terms: Terms, errors: Array) -> float:
-    """Weighted sum of the norms at these errors."""
+    """Return the weighted sum of the norms at these errors."""
     return sum(weight * norm.value(errors) for weight, norm in terms)
 
 
 def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, most: int = MOST_NODES) -> WorstCase:
-    """The largest weighted sum of norms N(V0 + E z) over intervals and discs.
+    """Return the largest weighted sum of norms N(V0 + E z) over intervals and discs.
 
     Parameters
     ----------
@@ -123,15 +123,15 @@ class _Errors(Division[_Part]):
         self.told: Told = [{} for _ in terms]
 
     def better(self, found: tuple[float, Array]) -> None:
-        """The worse of the worst errors so far and others."""
+        """Keep the worse of the worst errors so far and others."""
         self.best = max(self.best, found, key=lambda each: each[0])
 
     def is_done(self, one: Waiting[_Part]) -> bool:
-        """Whether no errors are worse by the tolerance."""
+        """Return whether no errors are worse by the tolerance."""
         return -one.bound <= self.best[0] * (1.0 + self._tolerance)
 
     def parts(self, taken: Sequence[Waiting[_Part]]) -> Parts[_Part]:
-        """One block held at either end, or its circle parted."""
+        """Yield parts with one block held at either end, or its circle parted."""
         ((above, _, own),) = taken
         rest = [block for k, block in enumerate(own.blocks) if k != own.split]
         for middle, free in own.blocks[own.split].parts(own.centre):
@@ -144,7 +144,7 @@ class _Errors(Division[_Part]):
 
 
 def _starts(columns: Sequence[slice], count: int) -> Array:
-    """No errors, and random ones that are allowed: a point of the square may lie outside the disc in it."""
+    """Return no errors, and random ones that are allowed: a point of the square may lie outside the disc in it."""
     starts = np.random.default_rng(0).uniform(-1.0, 1.0, (STARTS + 1, count))
     starts[0] = 0.0
     for disc in columns:
@@ -153,7 +153,7 @@ def _starts(columns: Sequence[slice], count: int) -> Array:
 
 
 def _climbed(terms: Terms, columns: Sequence[slice], errors: Array) -> tuple[float, Array]:
-    """From some errors to ones that no step along their own slope betters: each step takes the farthest point."""
+    """Climb from some errors to ones that no step along their own slope betters: each step takes the farthest point."""
     value = value_at(terms, errors)
     for _ in range(CLIMBS):
         slope = np.zeros(len(errors))

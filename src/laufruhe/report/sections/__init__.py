@@ -5,7 +5,6 @@ from __future__ import annotations
 from laufruhe.report.grid import Grid
 from laufruhe.report.section import EXTENSION_SECTIONS
 from laufruhe.report.sections import (
-    assembly,
     decisions,
     limits,
     load_cases,
@@ -14,7 +13,6 @@ from laufruhe.report.sections import (
     orders,
     ranks,
     reach,
-    robust,
     run_up,
     stars,
     torque,
@@ -23,7 +21,7 @@ from laufruhe.report.sections import (
 from laufruhe.solvers.result import Result
 
 SECTIONS = (
-    reach, stars, assembly, ranks, decisions, weights, robust, limits, mounts, torque, modes, load_cases,
+    reach, stars, ranks, decisions, weights, limits, mounts, torque, modes, load_cases,
     run_up, orders,
 )  # fmt: skip
 

@@ -9,10 +9,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from laufruhe.extensions.robust.tolerance import AddedDrive
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.extra import Extra
-from laufruhe.problem.tolerance import AddedDrive
 
 Chosen = tuple[tuple[int, ...], ...]
 """Of every lot the part in each cylinder."""
@@ -35,7 +35,7 @@ class Lot:
 
     @property
     def differences(self) -> Array:
-        """From the mean of the lot, shape (parts, 2) [kg]."""
+        """Differences from the mean of the lot, shape (parts, 2) [kg]."""
         masses = np.array(self.masses)
         return np.asarray(masses - masses.mean(axis=0))
 

@@ -1,26 +1,18 @@
-"""Tolerances in a problem file: "1.25 kg ± 2 %" at a number, a table [tolerances], and what each moves."""
+"""Built engines in a problem file: "1.25 kg ± 2 %" at a number, [tolerances], [robust], and lots of [assembly]."""
 
 from __future__ import annotations
 
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
 from laufruhe import units
-from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, key_path
-from laufruhe.files.fields import Table
-from laufruhe.files.nested import put
-from laufruhe.files.rotors import name_of_unbalance
-from laufruhe.machine import Engine, Rotor
-from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
-from laufruhe.problem.drawing import Path
-from laufruhe.problem.problem import Problem
-from laufruhe.problem.tolerance import (
+from laufruhe.extensions.robust.assembly import Assembly, Lot
+from laufruhe.extensions.robust.tolerance import (
     AddedDrive,
     Error,
     ErrorDrive,
@@ -28,10 +20,23 @@ from laufruhe.problem.tolerance import (
     Law,
     Over,
     PistonDrive,
+    Robust,
     Scope,
     ShareDrive,
     Tolerance,
+    Tolerances,
 )
+from laufruhe.files import fields as f
+from laufruhe.files.complaints import Refused, key_path, measured
+from laufruhe.files.csv_rows import rows_of
+from laufruhe.files.fields import Table
+from laufruhe.files.problem_file import Given, Key, Note
+from laufruhe.files.rotors import name_of_unbalance
+from laufruhe.machine import Engine, Rotor
+from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
+from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.problem.drawing import Path
+from laufruhe.problem.problem import Problem
 
 SIGNS = ("±", "+-", "+/-")
 _TOLERANCE = re.compile(
@@ -96,16 +101,16 @@ class Written:
 
     @property
     def where(self) -> str:
-        """For the reader of a complaint."""
+        """Place for the reader of a complaint."""
         return key_path(self.path)
 
     def refused(self, rule: str, remedy: str) -> Refused:
-        """One line about it."""
+        """Return one line about it."""
         return Refused(self.where, self.text, rule, remedy)
 
     @property
     def is_share(self) -> bool:
-        """Whether it is in percent."""
+        """Return whether it is in percent."""
         return self.size.endswith("%")
 
     @property
@@ -135,11 +140,28 @@ class Written:
         return value
 
 
-def parted(tables: Mapping[str, Any]) -> tuple[dict[str, Any], list[Written]]:
-    """Tables of a file without their tolerances, and these."""
+@dataclass(frozen=True)
+class Marks:
+    """Tolerances that stand at numbers of a file."""
+
+    written: tuple[Written, ...]
+
+
+def _part(tables: Mapping[str, Any]) -> tuple[dict[str, Any], Marks | None]:
+    """Return the tables of a file without tolerances, and these; None where it says nothing of built engines."""
     found: list[Written] = []
     plain = {key: _parted(value, (key,), found) if key in _ROOMS else value for key, value in tables.items()}
-    return plain, found
+    return plain, Marks(tuple(found)) if found or {"tolerances", "robust"} & set(tables) else None
+
+
+def _put(marks: Marks, problem: Problem, file: Any, tables: Mapping[str, Any]) -> Problem:
+    """Return the problem of built engines, where [robust] asks for them; tolerances are checked in any case."""
+    found = [_tolerance(one, problem, tables) for one in marks.written]
+    found += _residual(file.tolerances, problem.engine, max(point.speed for point in problem.points))
+    if file.robust is None:
+        return problem
+    own = Robust(Tolerances(tuple(found)), _over(file.robust, found))
+    return replace(problem, extras=(*problem.extras, own))
 
 
 def _parted(node: Any, path: Path, found: list[Written]) -> Any:
@@ -178,18 +200,8 @@ def _written(text: str, path: Path) -> Written:
     )  # fmt: skip
 
 
-def with_numbers(tables: Mapping[str, Any], changes: Mapping[Path, str | float]) -> dict[str, Any]:
-    """Tables with other numbers at some places."""
-    found = dict(tables)
-    for place, number in changes.items():
-        found = put(found, place, number)
-    return found
-
-
-def over_of(table: RobustTable | None, tolerances: Sequence[Tolerance]) -> Over | None:
-    """Of which engines what is minimised and limited is taken."""
-    if table is None:
-        return None
+def _over(table: RobustTable, tolerances: Sequence[Tolerance]) -> Over:
+    """Return the engines that what is minimised and limited is taken of."""
     if not tolerances:
         raise Refused("robust", None, "has no tolerances to stand", 'give a number one, for example "1.25 kg ± 2 %"')
     if table.over == "worst case":
@@ -205,14 +217,6 @@ def over_of(table: RobustTable | None, tolerances: Sequence[Tolerance]) -> Over 
         rule = f"leaves none of {table.engines} engines above"
         raise Refused("robust.over", table.over, rule, "raise engines, or lower the share")
     return Over(share, table.engines, table.seed)
-
-
-def tolerances_of(
-    written: Sequence[Written], table: TolerancesTable | None, problem: Problem, tables: Mapping[str, Any]
-) -> tuple[Tolerance, ...]:
-    """All tolerances of a file, and what of the engine each moves."""
-    found = [_tolerance(one, problem, tables) for one in written]
-    return (*found, *_residual(table, problem.engine, max(point.speed for point in problem.points)))
 
 
 _Found: TypeAlias = tuple[list[Error], float, str]
@@ -243,7 +247,7 @@ def _pistons(one: Written, engine: Engine) -> _Found:
 
 
 def _pins(one: Written, engine: Engine) -> _Found:
-    """Every throw once: cylinders on one throw share its mass."""
+    """Return every throw once: cylinders on one throw share its mass."""
     size, found, seen = _mass(one), [], set()
     for part in engine.slider_cranks:
         at = (part.shaft.name, round(part.x, 9), round(math.remainder(part.throw, math.tau), 9))
@@ -261,13 +265,13 @@ def _pins(one: Written, engine: Engine) -> _Found:
 
 
 def _mass(one: Written) -> float:
-    """Largest error of a mass [kg]."""
+    """Return the largest error of a mass [kg]."""
     number = one.number or 0.0
     return one.error * (abs(number) if one.is_share else 1.0) * units.parse(f"1 {one.unit}", "kg")
 
 
 def _rotor(one: Written, problem: Problem, tables: Mapping[str, Any]) -> _Found:
-    """Of the size of one counterweight or balancer."""
+    """Return the error of the size of one counterweight or balancer."""
     names = _names(one.path, tables)
     decided = {drive.rotor: decision for decision in problem.decisions for drive in decision.rotor_drives}
     if one.is_share:
@@ -288,7 +292,7 @@ def _rotor(one: Written, problem: Problem, tables: Mapping[str, Any]) -> _Found:
 
 
 def _names(path: Path, tables: Mapping[str, Any]) -> list[str]:
-    """Rotors that a table of a file makes."""
+    """Return the rotors that a table of a file makes."""
     table = tables[str(path[0])][path[1]]
     if path[0] == "counterweights":
         return [str(table["name"])]
@@ -296,7 +300,7 @@ def _names(path: Path, tables: Mapping[str, Any]) -> list[str]:
 
 
 def _of_file(one: Written) -> Tolerance:
-    """Of any other number: the engine is put together anew with it."""
+    """Return the tolerance of any other number: the engine is put together anew with it."""
     if one.number is None:
         raise one.refused("is open, and only masses and unbalances may be open and off", "fix it, or leave it out")
     if one.scope is Scope.PIECE and not any(isinstance(part, int) for part in one.path):
@@ -310,7 +314,7 @@ def _of_file(one: Written) -> Tolerance:
 
 
 def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> list[Tolerance]:
-    """What balancing leaves on the crankshaft, at any angle, on planes from the first throw to the last."""
+    """Return the unbalance that balancing leaves, at any angle, on planes from the first throw to the last."""
     if table is None or table.residual_unbalance is None:
         if table is not None and table.rotor_mass is not None:
             raise Refused("tolerances.rotor_mass", None, "needs a grade", "add residual_unbalance, or leave it out")
@@ -337,3 +341,56 @@ def _residual(table: TolerancesTable | None, engine: Engine, speed: float) -> li
         Error(f"plane {k + 1}", (AddedDrive(f"residual unbalance {k + 1}", x, each),), 2) for k, x in enumerate(places)
     )
     return [Tolerance(RESIDUAL, "kg m", each, errors, Law(table.law))]
+
+
+COLUMNS = {"pistons": ("mass",), "rods": ("mass at the small end", "mass at the big end")}
+MOST_PARTS = 100
+
+
+class AssemblyTable(Table):
+    """Measured pistons and rods: which of them goes into which cylinder is decided."""
+
+    pistons: str | None = f.told("CSV file with the mass of each piston.")
+    rods: str | None = f.told("CSV file with the masses of each rod at the small end and at the big end.")
+    mass_unit: str = f.told("Unit of the masses in these files.", "g")
+
+
+def _assembly(table: AssemblyTable, problem: Problem, given: Given) -> Problem:
+    """Return the problem with the lots of the files beside its file."""
+    engine = problem.engine
+    if given.file.geared_inertias:
+        raise Refused("geared_inertias", None, "are not known of [assembly]", "leave one of the two out")
+    unit = measured(f"1 {table.mass_unit}", "kg", "assembly.mass_unit", table.mass_unit)
+    lots = []
+    for key, columns in COLUMNS.items():
+        file, where = getattr(table, key), f"assembly.{key}"
+        if file is None:
+            continue
+        rows = rows_of(file, given.folder / file, where, columns)
+        count = len(engine.slider_cranks)
+        if len(rows) < count:
+            raise Refused(where, file, f"has {len(rows)} parts for {count} cylinders", "measure one for each at least")
+        if len(rows) > MOST_PARTS:
+            raise Refused(where, file, f"has {len(rows)} parts", f"at most {MOST_PARTS} can be handled")
+        if min(min(row) for row in rows) <= 0.0:
+            raise Refused(where, file, "has a mass that is not above zero", "correct it")
+        lots.append(Lot(key[:-1], tuple((unit * row[0], unit * row[1] if len(row) > 1 else 0.0) for row in rows)))
+    if not lots:
+        raise Refused("assembly", None, "has no parts to choose among", "name a file of pistons or rods")
+    for part in engine.slider_cranks:
+        least = part.reciprocating_mass + sum(float(lot.differences[:, 0].min()) for lot in lots)
+        if type(part) is not SliderCrank or least <= 0.0:
+            rule = "needs plain cylinders whose reciprocating mass is above all differences of the parts"
+            raise Refused("assembly", None, rule, "correct the masses, or leave it out")
+    return replace(problem, extras=(*problem.extras, Assembly(tuple(lots))))
+
+
+def _later(_: Table, problem: Problem, __: Given) -> Problem:
+    """Return the problem as it is: what the table asks is put into it once it is whole."""
+    return problem
+
+
+TOLERANCES = Key("tolerances", TolerancesTable, _later)
+ROBUST = Key("robust", RobustTable, _later, single=True)
+ASSEMBLY = Key("assembly", AssemblyTable, _assembly, single=True)
+NOTE = Note("tolerances", _part, _put)

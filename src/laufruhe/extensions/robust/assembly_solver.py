@@ -18,18 +18,19 @@ from functools import partial
 import numpy as np
 
 from laufruhe.errors import BoundError, ModelError
+from laufruhe.extensions.robust.assembly import Assembly, Chosen, Lot, assembled
 from laufruhe.extensions.robust.built_engines import BuiltEngines, values_of
 from laufruhe.extensions.robust.error_parts import Terms
+from laufruhe.extensions.robust.result import SHARES, AssemblyResult, Place
+from laufruhe.extensions.robust.tolerance import AddedDrive, Error, PistonDrive, Tolerance, Tolerances
 from laufruhe.extensions.robust.worst_case import value_at
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.progress import tell
-from laufruhe.problem.assembly import Assembly, Chosen, Lot, assembled
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import is_affine
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.tolerance import AddedDrive, Error, PistonDrive, Tolerance, Tolerances
 from laufruhe.prove.best_first import Division, Parts, Waiting
 from laufruhe.prove.certificate import Proof, Reach, certified, withheld
 from laufruhe.prove.witness import Known, check_around
@@ -37,8 +38,6 @@ from laufruhe.solvers import walk
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import KEPT, limit_values
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.tolerances.assembly_result import AssemblyResult, Place
-from laufruhe.solvers.tolerances.result import SHARES
 from laufruhe.solvers.values import ObjectiveValue
 from laufruhe.solvers.withheld import without_proof
 
@@ -141,7 +140,7 @@ def refuse(problem: Problem) -> None:
 
 
 def _terms(problem: Problem) -> Terms:
-    """The objective as norms of rows that are affine in what every cylinder has more: to and fro, then turning [kg]."""
+    """Return norms of rows that are affine in the mass that every cylinder has more: to and fro, then turning [kg]."""
     parts = problem.engine.slider_cranks
     errors = [Error(part.name, (PistonDrive(k, PER_KILOGRAM),)) for k, part in enumerate(parts)]
     errors += [
@@ -175,7 +174,7 @@ class _Search(Division[Chosen]):
         self.order = [(lot, k) for _, lot, k in sorted(order)]
 
     def run(self) -> float:
-        """The best assembly, and what none goes under."""
+        """Return the bound that no assembly goes under."""
         free: Chosen = tuple((-1,) * self.cylinders for _ in self.lots)
         found = self.divide((self.bound(free), free), MOST_NODES)
         check_around(self, self.best, Known(self._mass(self.best), self.value))
@@ -194,11 +193,11 @@ class _Search(Division[Chosen]):
         return self.value * (1.0 - 0.5 * self.tolerance)
 
     def is_done(self, one: Waiting[Chosen]) -> bool:
-        """Whether no assembly of it is better by half the tolerance."""
+        """Return whether no assembly of it is better by half the tolerance."""
         return one.bound >= self.enough
 
     def parts(self, taken: Sequence[Waiting[Chosen]]) -> Parts[Chosen]:
-        """Every part that is left in the cylinder that counts most of those without one."""
+        """Yield the parts left for the cylinder that counts most of those without one."""
         ((under, _, node),) = taken
         lot, cylinder = next((at for at in self.order if node[at[0]][at[1]] < 0), (-1, -1))
         for part in range(len(self.more[lot])) if lot >= 0 else ():
@@ -209,7 +208,7 @@ class _Search(Division[Chosen]):
             yield max(self.bound(child), under), child
 
     def _mass(self, chosen: Chosen) -> Array:
-        """What every cylinder has more: to and fro, then turning."""
+        """Return the mass that every cylinder has more [kg]: to and fro, then turning."""
         return np.asarray(np.sum([m[list(p)] for m, p in zip(self.more, chosen, strict=True)], axis=0)).T.reshape(-1)
 
     def _value(self, chosen: Chosen) -> float:
@@ -242,7 +241,7 @@ class _Search(Division[Chosen]):
         return best
 
     def _middle(self, node: Chosen) -> Array:
-        """Free cylinders have the mean of the parts that are left."""
+        """Return the masses where free cylinders have the mean of the parts that are left."""
         total = np.zeros((self.cylinders, 2))
         for more, parts in zip(self.more, node, strict=True):
             left = [k for k in range(len(more)) if k not in parts]
@@ -251,7 +250,7 @@ class _Search(Division[Chosen]):
         return np.asarray(total.T.reshape(-1))
 
     def _assigned(self, node: Chosen, slope: Array) -> Chosen:
-        """The assembly of a node that goes farthest down a slope."""
+        """Return the assembly of a node that goes farthest down a slope."""
         from scipy.optimize import linear_sum_assignment
 
         found = []

@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
+from laufruhe.extensions.robust.result import SHARES, AssemblyResult
 from laufruhe.plots.style import AFTER, BEFORE, SKY, entry, headed, page, styled
 from laufruhe.plots.words import INK, label_of
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.tolerances.assembly_result import AssemblyResult
-from laufruhe.solvers.tolerances.result import SHARES
 
 MEAN, WIDE = (0, (1, 2)), 6.4
 
 
 def applies(result: Result) -> bool:
-    """Where measured parts were chosen."""
+    """Return whether measured parts were chosen."""
     return isinstance(result.details, AssemblyResult)
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Share of assemblies that stay below, and where the best one, the given one and mean parts stand."""
+    """Draw the share of assemblies that stay below, and where the best one, the given one and mean parts stand."""
     found, objective = result.details, result.objective
     if not isinstance(found, AssemblyResult) or objective is None:
         raise ValueError("no parts were chosen")

@@ -18,6 +18,7 @@ from laufruhe.errors import ModelError
 from laufruhe.extensions.robust.adversaries import Adversary, DrawnEngines, EveryError, Found
 from laufruhe.extensions.robust.built_engines import evaluated
 from laufruhe.extensions.robust.conclusion import Held, compared, none_built, robust_result
+from laufruhe.extensions.robust.tolerance import Over, built, robust_of, tolerances_of, with_tolerances
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
@@ -31,7 +32,6 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.problem.tolerance import Over, built, robust_of, tolerances_of, with_tolerances
 from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, READINGS, Shown, judged, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
@@ -132,7 +132,7 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
 
 
 def _found(problem: Problem, over: Over, start: tuple[Value, ...], drawing: Result) -> tuple[Adversary, Least]:
-    """Who seeks the worst engines, and the design that is best against it."""
+    """Return who seeks the worst engines, and the design that is best against it."""
     tolerances, samples = tolerances_of(problem), problem.fidelity.samples
     nothing, random = nothing_of(problem, drawing.final.engine), np.random.default_rng(over.seed)
     if over.share is None and tolerances.is_affine:
@@ -204,7 +204,7 @@ class _Program:
         self.conflict: tuple[str, ...] = ()
 
     def add(self, errors: Sequence[Array]) -> bool:
-        """Sets that are not in it yet; whether there were any."""
+        """Add sets that are not in it yet, and return whether there were any."""
         new = [z for z in errors if all(np.abs(z - own).max(initial=0.0) > SAME for own in self.errors)]
         while self.errors and len(self.errors) + len(new) > MOST_SCENARIOS:
             least = int(np.argmin(self.shares)) if self.shares else 0
@@ -220,16 +220,16 @@ class _Program:
         return bool(new)
 
     def lower(self, excess: float) -> None:
-        """Limits by a little more than what one is passed by."""
+        """Lower limits by a little more than what one is passed by."""
         self.margin, self.margins = self.margin + 1.05 * excess, self.margins + 1
 
     @property
     def angles(self) -> int:
-        """Of the fidelity within the period of all loads."""
+        """Angles of the fidelity within the period of all loads."""
         return max(model.full_samples for model in self.models)
 
     def at(self, samples: int, averaged: bool = False) -> tuple[AffineProblem, list[tuple[int, Limit]]]:
-        """All sets at so many angles, and of every limit the set and the limit that it is of."""
+        """Return all sets at so many angles, and of every limit the set and the limit that it is of."""
         parts = [model.at(samples, averaged) for model in self.models]
         limits = [(k, limit, own) for k, part in enumerate(parts)
                   for limit, own in zip(self.problem.load_limits, part.limits, strict=True)
@@ -243,7 +243,7 @@ class _Program:
         ), [(k, limit) for k, limit, _ in limits]
 
     def solved(self, samples: int) -> tuple[tuple[Value, ...], float] | None:
-        """Its optimum and what no design goes under; None where no design keeps the limits at these angles."""
+        """Return its optimum and the bound of all designs; None where no design keeps the limits at these angles."""
         coarse, owners = self.at(samples)
         coarse = tightened(coarse, self.margin)
         solution = solve_cones(coarse)
@@ -268,13 +268,13 @@ class _Program:
         return tuple(domain.complex_value(solution.x) for domain in coarse.domains), bound.value
 
     def level(self, values: Sequence[Value]) -> float:
-        """The largest objective of a design with the errors that are in it."""
+        """Return the largest objective of a design with the errors that are in it."""
         found = (evaluated(model.problem, values, self.samples) for model in self.models)
         return max(objective_value(self.problem, each) for each in found)
 
 
 def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], nothing: float) -> Least:
-    """The design whose worst engine is least, from a given one (R8)."""
+    """Return the design whose worst engine is least, from a given one (R8)."""
     found = seeker.at(start, proven=not problem.decisions)
     best = Least(start, found, 0.0, Held((found.errors[0],), (1.0,), ((),)), 1, 0, seeker.samples)
     if not problem.decisions:
@@ -331,7 +331,7 @@ def _read_under(seeker: Adversary, best: Least, nothing: float) -> Least:
 
 
 def _kept(program: _Program, seeker: Adversary, best: Least) -> Least:
-    """A design that keeps its limits by what is proven too, where that is a little more than the worst found."""
+    """Return a design that keeps its limits by what is proven too, where that is a little more than the worst found."""
     program.margin = best.margin
     for _ in in_time(range(MOST_MARGINS)):
         if not KEPT < best.found.excess <= SMALL:
@@ -355,7 +355,7 @@ def _level(seeker: DrawnEngines, values: Sequence[Value], share: float) -> float
 def _least_share(
     problem: Problem, seeker: DrawnEngines, start: tuple[Value, ...], share: float, nothing: float
 ) -> Least:
-    """The design that a share of the drawn engines stays below least, as far as a search finds it (R9)."""
+    """Return the design that a share of the drawn engines stays below least, as far as a search finds it (R9)."""
     below = math.ceil(share * len(seeker.errors))
     values, best = start, None
     for _ in in_time(range(OUTER)):

@@ -27,28 +27,28 @@ SIGMAS = 3.0
 
 
 class Law(StrEnum):
-    """How errors lie within their tolerance."""
+    """Distribution of errors within their tolerance."""
 
     UNIFORM = "uniform"
     NORMAL = "normal"
 
 
 class Scope(StrEnum):
-    """Whether every piece has an error of its own, or all have the same."""
+    """Extent of an error: each piece has one of its own, or all have the same."""
 
     PIECE = "piece"
     BATCH = "batch"
 
 
 class ErrorDrive(Protocol):
-    """What one error moves."""
+    """Part of an engine that an error moves."""
 
     @property
     def is_affine(self) -> bool:
-        """Whether every load is affine in it together with all others of which the same is true."""
+        """Return whether every load is affine in it together with all others of which the same is true."""
 
     def moved(self, drawing: Drawing, error: complex, /) -> Drawing:
-        """The drawing with this error, in units of its largest size."""
+        """Return the drawing with this error, in units of its largest size."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class PistonDrive:
     is_affine: ClassVar[bool] = True
 
     def moved(self, drawing: Drawing, error: complex) -> Drawing:
-        """Of one cylinder."""
+        """Return the drawing with the mass of one cylinder moved."""
         parts = list(drawing.engine.slider_cranks)
         part = parts[self.cylinder]
         mass = part.reciprocating_mass + self.gain * error.real
@@ -79,11 +79,11 @@ class AddedDrive:
     is_affine: ClassVar[bool] = True
 
     def moved(self, drawing: Drawing, error: complex) -> Drawing:
-        """One rotor more."""
+        """Return the drawing with one rotor more."""
         return replace(drawing, engine=replace(drawing.engine, rotors=(*drawing.engine.rotors, self.rotor(error))))
 
     def rotor(self, error: complex) -> Rotor:
-        """What is added."""
+        """Return the rotor that is added."""
         return Rotor(self.name, self.x, self.gain * error, self.shaft, Role.THROW)
 
 
@@ -96,7 +96,7 @@ class ShareDrive:
     is_affine: ClassVar[bool] = True
 
     def moved(self, drawing: Drawing, error: complex) -> Drawing:
-        """Of the rotor, and of what drives it."""
+        """Return the drawing with the rotor, and what drives it, moved."""
         factor = 1.0 + self.share * error.real
         rotors = tuple(
             replace(r, unbalance=factor * r.unbalance) if r.name == self.rotor else r for r in drawing.engine.rotors
@@ -132,11 +132,11 @@ class FileDrive:
     is_affine: ClassVar[bool] = False
 
     def moved(self, drawing: Drawing, _: complex) -> Drawing:
-        """Nothing: files put the problem together."""
+        """Return the drawing as it is: files put the problem together."""
         return drawing
 
     def written(self, error: complex) -> str | float:
-        """The number as a file has it."""
+        """Return the number as a file has it."""
         value = self.number + self.gain * error.real
         return f"{value!r} {self.unit}" if self.unit else value
 
@@ -161,7 +161,7 @@ class Error:
 
     @property
     def is_affine(self) -> bool:
-        """Whether every load is affine in it."""
+        """Return whether every load is affine in it."""
         return all(drive.is_affine for drive in self.drives)
 
 
@@ -192,7 +192,7 @@ class Tolerance:
     scale: float = 1.0
 
     def draw(self, random: np.random.Generator, count: int) -> Array:
-        """Errors of many engines, shape (count, columns): even over their interval or disc, or normal within it."""
+        """Draw errors of many engines, shape (count, columns), even over interval or disc, or normal within it."""
         parts = [self._one(random, count, error.width) for error in self.errors]
         return np.concatenate(parts, axis=1)
 
@@ -206,7 +206,7 @@ class Tolerance:
 
 
 def _normal(random: np.random.Generator, count: int, width: int) -> Array:
-    """Normal errors, those beyond the tolerance drawn again."""
+    """Return normal errors, those beyond the tolerance drawn again."""
     found = random.normal(0.0, 1.0 / SIGMAS, (count, width))
     while (out := np.hypot.reduce(found, axis=1) > 1.0).any():
         found[out] = random.normal(0.0, 1.0 / SIGMAS, (int(out.sum()), width))
@@ -215,7 +215,7 @@ def _normal(random: np.random.Generator, count: int, width: int) -> Array:
 
 @dataclass(frozen=True)
 class Over:
-    """Of which built engines what is minimised and limited is taken.
+    """Choice of the built engines that what is minimised and limited is taken of.
 
     Attributes
     ----------
@@ -232,7 +232,7 @@ class Over:
     seed: int = 0
 
     def named(self, measure: str, is_affine: bool) -> str:
-        """What is minimised, in words."""
+        """Return what is minimised, in words."""
         if self.share is not None:
             return f"{measure}, {100.0 * self.share:g} % of engines below"
         return f"{measure}, worst case" if is_affine else f"{measure}, worst of {self.engines} drawn engines"
@@ -252,17 +252,17 @@ class Tolerances:
 
     @property
     def acting(self) -> Tolerances:
-        """Without those of no size."""
+        """Tolerances but those of no size."""
         return replace(self, each=tuple(t for t in self.each if t.size * t.scale > 0.0))
 
     @cached_property
     def errors(self) -> tuple[Error, ...]:
-        """Of all tolerances."""
+        """Errors of all tolerances."""
         return tuple(error for tolerance in self.each for error in tolerance.errors)
 
     @cached_property
     def columns(self) -> tuple[slice, ...]:
-        """Of every error in the vector of all."""
+        """Columns of every error in the vector of all."""
         ends = np.cumsum([0, *(error.width for error in self.errors)])
         return tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
 
@@ -273,11 +273,11 @@ class Tolerances:
 
     @property
     def is_affine(self) -> bool:
-        """Whether every load is affine in all errors together."""
+        """Return whether every load is affine in all errors together."""
         return all(error.is_affine for error in self.errors)
 
     def columns_of(self, name: str) -> slice:
-        """Of one tolerance in the vector of all errors."""
+        """Return the columns of one tolerance in the vector of all errors."""
         start = 0
         for tolerance in self.each:
             width = sum(error.width for error in tolerance.errors)
@@ -287,16 +287,16 @@ class Tolerances:
         raise KeyError(name)
 
     def scaled(self, name: str, factor: float) -> Tolerances:
-        """One of them so many times as wide."""
+        """Return all with one of them so many times as wide."""
         each = tuple(replace(t, scale=factor * t.scale) if t.name == name else t for t in self.each)
         return replace(self, each=each)
 
     def draw(self, random: np.random.Generator, count: int) -> Array:
-        """Errors of many engines, shape (count, columns)."""
+        """Return errors of many engines, shape (count, columns)."""
         return np.concatenate([np.zeros((count, 0)), *(t.draw(random, count) for t in self.each)], axis=1)
 
     def mirrored(self, random: np.random.Generator, count: int) -> Array:
-        """As many engines, half of them the others with every error turned round (R9)."""
+        """Return errors of as many engines, half of them the others with every error turned round (R9)."""
         half = self.draw(random, -(-count // 2))
         return np.concatenate([half, -half])
 

@@ -1,10 +1,9 @@
-"""Study parts on what balancing costs: their files, what they say, and what bad ones are told."""
+"""Files of the study part on tolerances: what they say, and what bad ones are told."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 import xarray as xr
 from typer.testing import CliRunner
@@ -16,7 +15,6 @@ from laufruhe.plots.picture import draw
 from laufruhe.report.document import Document
 from laufruhe.report.study_report import told as blocks_of
 from laufruhe.studies.kinds import KINDS
-from laufruhe.studies.kinds.free_forces import printed_agree
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
 from problem_files import PROBLEMS, written
@@ -39,19 +37,6 @@ claim = "promises nothing"
 name = "six"
 problem = "{PROBLEMS}/tractor-six.toml"
 claim = "matters"
-"""
-LAYOUTS = f"""
-title = "t"
-[study]
-[[study.parts]]
-name = "layouts"
-kind = "free forces"
-title = "Layouts"
-spacing = "125 mm"
-[[study.parts.cases]]
-name = "five"
-problem = "{PROBLEMS}/inline-five.toml"
-literature = {{ couple_1 = 0.449, couple_2 = 4.9798, force_2 = 0.001 }}
 """
 
 
@@ -79,16 +64,6 @@ def test_tolerances_keep_to_the_file(tmp_path: Path) -> None:
     table = told("tolerance", data)
     assert "| finer balancing, six | matters |" in table
     draw(KINDS["tolerance"].picture(data))
-
-
-def test_free_forces_count_what_agrees(tmp_path: Path) -> None:
-    data = part_of(tmp_path, LAYOUTS)
-    assert printed_agree(data) == (2, 3)
-    assert np.isnan(float(data["force_printed"].sel(case="five", order=1)))
-    table = told("free forces", data)
-    assert "| five | 144 | 0 | 0.4490 (0.449) | 0 (0.001) | 4.9798 (4.9798) |" in table
-    assert "2 of 3 printed values" in table
-    draw(KINDS["free forces"].picture(data))
 
 
 BAD_TOLERANCES = [

@@ -5,25 +5,25 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from laufruhe.extensions.robust.result import SHARES, RobustResult
 from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled, thin
 from laufruhe.plots.words import FAINT, INK, SMALL, label_of
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.tolerances.result import SHARES, RobustResult
 
 WORST, DRAWN = (0, (4, 2)), (0, (1, 2))
 MOST_TOLERANCES, WIDE = 8, 6.4
 
 
 def applies(result: Result) -> bool:
-    """Where built engines were decided for."""
+    """Return whether built engines were decided for."""
     return isinstance(result.details, RobustResult)
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """What share of engines stays below, design by design, over bars of what tolerances cost."""
+    """Draw the share of engines that stays below, design by design, over bars of what tolerances cost."""
     found, unit = result.details, objective_unit(result)
     if not isinstance(found, RobustResult):
         raise ValueError("nothing was decided for built engines")

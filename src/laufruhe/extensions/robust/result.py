@@ -1,12 +1,11 @@
-"""What a robust design is told of: two designs under tolerance, and what each tolerance costs."""
+"""Details of results: two designs under tolerance with the price of each, and parts that were chosen."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
+from laufruhe.extensions.robust.tolerance import Over
 from laufruhe.problem.evaluation import Evaluation
-from laufruhe.problem.tolerance import Over
 from laufruhe.solvers.result import Details
 
 SHARE = 0.95
@@ -18,7 +17,7 @@ CONFIDENCE = 0.99
 
 @dataclass(frozen=True)
 class BuiltDesign:
-    """One design and the engines built to it [SI].
+    """Design and the engines built to it [SI].
 
     Attributes
     ----------
@@ -48,7 +47,7 @@ class BuiltDesign:
 
 @dataclass(frozen=True)
 class PricedTolerance:
-    """One tolerance, and by how much the objective falls for each unit by which it is narrowed.
+    """Tolerance, and by how much the objective falls for each unit by which it is narrowed.
 
     Attributes
     ----------
@@ -115,14 +114,49 @@ class RobustResult(Details):
         """Evaluation that the objective is of."""
         return self.worst_engine
 
-    def record(self) -> dict[str, Any]:
-        """Return `robust`: two designs under tolerance, and the price of each tolerance."""
-        names = "exact share scenarios divisions engines seed exceeding exceeding_at_most"
-        designs = {"best_drawing": self.nominal, "decided": self.robust}
-        told: dict[str, Any] = {"over": "worst case" if self.over.share is None else self.over.share}
-        told |= {name: getattr(self, name) for name in names.split()}
-        for key, design in designs.items():
-            decisions = {name: {"value": value, "unit": unit} for name, value, unit in design.decisions}
-            told[key] = {name: getattr(design, name) for name in ["drawing", "worst", "share", "low", "high"]}
-            told[key] |= {"quantiles": list(design.quantiles), "decisions": decisions}
-        return {"robust": {**told, "tolerances": [asdict(tolerance) for tolerance in self.tolerances]}}
+
+@dataclass(frozen=True)
+class Place:
+    """Parts of a cylinder.
+
+    Attributes
+    ----------
+    parts
+        Of every lot the number of the part in the order of its file, from one.
+    masses
+        Of each what goes to and fro, and what turns with the pin [kg].
+    """
+
+    cylinder: str
+    parts: tuple[int, ...]
+    masses: tuple[tuple[float, float], ...]
+
+
+@dataclass(frozen=True)
+class AssemblyResult(Details):
+    """The best assembly beside others [SI].
+
+    Attributes
+    ----------
+    kinds
+        Of the lots.
+    assemblies
+        That there are in all.
+    looked_at
+        Parts of them that were bounded.
+    quantiles
+        Of assemblies at random.
+    worst
+        Of these.
+    mean_parts
+        The objective if every part had the mean mass of its lot.
+    """
+
+    kinds: tuple[str, ...]
+    places: tuple[Place, ...]
+    assemblies: float
+    looked_at: int
+    quantiles: tuple[float, ...]
+    worst: float
+    mean_parts: float
+    random: int

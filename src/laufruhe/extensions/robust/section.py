@@ -1,0 +1,135 @@
+"""Sections of reports: two designs under tolerance with the price of each, and parts that were chosen."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from laufruhe.extensions.robust.result import (
+    CONFIDENCE,
+    SHARES,
+    AssemblyResult,
+    BuiltDesign,
+    Place,
+    PricedTolerance,
+    RobustResult,
+)
+from laufruhe.present.measures import objective_unit
+from laufruhe.present.numbers import figure, number, percent, price_of, with_unit
+from laufruhe.report.grid import Grid
+from laufruhe.report.section import Section
+from laufruhe.report.sheet import Sheet
+from laufruhe.solvers.result import Result
+
+
+def _tolerance_tables(result: Result) -> list[Grid]:
+    """Return two designs, and a row a tolerance."""
+    found, unit = result.details, objective_unit(result)
+    assert isinstance(found, RobustResult)
+    worst = "worst case" if found.exact else "worst drawn"
+    below, sure = f"{100.0 * found.share:g} % of engines below", f"{100.0 * CONFIDENCE:g} % sure"
+    head = ("design", "as drawn", worst, below, sure)
+    rows = [_design(design, unit) for design in (found.nominal, found.robust)]
+    pairs = ((getattr(found.nominal, key), getattr(found.robust, key)) for key in ("drawing", "worst", "share"))
+    rows.append(("price", *(percent(b / a - 1.0) if a else "-" for a, b in pairs), ""))
+    told = ("tolerance, dearest first", "is", "errors", "shadow price", "costs")
+    own = [_tolerance(tolerance, unit) for tolerance in found.tolerances]
+    note = "Costs: shadow price times tolerance, an estimate of what removing the tolerance would save."
+    return [
+        Grid("Under tolerance", head, rows, note=_checked(found), sheet="under-tolerance"),
+        Grid("Tolerances", told, own, 2, note=note, sheet="tolerances"),
+    ]
+
+
+def _design(design: BuiltDesign, unit: str) -> tuple[str, ...]:
+    low, high = (number(value, 5) for value in (design.low, design.high))
+    values = (figure(value, unit, 5) for value in (design.drawing, design.worst, design.share))
+    return (design.name, *values, f"{low} to {high}")
+
+
+def _tolerance(tolerance: PricedTolerance, unit: str) -> tuple[str, ...]:
+    share = not tolerance.unit
+    size = f"{100.0 * tolerance.size:.3g} %" if share else with_unit(tolerance.size, tolerance.unit)
+    price = (
+        f"{number(0.01 * tolerance.price)} {unit} per %" if share else price_of(tolerance.price, unit, tolerance.unit)
+    )
+    errors = f"{tolerance.errors}, {tolerance.law}" + (", batch" if tolerance.scope == "batch" else "")
+    return tolerance.name, f"± {size}", errors, price, figure(tolerance.saving, unit, 3)
+
+
+def _checked(found: RobustResult) -> str:
+    told = f"Checked: of {found.engines:,} other engines {found.exceeding} exceed the objective"
+    return f"{told}, so at most {100.0 * found.exceeding_at_most:.2g} % of all do ({100.0 * CONFIDENCE:g} % sure)."
+
+
+def _assembly_tables(result: Result) -> list[Grid]:
+    """Return a row a cylinder, with the number of each part in the order of its file."""
+    found, unit = result.details, objective_unit(result)
+    assert isinstance(found, AssemblyResult)
+    head = ["cylinder"]
+    for kind in found.kinds:
+        head += [kind, "mass [g]"]
+    rows = [_row(place) for place in found.places]
+    return [Grid("Assembly", head, rows, note=_beside(found, unit), sheet="assembly")]
+
+
+def _row(place: Place) -> tuple[str, ...]:
+    cells = [place.cylinder]
+    for part, masses in zip(place.parts, place.masses, strict=True):
+        cells += [f"no. {part}", " + ".join(f"{1e3 * mass:.1f}" for mass in masses if mass)]
+    return tuple(cells)
+
+
+def _beside(found: AssemblyResult, unit: str) -> str:
+    middle, most = (figure(found.quantiles[int(share * (len(found.quantiles) - 1))], unit) for share in (0.5, 0.95))
+    told = f"Of {found.assemblies:,.0f} assemblies; {found.random} of them at random"
+    worst, mean = figure(found.worst, unit), figure(found.mean_parts, unit)
+    return (
+        f"{told}: half above {middle}, one of twenty above {most}, the worst {worst}. With parts of mean mass {mean}."
+    )
+
+
+def _tolerance_record(result: Result) -> dict[str, Any]:
+    """Return two designs under tolerance, and the price of each tolerance [SI]."""
+    found = result.details
+    assert isinstance(found, RobustResult)
+    names = "exact share scenarios divisions engines seed exceeding exceeding_at_most"
+    told: dict[str, Any] = {"over": "worst case" if found.over.share is None else found.over.share}
+    told |= {name: getattr(found, name) for name in names.split()}
+    for key, design in (("best_drawing", found.nominal), ("decided", found.robust)):
+        decisions = {name: {"value": value, "unit": unit} for name, value, unit in design.decisions}
+        told[key] = {name: getattr(design, name) for name in ["drawing", "worst", "share", "low", "high"]}
+        told[key] |= {"quantiles": list(design.quantiles), "decisions": decisions}
+    return {**told, "tolerances": [asdict(tolerance) for tolerance in found.tolerances]}
+
+
+def _assembly_record(result: Result) -> dict[str, Any]:
+    """Return the part of every lot in each cylinder, counted from one."""
+    found = result.details
+    assert isinstance(found, AssemblyResult)
+    told = {name: getattr(found, name) for name in ["assemblies", "looked_at", "random", "worst", "mean_parts"]}
+    places = [{"cylinder": one.cylinder, **dict(zip(found.kinds, one.parts, strict=True))} for one in found.places]
+    return {**told, "quantiles": list(found.quantiles), "places": places}
+
+
+def _shares(result: Result) -> Sheet:
+    """Return the share of engines built, or of assemblies, that stay below a value."""
+    unit, found = objective_unit(result) or "-", result.details
+    if isinstance(found, RobustResult):
+        columns = {"best drawing": found.nominal.quantiles, "decided": found.robust.quantiles}
+    else:
+        assert isinstance(found, AssemblyResult)
+        columns = {"assemblies at random": found.quantiles}
+    rows = [[100.0 * share, *values] for share, *values in zip(SHARES, *columns.values(), strict=True)]
+    return Sheet(["below [%]", *(f"{name} [{unit}]" for name in columns)], rows)
+
+
+TOLERANCES = Section(
+    "robust", lambda result: isinstance(result.details, RobustResult), _tolerance_tables, _tolerance_record,
+    ("under-tolerance", "tolerances"),
+    {"shares": (lambda result: isinstance(result.details, RobustResult | AssemblyResult), _shares)},
+)  # fmt: skip
+ASSEMBLY = Section(
+    "assembly", lambda result: isinstance(result.details, AssemblyResult), _assembly_tables, _assembly_record,
+    ("assembly",),
+)  # fmt: skip

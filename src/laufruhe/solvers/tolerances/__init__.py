@@ -1,1 +1,0 @@
-"""Designs for engines as they are built."""

@@ -1,0 +1,51 @@
+"""Study parts of free forces: their files and what they say."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from laufruhe.plots.picture import draw
+from laufruhe.report.document import Document
+from laufruhe.report.study_report import told as blocks_of
+from laufruhe.studies.kinds import KINDS
+from laufruhe.studies.kinds.free_forces import printed_agree
+from laufruhe.studies.reader import load_study
+from laufruhe.studies.runner import run
+from problem_files import PROBLEMS, written
+
+LAYOUTS = f"""
+title = "t"
+[study]
+[[study.parts]]
+name = "layouts"
+kind = "free forces"
+title = "Layouts"
+spacing = "125 mm"
+[[study.parts.cases]]
+name = "five"
+problem = "{PROBLEMS}/inline-five.toml"
+literature = {{ couple_1 = 0.449, couple_2 = 4.9798, force_2 = 0.001 }}
+"""
+
+
+def part_of(folder: Path, text: str) -> xr.Dataset:
+    datasets, _ = run(load_study(written(folder, text, "study")), folder, folder / "kept")
+    return next(iter(datasets.values()))
+
+
+def told(kind: str, data: xr.Dataset) -> str:
+    blocks = tuple(block for text in KINDS[kind].table(data) for block in blocks_of(text))
+    return Document("part", blocks).as_markdown(".png")
+
+
+def test_free_forces_count_what_agrees(tmp_path: Path) -> None:
+    data = part_of(tmp_path, LAYOUTS)
+    assert printed_agree(data) == (2, 3)
+    assert np.isnan(float(data["force_printed"].sel(case="five", order=1)))
+    table = told("free forces", data)
+    assert "| five | 144 | 0 | 0.4490 (0.449) | 0 (0.001) | 4.9798 (4.9798) |" in table
+    assert "2 of 3 printed values" in table
+    draw(KINDS["free forces"].picture(data))
