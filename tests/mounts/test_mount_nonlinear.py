@@ -228,24 +228,6 @@ def test_what_is_convex_in_a_sum_is_bounded_by_its_own_optimum(tmp_path):
 
 
 @pytest.mark.slow
-def test_forces_beside_other_terms_are_bounded_by_themselves(tmp_path):
-    """A sum of forces of mounts, of the block and of stiffness is not under what each of them is at least."""
-    problem = joint_problem(tmp_path, "rms")
-    shaken = Measure(channels.SHAKING_FORCE, NORMS["rms"])
-    terms = (*problem.objective, Term(shaken, 0.1), Term(Measure(channels.TOTAL_STIFFNESS), 1e-5))
-    search = replace(problem.search, boxes=4)
-    alone = replace(problem, decisions=problem.mount_decisions, limits=(), search=search)
-    mixed = replace(alone, objective=terms)
-    near = [d.lower if d.is_stiffness else d.start for d in mixed.decisions]
-    bound = mounts_bound(mixed, near)
-    assert bound > mounts_bound(mixed) + 0.5 * objective_value(alone, evaluate(alone, alone.design(near)))
-    generator = np.random.default_rng(5)
-    for _ in range(40):
-        values = [d.lower + generator.random() * (d.upper - d.lower) for d in mixed.decisions]
-        assert objective_value(mixed, evaluate(mixed, mixed.design(values))) >= bound
-
-
-@pytest.mark.slow
 def test_joint_design_keeps_its_limits_and_beats_each_part_alone(solved):
     problem, result = solved
     assert result.status is Status.FEASIBLE
