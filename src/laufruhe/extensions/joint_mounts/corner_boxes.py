@@ -36,7 +36,7 @@ from laufruhe.prove.best_first import Around, Bounded, Box, Divided
 from laufruhe.prove.certificate import Multipliers
 from laufruhe.prove.mounts.box_series import balanced, rest_of
 from laufruhe.prove.mounts.named import named_part
-from laufruhe.prove.mounts.subdivision import EVEN
+from laufruhe.prove.mounts.subdivision import EVEN, divides
 from laufruhe.prove.witness import Known, check_around
 
 MOST_OPEN = 5
@@ -76,14 +76,13 @@ class Corner:
 
 
 def mixes_corners(problem: Problem) -> bool:
-    """Whether all that is open are unbalances and few numbers of mounts, and all that is asked are loads."""
-    terms, decisions = problem.load_terms, problem.mount_decisions
-    if (
-        named_part(problem) is not problem
-        or problem.mount_terms
-        or len(terms) < len(problem.objective)
-        or len(decisions) > MOST_OPEN
-    ):
+    """Return whether unbalances or other numbers of mounts are open, several but few, and all that is asked are loads.
+
+    Boxes of one number, and of stiffness alone, are few without corners.
+    """
+    terms, few = problem.load_terms, len(problem.decisions) > 1 and len(problem.mount_decisions) <= MOST_OPEN
+    of_loads = named_part(problem) is problem and not problem.mount_terms and len(terms) == len(problem.objective)
+    if not (few and of_loads) or divides(problem):
         return False
     loads = [measure for measure in problem.measures if measure.is_load]
     plain = all(not measure.load.adds_up for measure in loads if measure.on_mounts) and not problem.known_rows

@@ -13,7 +13,6 @@ from laufruhe.extensions.joint_mounts.load_boxes import is_boxed, load_bounds
 from laufruhe.extensions.joint_mounts.open_throws import throws_at
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import domains_of, vector_of
-from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.mounts.provers import Prover, Question
 from laufruhe.prove.mounts.subdivision import divides
@@ -23,11 +22,6 @@ from laufruhe.solvers.told_limits import over_read
 
 EARLY = 0.1
 """Share of the boxes that is tried before other provers go on."""
-
-
-def mixes(problem: Problem) -> bool:
-    """Return whether unbalances are open beside several numbers of mounts; boxes of one number are few."""
-    return len(problem.decisions) > 1 and not divides(problem) and mixes_corners(problem)
 
 
 def corner_answers(question: Question) -> Iterator[Divided]:
@@ -81,7 +75,7 @@ def _known(question: Question) -> Known | None:
     return replace(known, place=np.append(known.place, columns))
 
 
-CORNERS = Prover("boxes of mounts, with unbalances", mixes, corner_answers, "boxes of stiffness")
+CORNERS = Prover("boxes of mounts, with unbalances", mixes_corners, corner_answers, "boxes of stiffness")
 LOADS = Prover(
     "boxes of mounts and unbalances", lambda problem: not divides(problem) and is_boxed(problem), load_answers
 )

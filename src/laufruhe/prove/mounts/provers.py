@@ -86,8 +86,7 @@ class Prover:
 
 
 def _stiffness_bounds(question: Question) -> Iterator[Divided]:
-    shares = (EARLY, 1.0)
-    yield from divided_bounds(question.problem, question.value, question.room, shares, question.known)
+    yield from divided_bounds(question.problem, question.value, question.room, (EARLY, 1.0), question.known)
 
 
 PROVERS = (Prover("boxes of stiffness", divides, _stiffness_bounds),)
