@@ -87,7 +87,13 @@ class Extension:
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {"economics": "economics", "replication": "replication", "tolerance": "robust"},
     "commands": {"page": "served_page"},
-    "keys": {"torsion": "torsion", "tolerances": "robust", "robust": "robust", "assembly": "robust"},
+    "keys": {
+        "torsion": "torsion",
+        "tolerances": "robust",
+        "robust": "robust",
+        "assembly": "robust",
+        "run_up": "run_ups",
+    },
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
 }
 """Extensions of this package by what they add to tables: whoever asks for it without the folder is told its name."""

@@ -8,20 +8,14 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-import laufruhe
-from laufruhe.errors import InputError, ModelError
+from laufruhe.errors import ModelError
 from laufruhe.machine import Block, Mount
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.run_up import periodic_state, run_through
-from laufruhe.physics.speed_map import split_loads
 from laufruhe.physics.time_model import time_model
 from laufruhe.physics.time_mounting import INTEGRATION
-from laufruhe.problem.channels import mounting_in
-from laufruhe.report.json_result import as_dict
-from laufruhe.solvers import Status
 from mounts.powertrain import powertrain, random_mounting, wrench
-from problem_files import PROBLEMS, loaded
 
 RPM = np.pi / 30.0
 
@@ -178,63 +172,3 @@ def test_roll_of_the_block_is_the_turn_that_its_mounts_tell():
         global_axes = np.einsum("mab,ma->mb", np.array([m.orientation for m in mounting.mounts]), own)
         motion, *_ = np.linalg.lstsq(np.vstack(rows), global_axes.reshape(-1), rcond=None)
         assert model.roll @ y == pytest.approx(motion[3], rel=1e-9)
-
-
-RUN = '[run_up]\nup_to = "1000 rpm"\ntime = "0.5 s"\nshut_down_time = "0.8 s"\n'
-
-
-def limited(most: str) -> str:
-    return f'[[constraints]]\nlimit = "run-up travel"\nmax = "{most}"\n'
-
-
-@pytest.fixture(scope="module")
-def soft() -> str:
-    text = (PROBLEMS / "soft-mounts-run-up.toml").read_text(encoding="utf-8")
-    return text[: text.index("[run_up]")]
-
-
-@pytest.mark.slow
-def test_a_run_up_that_the_best_design_keeps_changes_nothing(soft, tmp_path):
-    """Where the best design without it keeps it, that stays proven; what no stiffness keeps is named."""
-    soft += "[search]\nstarts = 1\n"
-    alone = laufruhe.solve(loaded(tmp_path, soft))
-    kept = laufruhe.solve(loaded(tmp_path, soft + RUN + limited("2 mm")))
-    assert kept.objective.value == pytest.approx(alone.objective.value)
-    assert kept.certificate.kind == alone.certificate.kind
-    found = next(limit for limit in kept.limits if limit.name == "run-up travel")
-    assert 0.0 < found.value < 2e-3
-    quick = RUN.replace("0.5 s", "0.2 s").replace("0.8 s", "0.2 s")
-    broken = laufruhe.solve(loaded(tmp_path, soft + quick + limited("0.1 mm")))
-    assert broken.status is Status.INFEASIBLE
-    assert broken.certificate is None
-    assert broken.conflict == ("run-up travel",)
-    record = as_dict(kept)["run_up"]
-    assert record["up_to"] == pytest.approx(1000.0 * RPM)
-    assert max(record[way]["travel"] for way in ("up", "down")) == found.value
-    # integrated at ten times the steps and a thousandth of the tolerance
-    design = kept.final
-    point = min(kept.problem.points, key=lambda p: p.speed)
-    loads = split_loads(design.engine, point, design.fidelity)
-    fine = run_through(mounting_in(design.engine), *loads, 0.0, 1000.0 * RPM, 0.5, 600, tolerance=1e-8)
-    assert record["up"]["travel"] == pytest.approx(fine.worst_travel, rel=1e-2)
-    assert record["up"]["twist"] == pytest.approx(fine.worst_twist, rel=1e-2)
-    assert record["up"]["force"] == pytest.approx(fine.worst_force, rel=1e-2)
-
-
-@pytest.mark.parametrize(
-    ("run", "rule"),
-    [
-        ("", "needs elastic mounts that an engine is run up on"),
-        (RUN.replace("up_to", 'operating_point = "sprint"\nup_to'), "is none here"),
-        (RUN.replace('"0.5 s"', '"0 s"'), "must be more than"),
-    ],
-)
-def test_run_ups_that_say_too_little(soft, run, rule, tmp_path):
-    with pytest.raises(InputError, match=rule):
-        loaded(tmp_path, soft + run + limited("1 mm"))
-
-
-def test_a_run_up_needs_springs(tmp_path):
-    rigid = (PROBLEMS / "tractor-single.toml").read_text(encoding="utf-8")
-    with pytest.raises(InputError, match="needs elastic mounts, that have resonances"):
-        loaded(tmp_path, rigid + RUN)

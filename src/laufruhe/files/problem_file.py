@@ -28,7 +28,6 @@ from laufruhe.files.operating_points import OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
 from laufruhe.files.quantities import QuantitiesTable
 from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
-from laufruhe.files.run_up import RunUpTable
 from laufruhe.files.running_gear import RunningGearTable
 from laufruhe.machine.layouts import Throw
 from laufruhe.problem.problem import Problem
@@ -130,7 +129,6 @@ class ProblemFile(Table):
     friction: FrictionTable | None = None
     mounts: MountsTable | None = None
     block: BlockTable | None = None
-    run_up: RunUpTable | None = None
     load_cases: list[LoadCaseTable] = Field(default_factory=list)
     main_bearings: list[MainBearingTable] = Field(default_factory=list)
     running_gear: RunningGearTable | None = None

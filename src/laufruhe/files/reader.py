@@ -37,7 +37,6 @@ from laufruhe.files.phasing import is_open, opened
 from laufruhe.files.problem_file import EXTENSION_KEYS, Given, Note, ProblemFile, file_model
 from laufruhe.files.quantities import followed
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
-from laufruhe.files.run_up import run_of
 from laufruhe.files.running_gear import size_decisions, weighed
 from laufruhe.files.scene import Scene
 from laufruhe.files.toml_depth import line_deeper_than
@@ -314,10 +313,9 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     rotors, (wheel, of_wheel) = tuple(collected.rotors), flywheel_of(file.flywheel, file.fidelity.own("crank_inertia"))
     brake = _brake(file, cylinders, cycle, path.parent)
     points = operating_points(told, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)
-    run = run_of(file.run_up, found.block, found.mounts, [point.name for point in points])
     geared, of_geared = geared_of(file.geared_inertias)
     engine = Engine(
-        file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, wheel, run, gear, geared,
+        file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, wheel, None, gear, geared,
         load_cases_of(file.load_cases, found.block),
     )  # fmt: skip
     of_sizes = _sizes(file, table, told_bearings, bearings, gear)

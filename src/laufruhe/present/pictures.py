@@ -49,13 +49,12 @@ _CAPTIONS = {
     "transmissibility": "Force on the elastic mounts over that on the same mounts if they gave no way.",
     "campbell": "Orders of crank speed against natural frequencies: where they cross, speed is critical.",
     "modes": "Share of each motion in the kinetic energy of each natural mode.",
-    "run_up": "Largest force and travel on any mount, and roll, while the engine runs up and is shut down.",
     "trade": "What slightly uneven firing buys.",
 }
 PICTURES: Mapping[str, Picture] = extended("pictures", Picture, [Picture(*each) for each in _CAPTIONS.items()])
 
 SHEETS = (
-    "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "run-up", "rankings",
+    "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "rankings",
 )  # fmt: skip
 """Curves and tables of a result as files: `report.tables` fills them in full precision."""
 CURVES = (
@@ -65,7 +64,6 @@ CURVES = (
 """Further ones, which `report.curves` fills."""
 PRINTED = (
     "reach", "objectives-in-order", "equal-optima", "weights", "balance-factors", "crankshaft-torque", "load-cases",
-    "through-resonance",
 )  # fmt: skip
 """Tables of the report that are files as they are printed."""
 

@@ -17,7 +17,6 @@ from laufruhe.physics.torque import torque_facts
 from laufruhe.physics.wrench import WRENCH
 from laufruhe.present.measures import is_met, limits_of, moment_orders, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
-from laufruhe.present.run_up import run_of, run_point, runs_up, shown_runs
 from laufruhe.problem.channels import LoadChannel, mounting_in
 from laufruhe.problem.evaluation import Evaluation, measured, over, samples_of
 from laufruhe.problem.static_load import static_part
@@ -241,18 +240,7 @@ def _on_mounts(result: Result) -> Record:
     """Of a block on elastic mounts; travel of every mount, and the force on it, under each load held (C2)."""
     mounting, told = mounting_in(result.final.engine), "motion travel force on_stops"
     cases = {case.name: _of(settled(mounting, case), told) for case in result.final.engine.load_cases}
-    found = {"modes": _modes(result.final), **({"load_cases": cases} if cases else {})}
-    return {**found, **({"run_up": _runs(result)} if runs_up(result) else {})}
-
-
-def _runs(result: Result) -> Record:
-    """The most on any mount, and the largest roll, from rest to a speed and back; null on an endless resonance."""
-    run = run_of(result)
-    most = {
-        way: {"time": getattr(run, way), **_of(found, "force=worst_force travel=worst_travel twist=worst_twist")}
-        for way, found in zip(("up", "down"), shown_runs(result, result.final), strict=True)
-    }
-    return {"up_to": run.speed, "point": run_point(result).name, **most}
+    return {"modes": _modes(result.final), **({"load_cases": cases} if cases else {})}
 
 
 def _phasing(result: Result) -> Record:

@@ -12,13 +12,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from laufruhe.numerics.processes import meanwhile
 from laufruhe.present.measures import has_loads, has_ranking, limits_of, loaded, places_of, ranking_of
 from laufruhe.present.mounting import facts_of, is_elastic
-from laufruhe.present.numbers import DEGREE, RPM
-from laufruhe.present.run_up import runs_up, shown_runs
+from laufruhe.present.numbers import RPM
 from laufruhe.present.speed_curves import speeds_of, transmissibility_of
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
 from laufruhe.problem.evaluation import measured
@@ -98,19 +95,6 @@ def _transmissibility(result: Result) -> Sheet:
     return Sheet(["speed [rpm]", *(head for head, _ in columns)], [list(row) for row in rows] if columns else [])
 
 
-def _run_up(result: Result) -> Sheet:
-    rows = [
-        [design, way, RPM * speed, force, travel, DEGREE * twist]
-        for design, found in loaded(result).items()
-        for way, run in zip(("run-up", "shut-down"), shown_runs(result, found), strict=True)
-        for speed, force, travel, twist in np.column_stack([run.speeds, run.force, run.travel, run.twist]).tolist()
-    ]
-    return Sheet(
-        ["design", "way", "speed [rpm]", "largest mount force [N]", "largest mount travel [m]", "largest roll [deg]"],
-        rows,
-    )
-
-
 def _rankings(result: Result) -> Sheet:
     rows = [
         [rank, star.value, star.lower_bound, star.proven, _degrees(star.throws), ", ".join(star.shafts),
@@ -140,7 +124,6 @@ _SHEETS: Sheets = {
     "orders": (has_loads, lambda result: Sheet.of(orders_of(loaded(result)))),
     "modes": (is_elastic, lambda result: Sheet.of(modes_of(result.designs))),
     "transmissibility": (is_elastic, _transmissibility),
-    "run-up": (lambda result: runs_up(result) and has_loads(result), _run_up),
     "rankings": (has_ranking, _rankings),
     **CURVES,
 }

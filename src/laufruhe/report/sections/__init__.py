@@ -13,7 +13,6 @@ from laufruhe.report.sections import (
     orders,
     ranks,
     reach,
-    run_up,
     stars,
     torque,
     weights,
@@ -22,7 +21,7 @@ from laufruhe.solvers.result import Result
 
 SECTIONS = (
     reach, stars, ranks, decisions, weights, limits, mounts, torque, modes, load_cases,
-    run_up, orders,
+    orders,
 )  # fmt: skip
 
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.fields import Table
-from laufruhe.machine import Block, Mount, Run
+from laufruhe.files.problem_file import Given, Key
+from laufruhe.machine import Run
 from laufruhe.machine.dynamic import FluidTrack
 from laufruhe.machine.mount import every_spring
+from laufruhe.problem.problem import Problem
 
 
 class RunUpTable(Table):
@@ -23,15 +25,14 @@ class RunUpTable(Table):
     )
 
 
-def run_of(table: RunUpTable | None, block: Block | None, mounts: Sequence[Mount], points: Sequence[str]) -> Run | None:
-    """How the engine is run up and shut down."""
-    if table is None:
-        return None
-    if block is None:
+def _read(table: RunUpTable, problem: Problem, __: Given) -> Problem:
+    """Return the problem of an engine that is run up and shut down."""
+    engine, points = problem.engine, [point.name for point in problem.points]
+    if engine.block is None:
         raise Refused(
             "run_up", None, "needs elastic mounts, that have resonances", 'add [mounts] with kind = "elastic"'
         )
-    for _, spring in every_spring(mounts):
+    for _, spring in every_spring(engine.mounts):
         if any(not isinstance(law, FluidTrack) for law in spring.dynamic):
             rule = f"has no law for mount '{spring.name}', whose stiffness was measured over frequency"
             raise Refused("run_up", None, rule, "give it a fluid_track, or leave run_up out")
@@ -39,4 +40,8 @@ def run_of(table: RunUpTable | None, block: Block | None, mounts: Sequence[Mount
         raise Refused(
             "run_up.operating_point", table.operating_point, "is none here", nearest(table.operating_point, points)
         )
-    return Run(table.up_to, table.time, table.shut_down_time or table.time, table.operating_point or "")
+    run = Run(table.up_to, table.time, table.shut_down_time or table.time, table.operating_point or "")
+    return replace(problem, engine=replace(engine, run=run))
+
+
+KEY = Key("run_up", RunUpTable, _read)

@@ -1,0 +1,11 @@
+"""Engines run up and shut down through resonance: [run_up] of a file, its tables, numbers and picture."""
+
+from laufruhe.extension import Extension
+
+_HERE = "laufruhe.extensions.run_ups"
+EXTENSION = Extension(
+    "run_ups",
+    keys=(f"{_HERE}.file:KEY",),
+    sections=(f"{_HERE}.section:SECTION",),
+    pictures=(f"{_HERE}.pictures:PICTURE",),
+)

@@ -1,0 +1,62 @@
+"""What mounts and block go through between rest and speed."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from laufruhe.extensions.run_ups.facts import run_of, run_point, runs_up, shown_runs
+from laufruhe.present.measures import has_loads, loaded
+from laufruhe.present.numbers import RPM, figure
+from laufruhe.report.grid import Grid
+from laufruhe.report.section import Section
+from laufruhe.report.sheet import Sheet
+from laufruhe.solvers.result import Result
+from laufruhe.units import shown
+
+HEAD = ("", "time", "largest force", "largest travel", "largest roll")
+
+
+def _tables(result: Result) -> list[Grid]:
+    """Return run-up and shut-down, where the problem says how these go."""
+    if result.problem.engine.run is None:
+        return []
+    run, (up, down) = run_of(result), shown_runs(result, result.final)
+    rows = tuple(
+        (name, f"{time:g} s", figure(found.worst_force, "N"), figure(found.worst_travel, "m"),
+         figure(found.worst_twist, "rad"))
+        for name, time, found in (("run-up", run.up, up), ("shut-down", run.down, down))
+    )  # fmt: skip
+    note = f"On any mount, between rest and {shown(run.speed, 'rad/s')}, with the gas of {run_point(result).name}."
+    return [Grid("Through resonance", HEAD, rows, note=note, sheet="through-resonance")]
+
+
+def _record(result: Result) -> dict[str, Any]:
+    """Return the most on any mount, and the largest roll, from rest to a speed and back; null on a resonance."""
+    run = run_of(result)
+    most = {
+        way: {"time": time, "force": found.worst_force, "travel": found.worst_travel, "twist": found.worst_twist}
+        for way, time, found in zip(("up", "down"), (run.up, run.down), shown_runs(result, result.final), strict=True)
+    }
+    return {"up_to": run.speed, "point": run_point(result).name, **most}
+
+
+def _over_speed(result: Result) -> Sheet:
+    rows = [
+        [design, way, RPM * speed, force, travel, math.degrees(twist)]
+        for design, found in loaded(result).items()
+        for way, run in zip(("run-up", "shut-down"), shown_runs(result, found), strict=True)
+        for speed, force, travel, twist in np.column_stack([run.speeds, run.force, run.travel, run.twist]).tolist()
+    ]
+    return Sheet(
+        ["design", "way", "speed [rpm]", "largest mount force [N]", "largest mount travel [m]", "largest roll [deg]"],
+        rows,
+    )
+
+
+SECTION = Section(
+    "run_up", runs_up, _tables, _record, ("through-resonance",),
+    {"run-up": (lambda result: runs_up(result) and has_loads(result), _over_speed)},
+)  # fmt: skip
