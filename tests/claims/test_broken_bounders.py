@@ -22,7 +22,6 @@ from laufruhe.prove import certificate
 from laufruhe.prove.boxes.leads import LeadBoxes
 from laufruhe.prove.boxes.monotone import OneWayProblem
 from laufruhe.prove.boxes.shared_gas import SharedGasBoxes
-from laufruhe.prove.boxes.sizes import SizeBoxes
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes
 from laufruhe.prove.throws.star_cut import Cut
@@ -79,7 +78,6 @@ BROKEN = {
     "windows of throws": ("inline-nine-uneven", scaled(uneven, "uneven_bound", lambda found: found + 1e3)),
     "throws": ("steam-two-crank", scaled(ThrowPrograms, "_under", first_times(1.02))),
     "the flywheel": ("scotch-yoke-steam-pump", scaled(OneWayProblem, "least", times(1.02))),
-    "sizes": ("worked-diesel-sizes", scaled(SizeBoxes, "objective", times(1.01))),
     "leads": ("geared-three-leads", scaled(LeadBoxes, "bound", value_times(1.01))),
     "places": ("tractor-four-shaft-heights", scaled(places._Search, "box", bound_times(1.01))),
     "matrix inequalities": ("powertrain-torque-roll", scaled(convex, "dual_bound", first_times(1.001))),

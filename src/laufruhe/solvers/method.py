@@ -9,7 +9,7 @@ from typing import Any
 
 from laufruhe.numerics.norms import Norm
 from laufruhe.numerics.processes import called
-from laufruhe.problem.channels import Channel
+from laufruhe.problem.channels import AT_EACH_MOUNT, OF_MOUNTING, OF_RUNS, OF_SIZES, Channel
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence, kinds_of
 from laufruhe.problem.measure import Measure
@@ -20,6 +20,15 @@ from laufruhe.solvers.result import Result
 
 # of stars and choices of shafts: masses are those of the shafts that are built, numbers of a signal are told apart
 BUILT = (Dependence.SHIFT, Dependence.AFFINE, Dependence.SWING)
+OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *OF_RUNS}
+"""Channels that programs of mounts have formulas for."""
+OF_SIZES_ALONE = frozenset(channel for channel in OF_SIZES if channel.of_engine is not None)
+"""Channels that are functions of the sizes of an engine alone."""
+
+
+def is_no_number(channel: Channel) -> bool:
+    """Return whether a channel is a load or a mass."""
+    return not channel.is_number
 
 
 def is_pointwise(norm: Norm) -> bool:

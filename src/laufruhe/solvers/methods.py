@@ -13,22 +13,16 @@ from laufruhe.errors import ModelError, SolverError
 from laufruhe.extension import in_order
 from laufruhe.load_models.run_look import asks_runs
 from laufruhe.numerics.budget import limited, passed
-from laufruhe.numerics.norms import Norm
 from laufruhe.numerics.processes import called
 from laufruhe.numerics.progress import Listener, listening, tell
 from laufruhe.numerics.witness import collected
 from laufruhe.problem.channels import (
-    AT_EACH_MOUNT,
     FREQUENCIES,
     IRREGULARITY,
     MOUNT_FORCE,
     OF_BLOCK,
     OF_FLYWHEEL,
-    OF_MOUNTING,
-    OF_RUNS,
     OF_SHAFT_PLACES,
-    OF_SIZES,
-    Channel,
 )
 from laufruhe.problem.decision import KINDS, Kind
 from laufruhe.problem.dependence import Dependence, depends, kinds_of
@@ -44,7 +38,7 @@ from laufruhe.solvers.conclusion import KEPT, Shown, concluded, judged, none_wit
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import beyond_mounts
 from laufruhe.solvers.in_order import solve_in_order
-from laufruhe.solvers.method import BUILT, Method, by_home, is_pointwise
+from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, by_home, is_no_number, is_pointwise
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex
 from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.relaxed import solve_relaxed
@@ -58,14 +52,6 @@ LIBRARIES = ("casadi", "clarabel", "cvxpy")
 """Packages that are imported where something open needs them, named as their modules."""
 CUT_SHORT = "stopped at the time limit"
 Decide = Callable[[Problem], Result]
-
-
-def _is_of_lengths(norm: Norm) -> bool:
-    return norm.is_convex and norm.of_row_lengths
-
-
-def _is_no_number(channel: Channel) -> bool:
-    return not channel.is_number
 
 
 def solve_each_apart(problem: Problem) -> Result:
@@ -100,10 +86,6 @@ def _is_rigid(problem: Problem) -> bool:
     return problem.engine.block is None and not problem.fidelity.is_uneven
 
 
-def _minimises_loads(problem: Problem) -> bool:
-    return any(not term.measure.is_mounting for term in problem.objective)
-
-
 def _tells_stars_apart(problem: Problem) -> bool:
     """Return whether all that is asked tells stars on open mounts apart; how evenly they turn while they are even."""
     moves = problem.phasing is not None and problem.phasing.continuous
@@ -115,8 +97,6 @@ _U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT,
 _Z, _Q = Kind.SIZE, Kind.PISTON
 _AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependence.SHIFT,)
 _PLACED = (Dependence.BIAFFINE, Dependence.BENT)
-_OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *OF_RUNS}
-_OF_SIZES = frozenset(channel for channel in OF_SIZES if channel.of_engine is not None)
 _CONES, _JOINT = ".cones.unbalances:solve_sharply", ".mounts.nonlinear:solve_joint"
 _STARS = ".stars.phasing:solve_phasing"
 _OWN: tuple[Method, ...] = (
@@ -130,11 +110,11 @@ _OWN: tuple[Method, ...] = (
     Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, Reach.WHOLE, _CONES, True,
            proves="the optimum"),
     Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, Reach.WHOLE, ".boxes.leads:solve_leads", True,
-           frozenset({IRREGULARITY}), is_pointwise, _is_no_number,
+           frozenset({IRREGULARITY}), is_pointwise, is_no_number,
            proves="the optimum, as far as the boxes go (P13)"),
     Method("boxes of leads between shared chambers", {Kind.LEAD: ()}, Reach.WHOLE,
            ".boxes.shared_leads:solve_shared_leads", True, frozenset({MOUNT_FORCE, *OF_BLOCK}), is_pointwise,
-           _is_no_number, _is_rigid,
+           is_no_number, _is_rigid,
            proves="the optimum, as far as the boxes go (P15)"),
     Method("cones over boxes of places", {_U: _AFFINE, _P: _PLACED}, Reach.WHOLE,
            ".boxes.places:solve_places", True, OF_SHAFT_PLACES, is_pointwise,
@@ -143,33 +123,23 @@ _OWN: tuple[Method, ...] = (
            norms=is_pointwise,
            proves="the optimum; where throws leave the even steps as far as boxes of throws, bank angle and split "
            "pins go (S29, S30)"),
-    Method("boxes of sizes", {_Z: _MASSES, _U: _AFFINE}, Reach.WHOLE, ".boxes.sizes:solve_sizes", True, _OF_SIZES,
-           _is_of_lengths, _is_no_number,
-           proves="the optimum (Z12, Z14); with the length of the rod within a gap where bends of a load move "
-           "with it (Z13)"),
-    Method("stars, each with boxes of sizes", {_S: BUILT, _U: _AFFINE, _Z: _MASSES}, Reach.WHOLE,
-           ".stars.sizes:solve_star_sizes", True, _OF_SIZES, _is_of_lengths, _is_no_number,
-           proves="the optimum, of 60 even stars or firing orders at most"),
     Method("linear matrix inequalities", {_K: ()}, Reach.WHOLE, ".mounts.convex:solve_convex_mounts",
            knows=frozenset({*CONVEX, FREQUENCIES}), also=is_convex,
            proves="the optimum"),
-    Method("smooth program, boxes of stiffness", {_K: ()}, Reach.NEAR, _JOINT, False, _OF_MOUNTS, is_pointwise,
+    Method("smooth program, boxes of stiffness", {_K: ()}, Reach.NEAR, _JOINT, False, OF_MOUNTS, is_pointwise,
            proves="mostly the optimum of up to four numbers, often of six; else a bound"),
-    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE, _JOINT, False, _OF_MOUNTS, is_pointwise,
+    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE, _JOINT, False, OF_MOUNTS, is_pointwise,
            proves="mostly the optimum of up to five numbers of the mounts (E69); else a local one, with a bound"),
     Method("flywheel, crankshaft and the rest apart",
            dict.fromkeys(sorted(set(KINDS.values()) - {_S}), tuple(Dependence)), Reach.ASIDE,
            ".methods:solve_each_apart", norms=lambda _: True, also=is_apart,
            proves="what each of them proves"),
-    Method("local programs of sizes and mounts", {_Z: _MASSES, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
-           ".mounts.sizes:solve_mounted_sizes", False, _OF_SIZES | _OF_MOUNTS, _is_of_lengths, also=_minimises_loads,
-           proves="a local optimum, with the bound of any masses that the sizes may have (Z15)"),
     Method("stars, each with a smooth program", {_S: BUILT, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
-           ".mounts.stars:solve_star_mounts", False, _OF_MOUNTS, is_pointwise, also=_tells_stars_apart,
+           ".mounts.stars:solve_star_mounts", False, OF_MOUNTS, is_pointwise, also=_tells_stars_apart,
            proves="a local optimum, with a bound"),
     Method("local programs, places at their corners",
            {_U: _AFFINE, _P: _PLACED, _Q: _AFFINE, _Z: _MASSES, Kind.LEAD: _SHIFT}, Reach.WHOLE,
-           ".methods:solve_with_places", True, OF_SHAFT_PLACES | _OF_SIZES | {IRREGULARITY},
+           ".methods:solve_with_places", True, OF_SHAFT_PLACES | OF_SIZES_ALONE | {IRREGULARITY},
            also=_closes_without_places,
            proves="what is proven of the rest with places at the corners of their bounds (P20)"),
     Method("local programs of all numbers", dict.fromkeys(KINDS.values(), tuple(Dependence)), Reach.ASIDE,

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import laufruhe
+from extensions.sizes.test_mounts_sizes import FEW_BOXES
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -17,7 +18,6 @@ from laufruhe.solvers.mounts.nonlinear import mounts_bound
 from mounts.files import problem_of
 from mounts.test_mount_nonlinear import joint_problem
 from mounts.test_mount_stars import parts
-from mounts.test_mounts_sizes import FEW_BOXES
 
 
 @pytest.mark.slow

@@ -12,7 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from laufruhe.load_models.sized_model import SizeModel
+from laufruhe.extensions.sizes.model import SizeModel
+from laufruhe.extensions.sizes.solver import check_acts, solve_sizes
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision, Drive, Kind, NumberDrive, RotorDrive
 from laufruhe.problem.measure import Measure
@@ -22,7 +23,6 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Value
 from laufruhe.prove.certificate import Reach, room_of
 from laufruhe.prove.mounts.provers import Question, proven
-from laufruhe.solvers.boxes.sizes import check_acts, solve_sizes
 from laufruhe.solvers.conclusion import KEPT, Design, concluded, judged
 from laufruhe.solvers.mounts.nonlinear import mounts_bound
 from laufruhe.solvers.result import Result

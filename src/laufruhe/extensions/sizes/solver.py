@@ -10,15 +10,15 @@ from functools import cached_property
 import numpy as np
 
 from laufruhe.errors import ModelError
+from laufruhe.extensions.sizes.boxes import MOST_BOXES, SizeBoxes, divided_sizes
+from laufruhe.extensions.sizes.model import SizeModel
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
-from laufruhe.load_models.sized_model import SizeModel
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import Grid
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
-from laufruhe.prove.boxes.sizes import MOST_BOXES, SizeBoxes, divided_sizes
 from laufruhe.prove.certificate import Multipliers, Reach
 from laufruhe.solvers.boxes.held_designs import best_with
 from laufruhe.solvers.conclusion import Design, concluded, known_of, none_within

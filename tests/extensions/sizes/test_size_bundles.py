@@ -9,11 +9,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from laufruhe.load_models.sized_model import MASSES
+from laufruhe.extensions.sizes.boxes import SizeBoxes
+from laufruhe.extensions.sizes.bundles import Reach
+from laufruhe.extensions.sizes.model import MASSES
 from laufruhe.problem.decision import Decision, Domain
 from laufruhe.problem.sets import Interval, Sector
-from laufruhe.prove.boxes.size_bundles import Reach
-from laufruhe.prove.boxes.sizes import SizeBoxes
 
 
 def test_the_least_is_that_of_a_corner() -> None:

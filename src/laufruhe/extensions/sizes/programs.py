@@ -14,14 +14,14 @@ from typing import TypeAlias
 
 import numpy as np
 
+from laufruhe.extensions.sizes.bundles import Grouped, Number, Reach, corner, least_of
+from laufruhe.extensions.sizes.model import MASSES, SizeModel
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
-from laufruhe.load_models.sized_model import MASSES, SizeModel
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.problem.decision import Decision, domains_of
 from laufruhe.problem.sets import Interval
-from laufruhe.prove.boxes.size_bundles import Grouped, Number, Reach, corner, least_of
 from laufruhe.prove.certificate import ROUNDING, Multipliers, best_bound, minorant, spread
 
 Ask: TypeAlias = Callable[[AffineProblem, bool], tuple[Array | None, Multipliers]]

@@ -13,8 +13,8 @@ from functools import lru_cache
 
 import numpy as np
 
+from laufruhe.extensions.sizes.pieces import Piece
 from laufruhe.load_models.affine import AffineNorm
-from laufruhe.load_models.size_pieces import Piece
 from laufruhe.numerics.arrays import Array, Mask
 
 TERMS, BETWEEN = 20, (0.13, 0.71)

@@ -9,8 +9,8 @@ import time
 from dataclasses import replace
 
 from laufruhe.errors import ModelError
+from laufruhe.extensions.sizes.solver import solve_sizes
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.boxes.sizes import solve_sizes
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.conclusion import no_star
 from laufruhe.solvers.stars.families import families_of

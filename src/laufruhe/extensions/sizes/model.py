@@ -16,8 +16,8 @@ from functools import cached_property
 
 import numpy as np
 
+from laufruhe.extensions.sizes.pieces import Piece, plain
 from laufruhe.load_models.affine import AffineNorm
-from laufruhe.load_models.size_pieces import Piece, plain
 from laufruhe.machine import Engine
 from laufruhe.machine.running_gear import ROD_LENGTH, Size
 from laufruhe.numerics.arrays import Array, Mask

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 import laufruhe
 import ready
-from laufruhe.errors import InputError, ModelError
-from laufruhe.load_models.sized_model import SizeModel
+from claims.test_broken_bounders import scaled, times
+from laufruhe.errors import BoundError, InputError, ModelError
+from laufruhe.extensions.sizes.boxes import SizeBoxes
+from laufruhe.extensions.sizes.model import SizeModel
 from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.prove.boxes.sizes import SizeBoxes
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Status
 from laufruhe.solvers.result import Result
@@ -409,3 +410,10 @@ def test_ready_problems_are_proven_and_names_open_and_fix_them(name: str) -> Non
         fixed = fixed.fix(decision.name, f"{decision.value!r} {decision.unit}")
     assert laufruhe.evaluate(fixed).objective.value == pytest.approx(result.objective.value, rel=1e-9)
     assert len(fixed.decisions) == 0
+
+
+@pytest.mark.slow
+def test_a_broken_bounder_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    scaled(SizeBoxes, "objective", times(1.01))(monkeypatch)
+    with pytest.raises(BoundError, match="contradicts a known design"):
+        laufruhe.solve(PROBLEMS / "worked-diesel-sizes.toml")

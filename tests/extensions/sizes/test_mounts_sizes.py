@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.load_models.sized_model import SizeModel
+from extensions.sizes.test_sizes_weights import FEWER
+from laufruhe.extensions.sizes.model import SizeModel
+from laufruhe.extensions.sizes.mounted import with_masses
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.conclusion import judged
-from laufruhe.solvers.mounts.sizes import with_masses
 from laufruhe.solvers.result import Result
 from problem_files import changed
-from solvers.test_sizes_weights import FEWER
 
 SOFT = '{ between = ["100 N/mm", "800 N/mm"], start = "300 N/mm" }'
 MOUNTED = changed(

@@ -18,14 +18,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from laufruhe.load_models.rod_series import RodSeries, rod_series
-from laufruhe.load_models.sized_model import SizeModel
+from laufruhe.extensions.sizes.bundles import Bundle, Number, Reach, Ways, corner
+from laufruhe.extensions.sizes.model import SizeModel
+from laufruhe.extensions.sizes.programs import Ask, SizePrograms, Together
+from laufruhe.extensions.sizes.rod_series import RodSeries, rod_series
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.prove.best_first import Box, Divided, Halving, Over, halves, widest
-from laufruhe.prove.boxes.size_bundles import Bundle, Number, Reach, Ways, corner
-from laufruhe.prove.boxes.size_programs import Ask, SizePrograms, Together
 from laufruhe.prove.witness import Known, check_around, thin
 
 MOST_BOXES = 3000

@@ -9,20 +9,20 @@ import pytest
 
 import laufruhe
 import ready
+from extensions.sizes.test_sizes import TEXT
 from laufruhe.errors import ModelError
-from laufruhe.load_models.sized_model import SizeModel
+from laufruhe.extensions.sizes.boxes import SizeBoxes
+from laufruhe.extensions.sizes.model import SizeModel
+from laufruhe.extensions.sizes.solver import ask_cones
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.boxes.sizes import SizeBoxes
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Status
-from laufruhe.solvers.boxes.sizes import ask_cones
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.result import Result
 from problem_files import PROBLEMS, changed
 from searched import searched
-from solvers.test_sizes import TEXT
 
 WEIGHT = """
 [[counterweights]]

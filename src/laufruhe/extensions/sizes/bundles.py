@@ -13,8 +13,8 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from laufruhe.load_models.rod_series import RodSeries
-from laufruhe.load_models.sized_model import MASSES
+from laufruhe.extensions.sizes.model import MASSES
+from laufruhe.extensions.sizes.rod_series import RodSeries
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Domain
 from laufruhe.problem.measure import Measure

@@ -1,0 +1,78 @@
+"""Few angles judge no design of sizes that many angles judge otherwise."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import pytest
+
+from laufruhe.extensions.sizes.solver import solve_sizes
+from laufruhe.numerics.budget import limited
+from laufruhe.problem.evaluation import evaluate, finely, objective_value
+from laufruhe.prove.certificate import Proof
+from laufruhe.solvers import Result, Status, solve
+from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.told_limits import solve_told
+from solvers.test_told_limits import ENGINE, SECOND, problem
+
+
+def sized(throw: float) -> dict[str, Any]:
+    """A single whose rod may be thinner."""
+    big_end = {"diameter": "50 mm", "width": "28 mm"}
+    return {
+        "engine": {**ENGINE, "throws": [throw], "bore": "80 mm", "cylinder_spacing": "120 mm", "big_end": big_end},
+        "running_gear": {
+            "density": "7850 kg/m^3", "rod": {"diameter": {"between": ["10 mm", "30 mm"], "start": "25 mm"}}
+        },
+        "constraints": [{"limit": "maximum rod stress", "max": "60 N/mm^2", "name": "rod"}],
+    }  # fmt: skip
+
+
+@cache
+def of_many_angles(throw: float) -> Result:
+    return solve(problem(sized(throw), objective=SECOND, fidelity={"samples": 5760}))
+
+
+def test_a_bound_of_sizes_is_not_over_a_rival_that_many_angles_judge() -> None:
+    """At a throw of 3 deg 48 angles have a quarter of a percent too much of the second order."""
+    few, many = solve(problem(sized(3), objective=SECOND)), of_many_angles(3)
+    rival = objective_value(many.problem, finely(many.final))
+    assert few.certificate is not None
+    assert few.certificate.lower_bound <= rival * (1.0 + 1e-9)
+    assert many.status is few.status is Status.OPTIMAL
+
+
+@pytest.mark.parametrize(("throw", "share", "met"), [(0, 0.998, False), (3, 1.0005, True)])
+def test_limits_of_sizes_are_what_the_cycle_has(throw: float, share: float, met: bool) -> None:
+    """48 angles have half a percent too little of it at a throw of none, a quarter too much at 3 deg."""
+    told = sized(throw)
+    least = of_many_angles(throw).objective.value
+    limit = {"name": "quiet", "limit": "mean shaking force", "orders": [2], "max": f"{share * least} N"}
+    more = {"constraints": [*told["constraints"], limit], "search": {"boxes": 200}}
+    asked = problem(told, objective={"minimise": "rms shaking force"}, **more)
+    result = solve(asked)
+    assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
+    assert not met or finely(result.final).excess(asked.limits) <= KEPT
+
+
+def test_a_gap_is_not_left_open_for_what_few_angles_read_too_much() -> None:
+    result = solve(problem(sized(3), objective=SECOND))
+    assert result.status is Status.OPTIMAL
+    assert result.objective.value == pytest.approx(evaluate(result.problem, result.final.engine, 5760).value(
+        result.problem.objective[0].measure), rel=1e-4)  # fmt: skip
+
+
+def test_time_that_is_over_leaves_no_design_that_few_angles_alone_allow() -> None:
+    """48 angles have half a percent too little of the second order; no time is left to look at more."""
+    told = sized(0)
+    most = 0.998 * of_many_angles(0).objective.value
+    limit = {"name": "quiet", "limit": "mean shaking force", "orders": [2], "max": f"{most} N"}
+    asked = problem(told, objective={"minimise": "rms shaking force"}, constraints=[*told["constraints"], limit])
+    with limited(1e-9):
+        result = solve_told(asked, solve_sizes)
+    assert finely(result.final).excess(asked.limits) > KEPT
+    assert result.status is Status.FAILED
+    assert result.certificate is not None
+    assert result.certificate.kind is Proof.NONE
+    assert "'quiet'" in result.message
