@@ -13,7 +13,8 @@ from pathlib import Path
 SOURCE = Path(__file__).resolve().parents[2] / "src"
 ROOMS = (
     "physics", "load_models", "prove", "solvers", "machine",
-    "extensions/mount_relaxation", "extensions/joint_mounts", "extensions/robust", "extensions/long_cranks",
+    "extensions/joint_mounts", "extensions/long_cranks", "extensions/mount_relaxation", "extensions/robust",
+    "extensions/run_ups", "extensions/sizes", "extensions/torsion",
 )  # fmt: skip
 """Folders of physics, search and proof."""
 TOLERANCE = 1e-3
@@ -99,7 +100,10 @@ def _is_text(node: ast.stmt) -> bool:
 @cache
 def all_mutants() -> tuple[Mutant, ...]:
     """Return every mutant of the rooms, in the order of files and lines."""
-    files = [file for room in ROOMS for file in sorted((SOURCE / "laufruhe" / room).rglob("*.py"))]
+    folders = [SOURCE / "laufruhe" / room for room in ROOMS]
+    if gone := [str(folder) for folder in folders if not folder.is_dir()]:
+        raise FileNotFoundError(f"no such rooms: {gone}; change ROOMS in {Path(__file__).name}")
+    files = [file for folder in folders for file in sorted(folder.rglob("*.py"))]
     return tuple(mutant for file in files for mutant in mutants_of(file))
 
 
