@@ -95,13 +95,15 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "run_up": "run_ups",
     },
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
+    "layouts": {"rotary": "rotary"},
 }
 """Extensions of this package by what they add to tables: whoever asks for it without the folder is told its name."""
+INSTALL = "install laufruhe with all its folders"
 
 
 def lack(extension: str) -> tuple[str, str]:
     """Return rule and remedy of what needs an extension of this package that is not there."""
-    return f"needs the extension '{extension}', which is not installed", "install laufruhe with all its folders"
+    return f"needs the extension '{extension}', which is not installed", INSTALL
 
 
 @cache

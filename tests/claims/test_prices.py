@@ -81,17 +81,6 @@ def test_an_envelope_has_a_price_with_places_open() -> None:
     assert price.tightened == price.relaxed
 
 
-@pytest.mark.slow
-def test_limits_of_nothing() -> None:
-    """A couple of 1 N m that is left needs that much less of both weights; no couple is under none."""
-    result = laufruhe.solve(INPUTS.parents[2] / "problems" / "rotary-four-open.toml")
-    told, speed = prices(result), 8000.0 * math.tau / 60.0
-    price = told["maximum rocking couple"]
-    assert price.relaxed == pytest.approx(2.0 / (0.56 * 0.05 * speed**2), rel=1e-3)
-    assert price.tightened == math.inf
-    assert told["maximum shaking force"] == Price(0.0, math.inf)
-
-
 @pytest.mark.parametrize("count", [100, 3000])
 def test_rows_on_a_circle(count: int) -> None:
     """Many rows of one length are told by some of them: the multiplier that balances a slope is its length."""

@@ -68,7 +68,6 @@ def test_every_decision_is_found_by_the_name_that_results_show() -> None:
         "shaper",
         "tractor-four-seven-metres",
         "geared-inertia",
-        "rotary-two",
         "powertrain-load-cases",
     ],
 )

@@ -218,8 +218,3 @@ def test_the_picture_says_of_no_steam_engine_that_it_fires() -> None:
     words = _words("steam-two-crank")
     assert "iring" not in words
     assert "Dead centres at the head end, and what turns" in words
-
-
-@pytest.mark.slow
-def test_nothing_left_is_no_picture() -> None:
-    assert not twins.applies(solved("rotary-two"))

@@ -255,20 +255,6 @@ def test_indicator_diagrams_enclose_the_work_of_the_gas() -> None:
 
 
 @pytest.mark.slow
-def test_chambers_of_rotors_make_the_torque_of_the_gas() -> None:
-    result = state(load(PROBLEMS / "rotary-two.toml"))
-    sheet, point = sheets_of(result)["chambers"], result.problem.points[0]
-    rows = np.array([row[2:] for row in sheet.rows if row[0] == point.name], dtype=float)
-    steps = len(np.unique(rows[:, 1]))
-    mean = rows[:, 4].reshape(-1, steps)[:, :-1].mean(axis=1).sum()
-    torque = torque_parts(result.final.engine, point, result.problem.fidelity)["gas"]
-    assert mean == pytest.approx(float(torque.at(0).real), rel=1e-3)
-    volumes = rows[:, 2].reshape(-1, steps)
-    assert volumes.min(axis=1) == pytest.approx(0.0, abs=1e-12)
-    assert np.ptp(volumes.max(axis=1)) < 1e-12
-
-
-@pytest.mark.slow
 def test_a_willans_line_is_a_file_with_its_readings() -> None:
     """The line of the file is that of NumPy's least squares, and meets no fuel at the friction."""
     result = state(load(PROBLEMS / "car-four-willans.toml"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeAlias, get_args
@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from laufruhe import units
 from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, printed
-from laufruhe.extension import HOMES, lack
+from laufruhe.extension import HOMES, INSTALL, Tables, lack
 from laufruhe.files.fields import FORMS, Number, Open
 from laufruhe.files.toml_text import toml_key
 
@@ -24,6 +24,8 @@ MOST_COMPLAINTS = 20
 """That a file gets at once."""
 _CLOSE = 0.6
 _FEW = 3
+_TABLES: Mapping[str, Tables] = {"kind": "study_kinds", "layout": "layouts"}
+"""Tables of objects that a file names, by their keys."""
 _COUNTED = {
     "too_short": ("at least", "min_length", "add what is missing"),
     "too_long": ("at most", "max_length", "take some out"),
@@ -51,6 +53,10 @@ def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Compl
         if detail["type"] == "missing" and _is_misspelt(loc, unknown):
             continue
         found.setdefault(key_path(loc), _complaint(detail, loc, tables, _home(str(loc[-1]), model)))
+    lacking = tuple(complaint for complaint in found.values() if complaint.remedy == INSTALL)
+    if lacking:
+        # keys of an extension that is not there are no faults
+        return lacking
     first = list(found.values())[:MOST_COMPLAINTS]
     rest = error.error_count() - len(told) + len(found) - len(first)
     more = [Complaint("file", "", f"has {rest} more such faults", "correct these first")] if rest else []
@@ -155,8 +161,9 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], home: s
     if kind in ("literal_error", "union_tag_invalid"):
         allowed = str(detail["ctx"].get("expected") or detail["ctx"].get("expected_tags"))
         value = detail["ctx"].get("tag", detail["input"])
-        if kind == "union_tag_invalid" and value in HOMES["study_kinds"]:
-            return Complaint(where, short(value), *lack(HOMES["study_kinds"][value]))
+        table = _TABLES.get(where.rpartition(".")[2])
+        if table and (extension := HOMES[table].get(str(value))):
+            return Complaint(where, short(value), *lack(extension))
         words = allowed.replace("' or '", "', '").replace("'", "").split(", ")
         # of two or three all are told: the nearest in letters need not be the one that is meant
         remedy = nearest(str(value), words) if len(words) > _FEW else "use one of: " + ", ".join(words)

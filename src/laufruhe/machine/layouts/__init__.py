@@ -15,13 +15,12 @@ from laufruhe.machine.layouts.opposed_piston import OpposedPiston, facing_piston
 from laufruhe.machine.layouts.parts import Parts
 from laufruhe.machine.layouts.places import Layout, stations
 from laufruhe.machine.layouts.radial import Radial
-from laufruhe.machine.layouts.rotary import Rotary
 from laufruhe.machine.layouts.vee import Vee, vee
 
 LAYOUTS: Mapping[str, LayoutKind] = extended(
     "layouts",
     LayoutKind,
-    (Inline(), Vee(), Boxer(), OpposedPiston(), Delta(), Radial(), Rotary(), Parts()),
+    (Inline(), Vee(), Boxer(), OpposedPiston(), Delta(), Radial(), Parts()),
 )
 
 __all__ = [

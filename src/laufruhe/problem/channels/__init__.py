@@ -27,7 +27,6 @@ from laufruhe.physics.bearing_loads import (
 from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.asking import Answered, Asked
-from laufruhe.problem.channels.apexes import OF_APEXES
 from laufruhe.problem.channels.flywheel import FLYWHEEL_INERTIA, IRREGULARITY, OF_FLYWHEEL
 from laufruhe.problem.channels.kinds import (
     AT_MOUNTS,
@@ -196,5 +195,5 @@ CHANNELS: Mapping[str, Channel] = extended("channels", Channel, (
     MOUNT_FORCE, MOUNT_TRAVEL, *OF_BLOCK,
     HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,
     SIDE_FORCE, FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS,
-    ADDED_MASS, *OF_MOUNTING, *OF_RUNS, *OF_APEXES, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES,
+    ADDED_MASS, *OF_MOUNTING, *OF_RUNS, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES,
 ))  # fmt: skip

@@ -12,9 +12,9 @@ import pytest
 from numpy.typing import NDArray
 
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.rotary.unit import RotaryUnit
 from laufruhe.files.reader import load_tables
 from laufruhe.machine import Engine, OperatingPoint, PressureTrace, Seiliger, Wiebe
-from laufruhe.machine.rotary import RotaryUnit
 from laufruhe.numerics.turns import cis
 from laufruhe.physics.bearing_loads import main_bearing_forces, pin_forces
 from laufruhe.physics.cylinder_volume import chamber_volume

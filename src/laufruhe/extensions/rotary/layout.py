@@ -9,11 +9,11 @@ from typing import Any
 
 from laufruhe import units
 from laufruhe.errors import KeyedError
+from laufruhe.extensions.rotary.unit import FLANKS, RotaryUnit
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts.base import SPACING, Key
 from laufruhe.machine.layouts.build import Mechanism, numbers_of
 from laufruhe.machine.layouts.inline import Inline
-from laufruhe.machine.rotary import FLANKS, RotaryUnit
 from laufruhe.machine.slider_crank import SliderCrank
 
 
@@ -75,3 +75,6 @@ class Rotary(Inline):
             own["eccentricity"], math.inf, 0.0, rod_rotating_mass=own["rotor_mass"], rotor_radius=radius,
             rotor_width=own["rotor_width"], rotor_inertia=own["rotor_inertia"], **shared,
         )  # fmt: skip
+
+
+ROTARY = Rotary()

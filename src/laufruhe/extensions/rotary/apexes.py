@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from laufruhe.machine.rotary import RotaryUnit
+from laufruhe.extensions.rotary.unit import RotaryUnit
 from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.kinds import Need, NumberChannel
 
@@ -39,4 +39,3 @@ def _most(name: str, unit: str, power: int, number: Callable[[RotaryUnit], float
 
 APEX_SPEED = _most("apex speed", "m/s", 1, lambda part: part.apex_speed)
 APEX_ACCELERATION = _most("apex acceleration", "m/s^2", 2, lambda part: part.apex_acceleration)
-OF_APEXES = (APEX_SPEED, APEX_ACCELERATION)
