@@ -20,7 +20,7 @@ from laufruhe.errors import ModelError
 
 GROUP = "laufruhe.extensions"
 Tables = Literal[
-    "norms", "channels", "kinds", "layouts", "methods", "quantities", "provers", "reductions", "study_kinds",
+    "norms", "channels", "kinds", "layouts", "drives", "methods", "quantities", "provers", "reductions", "study_kinds",
     "commands", "keys", "notes", "pictures", "sections",
 ]  # fmt: skip
 
@@ -44,6 +44,8 @@ class Extension:
         Objects of `laufruhe.problem.drives.Kind`: kinds of numbers that may be open.
     layouts
         Objects of `laufruhe.machine.layouts.LayoutKind`.
+    drives
+        Objects of `laufruhe.machine.drives.DriveKind`.
     methods
         Objects of `laufruhe.solvers.method.Method`: rows of the table of methods, each before the one that it names.
     quantities
@@ -72,6 +74,7 @@ class Extension:
     dependences: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()
     layouts: tuple[str, ...] = ()
+    drives: tuple[str, ...] = ()
     methods: tuple[str, ...] = ()
     quantities: tuple[str, ...] = ()
     provers: tuple[str, ...] = ()
@@ -96,6 +99,7 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
     },
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
     "layouts": {"rotary": "rotary"},
+    "drives": {"swinging-yoke": "swinging_yoke"},
 }
 """Extensions of this package by what they add to tables: whoever asks for it without the folder is told its name."""
 INSTALL = "install laufruhe with all its folders"

@@ -70,10 +70,13 @@ def test_a_file_or_command_that_needs_it_is_refused_by_its_name(table: Tables, n
     mass = '{ between = ["1 kg", "2 kg"], tolerance = "1 %" }' if name == "tolerance" else f'"2 kg {name} 1 %"'
     noted = re.sub(r"reciprocating_mass = .*", f"reciprocating_mass = {mass}", problem.read_text(encoding="utf-8"))
     (tmp_path / "note.toml").write_text(noted, encoding="utf-8")
-    text = problem.read_text(encoding="utf-8").replace('"inline"', f'"{name}"\nkey_of_its_own = 1')
-    (tmp_path / "layout.toml").write_text(text, encoding="utf-8")
+    text = problem.read_text(encoding="utf-8")
+    layout, drive = (f"{said}\nkey_of_its_own = 1" for said in (f'"{name}"', f'"inline"\ndrive = "{name}"'))
+    (tmp_path / "layout.toml").write_text(text.replace('"inline"', layout), encoding="utf-8")
+    (tmp_path / "drive.toml").write_text(text.replace('"inline"', drive), encoding="utf-8")
     words = {
         "layouts": ("solve", tmp_path / "layout.toml"),
+        "drives": ("solve", tmp_path / "drive.toml"),
         "study_kinds": ("study", tmp_path / "study.toml"),
         "commands": (name, problem),
         "keys": ("solve", tmp_path / "problem.toml"),

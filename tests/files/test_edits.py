@@ -65,7 +65,6 @@ def test_every_decision_is_found_by_the_name_that_results_show() -> None:
     "name",
     [
         "opposed-pistons-masses",
-        "shaper",
         "tractor-four-seven-metres",
         "geared-inertia",
         "powertrain-load-cases",

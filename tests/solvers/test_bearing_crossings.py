@@ -10,7 +10,7 @@ import pytest
 
 import laufruhe
 from lanes import first_fast
-from laufruhe.errors import InputError, ModelError
+from laufruhe.errors import InputError
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
@@ -87,13 +87,6 @@ def test_no_design_goes_under_the_bound(name: str, quantity: str) -> None:
             met += 1
             assert objective_value(problem, other) >= result.certificate.lower_bound * (1.0 - 1e-3)
     assert met > 2
-
-
-def test_mechanisms_whose_rods_are_not_modelled_are_refused_by_name() -> None:
-    yoke = {key: value for key, value in ENGINE.items() if key not in ("rod", "rod_length", "rod_ratio")}
-    yoke |= {"drive": "swinging-yoke", "pivot_distance": "200 mm", "return_ratio": 1.6, "throws": [0, 240, 120]}
-    with pytest.raises(ModelError, match="loads of its rod are not modelled"):
-        laufruhe.solve(problem_of({"engine": yoke, "gas": None}, "mean main-bearing force"))
 
 
 def test_sizes_of_rods_on_a_master_rod_are_refused_by_name() -> None:

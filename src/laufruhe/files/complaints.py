@@ -24,7 +24,7 @@ MOST_COMPLAINTS = 20
 """That a file gets at once."""
 _CLOSE = 0.6
 _FEW = 3
-_TABLES: Mapping[str, Tables] = {"kind": "study_kinds", "layout": "layouts"}
+_TABLES: Mapping[str, Tables] = {"kind": "study_kinds", "layout": "layouts", "drive": "drives"}
 """Tables of objects that a file names, by their keys."""
 _COUNTED = {
     "too_short": ("at least", "min_length", "add what is missing"),

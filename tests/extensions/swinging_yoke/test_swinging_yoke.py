@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
+from laufruhe.extensions.swinging_yoke.mechanism import SwingingYoke
 from laufruhe.machine import Chamber, Chambers, Cycle, Engine, OperatingPoint, Pump, Shaft
 from laufruhe.machine.rotor import CRANKSHAFT
-from laufruhe.machine.swinging_yoke import SwingingYoke
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.torque import crank_torque, torque_facts
 

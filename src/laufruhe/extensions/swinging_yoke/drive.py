@@ -8,11 +8,11 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from laufruhe.errors import KeyedError
+from laufruhe.extensions.swinging_yoke.mechanism import SwingingYoke
 from laufruhe.machine.drives.base import DriveKind, Sizes
 from laufruhe.machine.layouts.base import Key
 from laufruhe.machine.layouts.build import Mechanism, numbers_of
 from laufruhe.machine.slider_crank import SliderCrank
-from laufruhe.machine.swinging_yoke import SwingingYoke
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,3 +74,6 @@ class SwingingYokeDrive(DriveKind):
             told |= {name: own["lever"][key] for key, name in names.items()}
         shared = {part.name: getattr(plain, part.name) for part in fields(plain)}
         return Yoke(**shared | {"offset": 0.0}, own=told)
+
+
+SWINGING_YOKE = SwingingYokeDrive()

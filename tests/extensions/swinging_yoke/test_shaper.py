@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+import tomllib
 
 import numpy as np
 import pytest
 
 import laufruhe
-from laufruhe.machine.swinging_yoke import SwingingYoke
+from laufruhe.errors import ModelError
+from laufruhe.extensions.swinging_yoke.mechanism import SwingingYoke
+from laufruhe.files.reader import load_tables
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers import Result
+from laufruhe.report.wording import fired
+from laufruhe.solvers import Result, state
 from problem_files import PROBLEMS
 
 PROBLEM = PROBLEMS / "shaper.toml"
@@ -100,3 +104,21 @@ def test_the_weight_of_the_lever_counts_as_a_counterweight(most: float) -> None:
         least = min(least, math.sqrt(np.square(rest + turning @ free).sum() / STEPS))
     assert result.objective.value == pytest.approx(least, rel=1e-4)
     assert result.objective.value <= least * (1.0 + 1e-9)
+
+
+def test_a_shaper_does_not_fire() -> None:
+    assert fired(state(laufruhe.load(PROBLEM))) == ""
+
+
+def test_a_lever_weight_is_found_by_its_name() -> None:
+    problem = laufruhe.load(PROBLEM)
+    for decision in problem.decisions:
+        fixed = problem.fix(decision.name, f"{0.5 * (decision.lower + decision.upper)!r} {decision.unit}")
+        assert decision.name not in {other.name for other in fixed.decisions}
+
+
+def test_forces_on_bearings_of_a_yoke_are_refused_by_name() -> None:
+    tables = tomllib.loads(PROBLEM.read_text(encoding="utf-8"))
+    tables |= {"main_bearings": [{"x": "0.3 m"}, {"x": "-0.3 m"}], "objective": {"minimise": "mean main-bearing force"}}
+    with pytest.raises(ModelError, match="loads of its rod are not modelled"):
+        laufruhe.solve(load_tables(tables, PROBLEM))
