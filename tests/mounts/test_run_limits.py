@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import laufruhe
+from laufruhe.extensions.run_ups.rows import RunRows
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models.run_look import run_measures
-from laufruhe.load_models.run_rows import RunRows
 from laufruhe.physics.run_up import run_through
 from laufruhe.physics.runs import runs_of
 from laufruhe.physics.speed_map import split_loads

@@ -11,7 +11,6 @@ from functools import cache, partial
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.extension import in_order
-from laufruhe.load_models.run_look import asks_runs
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.processes import called
 from laufruhe.numerics.progress import Listener, listening, tell
@@ -343,8 +342,6 @@ REDUCTIONS: tuple[Reduction, ...] = (
     Reduction("ranks, one after another", lambda p: bool(p.ranks), lambda p, decide, _: solve_in_order(p, decide),
               _refuse_any_rank),
     Reduction("limits that nothing open moves", lambda p: bool(_fixed_limits(p)), _without_fixed_limits),
-    Reduction("run-ups", lambda p: asks_runs(p) and bool(kinds_of(p)) and Kind.NUMBER not in kinds_of(p),
-              lambda p, decide, _: by_home(".runs:solve_runs", p, kinds_of(p), decide)),
     Reduction("an objective that nothing open moves", _is_settled, _as_given),
 )  # fmt: skip
 """Reductions of the core in the order in which they are looked for."""

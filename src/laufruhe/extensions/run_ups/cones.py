@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.extensions.run_ups.rows import RunRows
 from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineProblem
-from laufruhe.load_models.run_rows import RunRows
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.numerics.progress import tell

@@ -13,14 +13,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from laufruhe.errors import ModelError
+from laufruhe.extensions.run_ups.cones import solve_run_cones
+from laufruhe.extensions.run_ups.rows import RunRows
 from laufruhe.load_models.run_look import run_measures
-from laufruhe.load_models.run_rows import RunRows
 from laufruhe.machine.mount import every_spring
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.solvers.conclusion import broken_limits, quoted, with_limits
-from laufruhe.solvers.cones.run_limits import solve_run_cones
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.stars.phasing import by_each_order, every_star
 
@@ -88,7 +88,7 @@ def _designed(
         return solve_run_cones(problem, limits, terms, rows, decide)
     if not kinds <= _SMOOTH:
         return None
-    from laufruhe.solvers.mounts.runs import solve_run_mounts
+    from laufruhe.extensions.run_ups.mounts import solve_run_mounts
 
     return solve_run_mounts(problem, relaxed)
 

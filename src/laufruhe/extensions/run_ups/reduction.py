@@ -1,0 +1,21 @@
+"""Reduction: what else is asked is decided first, and run-ups after it."""
+
+from laufruhe.load_models.run_look import asks_runs
+from laufruhe.numerics.processes import called
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import kinds_of
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers.methods import Decide, Reduction
+from laufruhe.solvers.result import Result
+
+
+def _applies(problem: Problem) -> bool:
+    return asks_runs(problem) and bool(kinds_of(problem)) and Kind.NUMBER not in kinds_of(problem)
+
+
+def _solve(problem: Problem, decide: Decide, _: Decide) -> Result:
+    found: Result = called("laufruhe.extensions.run_ups.solver:solve_runs", problem, kinds_of(problem), decide)
+    return found
+
+
+REDUCTION = Reduction("run-ups", _applies, _solve, before="an objective that nothing open moves")
