@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -131,3 +132,24 @@ def test_the_inertia_of_all_that_turns_follows_from_the_discs() -> None:
             load_tables({**tables, **more}, Path("five.toml"))
         assert said in str(caught.value)
         assert len(str(caught.value).splitlines()) == 1
+
+
+def test_shafts_of_a_crankshaft_take_values_by_the_names_that_results_show() -> None:
+    tables = tomllib.loads((PROBLEMS / "inline-five-torsion.toml").read_text(encoding="utf-8"))
+    disc = tables["torsion"]["discs"][0]
+    disc["inertia"] = {"between": ["0.001 kg m^2", "1 kg m^2"]}
+    disc["shaft"] = {"pieces": [{"length": "80 mm", "diameter": {"between": ["20 mm", "80 mm"]}}]}
+    problem = laufruhe.load(tables)
+    values = {"torsion.pulley.inertia": "0.5 kg m^2", "torsion.pulley.diameter": "60 mm"}
+    assert [decision.name for decision in problem.decisions] == list(values)
+    assert [decision.start for decision in problem.with_values(values).decisions] == [0.5, 0.06]
+
+
+def test_dampers_take_values_by_the_names_that_results_show() -> None:
+    problem = laufruhe.load(PROBLEMS / "inline-five-damper.toml")
+    for decision in problem.decisions:
+        value = 0.3 * decision.lower + 0.7 * decision.upper
+        found = problem.with_values({decision.name: f"{value!r} {decision.unit}"})
+        moved = {d.name: d.start for d in found.decisions}
+        assert moved.pop(decision.name) == pytest.approx(value, rel=1e-12)
+        assert moved == {d.name: d.start for d in problem.decisions if d is not decision}
