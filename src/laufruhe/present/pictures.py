@@ -43,7 +43,6 @@ _CAPTIONS = {
     "indicator": "Indicator diagrams of steam cylinders and pumps, and the force on each rod over its stroke.",
     "willans": "Fuel over the load at the brake, or drag over speed, and the line that tells the friction.",
     "torque": "Torque of gas, pistons and rods, its work and its orders, and the speed that a flywheel makes of it.",
-    "chambers": "Volume, pressure and torque of each chamber of a rotor over three turns of the shaft.",
     "bearings": "Force on each main bearing over a cycle, as block and crankshaft feel it, and where they wear.",
     "spectrum": "What orders of crank speed the loads are made of.",
     "transmissibility": "Force on the elastic mounts over that on the same mounts if they gave no way.",
@@ -58,7 +57,7 @@ SHEETS = (
 )  # fmt: skip
 """Curves and tables of a result as files: `report.tables` fills them in full precision."""
 CURVES = (
-    "torque", "indicator", "chambers", "uneven-firing",
+    "torque", "indicator", "uneven-firing",
     "willans", "bearings-on-crank", "wear", "turning-parts", "mount-critical-speeds",
 )  # fmt: skip
 """Further ones, which `report.curves` fills."""

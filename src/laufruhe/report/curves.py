@@ -16,7 +16,7 @@ from laufruhe.physics.irregularity import swing_of
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torque import torque_parts
 from laufruhe.physics.willans import FrictionTest
-from laufruhe.present.chambers import indicator_of, points_with_chambers, rotor_chambers, rotors_of
+from laufruhe.present.chambers import indicator_of, points_with_chambers
 from laufruhe.present.measures import (
     BEARINGS,
     as_crank_turns,
@@ -105,22 +105,6 @@ def _indicator(result: Result) -> Sheet:
     return Sheet(head, rows)
 
 
-def _chambers(result: Result) -> Sheet:
-    """Volume, pressure and torque of every chamber of every rotor, of the final design."""
-    rows = []
-    for point in result.problem.points:
-        for part in rotors_of(result.final.engine):
-            found = rotor_chambers(result.problem, part, point, STEPS * len(part.swept.lags) + 1)
-            nothing = np.full_like(found.volume, math.nan)
-            pressure, torque = (nothing if each is None else each for each in (found.pressure, found.torque))
-            for k, columns in enumerate(zip(found.volume, pressure, torque, strict=True)):
-                values = np.column_stack([np.degrees(found.angles), *columns]).tolist()
-                rows += [[point.name, part.name, k + 1, *row] for row in values]
-    head = ["point", "rotor", "chamber", "angle [deg]", "volume over the least [m^3]",
-            "pressure over the crankcase [Pa]", "torque [N m]"]  # fmt: skip
-    return Sheet(head, rows)
-
-
 def _willans(result: Result) -> Sheet:
     """Readings of friction tests, the line through them, what is asked of it, and the friction that it tells."""
     rows = [row for test in result.problem.friction for row in _of_test(test)]
@@ -202,7 +186,6 @@ def _mount_criticals(result: Result) -> Sheet:
 CURVES: Sheets = {
     "torque": (lambda result: asks_torque(result) and has_loads(result), _torque),
     "indicator": (points_with_chambers, _indicator),
-    "chambers": (lambda result: rotors_of(result.final.engine), _chambers),
     "uneven-firing": (has_ranking, _uneven_firing),
     "willans": (lambda result: result.problem.friction, _willans),
     "bearings-on-crank": (has_bearings, _on_crank),

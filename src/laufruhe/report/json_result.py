@@ -66,7 +66,11 @@ def as_dict(result: Result, series: bool = False) -> Record:
         "shaking": max((point["shaking"] for point in points), key=_hardness),
         "points": [{key: point[key] for key in own} for point in points],
         **(_on_mounts(result) if is_elastic(result) else {}),
-        **{name: section.record(result) for name, section in EXTENSION_SECTIONS.items() if section.applies(result)},
+        **{
+            name: section.record(result)
+            for name, section in EXTENSION_SECTIONS.items()
+            if section.record and section.applies(result)
+        },
         **_running(result),
         **_phasing(result),
         **_ranks(result),

@@ -25,7 +25,7 @@ class Section:
     tables
         Return the tables of the report.
     record
-        Return the entry of result.json.
+        Return the entry of result.json, if there is one.
     printed
         Names of the tables that are files as they are printed.
     sheets
@@ -34,8 +34,8 @@ class Section:
 
     name: str
     applies: Callable[[Result], bool]
-    tables: Callable[[Result], Sequence[Grid]]
-    record: Callable[[Result], Mapping[str, Any]]
+    tables: Callable[[Result], Sequence[Grid]] = lambda _: ()
+    record: Callable[[Result], Mapping[str, Any]] | None = None
     printed: tuple[str, ...] = ()
     sheets: Sheets = field(default_factory=dict)
 

@@ -7,9 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
+from laufruhe.extensions.rotary.chambers import rotor_chambers, rotors_of
 from laufruhe.plots.style import GREEN, ORANGE, SKY, entry, headed, page, styled
 from laufruhe.plots.words import FAINT, INK, aligned
-from laufruhe.present.chambers import rotor_chambers, rotors_of
 from laufruhe.present.measures import hardest_point
 from laufruhe.solvers.result import Result
 
@@ -18,13 +18,13 @@ WIDE, HIGH = 6.8, 1.65
 
 
 def applies(result: Result) -> bool:
-    """Whether chambers of one rotor work one after the other."""
+    """Return whether an engine has rotors that run."""
     return bool(rotors_of(result.final.engine)) and bool(result.problem.points)
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Each chamber of rotor 1, and the torque that they make together."""
+    """Draw each chamber of rotor 1, and the torque that they make together."""
     part, point = rotors_of(result.final.engine)[0], result.problem.points[hardest_point(result)]
     found = rotor_chambers(result.problem, part, point, STEPS)
     degrees = np.degrees(found.angles)

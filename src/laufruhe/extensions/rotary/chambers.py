@@ -1,0 +1,60 @@
+"""Chambers of a rotor, as pictures and tables show them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from laufruhe.machine import Engine, OperatingPoint, SliderCrank
+from laufruhe.numerics.arrays import Array
+from laufruhe.physics.cylinder_volume import chamber_volume
+from laufruhe.physics.gas_cycle import thrust_at
+from laufruhe.physics.gas_loads import chamber_torque
+from laufruhe.present.pictures import Picture
+from laufruhe.problem.problem import Problem
+
+PICTURE = Picture(
+    "chambers",
+    "Volume, pressure and torque of each chamber of a rotor over three turns of the shaft.",
+    "laufruhe.extensions.rotary.chambers_picture",
+)
+
+
+def rotors_of(engine: Engine) -> Sequence[SliderCrank]:
+    """Return the rotors of an engine."""
+    return [part for part in engine.slider_cranks if len(part.swept.lags) > 1]
+
+
+@dataclass(frozen=True)
+class RotorChambers:
+    """The chambers of a rotor, a row each, at angles of the shaft over the turns in which each works once.
+
+    Attributes
+    ----------
+    volume
+        Over the least [m3].
+    pressure, torque
+        Over the crankcase [Pa], and on the shaft [N m]; None without gas.
+    """
+
+    angles: Array
+    volume: Array
+    pressure: Array | None
+    torque: Array | None
+
+
+def rotor_chambers(problem: Problem, part: SliderCrank, point: OperatingPoint, count: int) -> RotorChambers:
+    """Return volume, pressure and torque of every chamber of a rotor (Y3, Y4)."""
+    gas, lags = problem.fidelity.gas_of(point), part.swept.lags
+    turns = math.tau * len(lags)
+    angles = np.linspace(0.0, turns, count)
+    since = [np.mod(angles - lag, turns) for lag in lags]
+    volume = np.array([chamber_volume(part, each) for each in since])
+    if gas is None:
+        return RotorChambers(angles, volume, None, None)
+    cycle = problem.engine.cycle
+    pressure = np.array([-thrust_at(gas, part, cycle, each) / part.piston_area for each in since])
+    return RotorChambers(angles, volume, pressure, np.array([chamber_torque(gas, part, cycle, each) for each in since]))

@@ -1,0 +1,36 @@
+"""Chambers of rotors as a file of numbers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from laufruhe.extensions.rotary.chambers import rotor_chambers, rotors_of
+from laufruhe.problem.curves import STEPS
+from laufruhe.report.section import Section
+from laufruhe.report.sheet import Sheet
+from laufruhe.solvers.result import Result
+
+
+def _chambers(result: Result) -> Sheet:
+    """Return volume, pressure and torque of every chamber of every rotor, of the final design."""
+    rows = []
+    for point in result.problem.points:
+        for part in rotors_of(result.final.engine):
+            found = rotor_chambers(result.problem, part, point, STEPS * len(part.swept.lags) + 1)
+            nothing = np.full_like(found.volume, math.nan)
+            pressure, torque = (nothing if each is None else each for each in (found.pressure, found.torque))
+            for k, columns in enumerate(zip(found.volume, pressure, torque, strict=True)):
+                values = np.column_stack([np.degrees(found.angles), *columns]).tolist()
+                rows += [[point.name, part.name, k + 1, *row] for row in values]
+    head = ["point", "rotor", "chamber", "angle [deg]", "volume over the least [m^3]",
+            "pressure over the crankcase [Pa]", "torque [N m]"]  # fmt: skip
+    return Sheet(head, rows)
+
+
+def _has_rotors(result: Result) -> bool:
+    return bool(rotors_of(result.final.engine))
+
+
+SECTION = Section("rotary", _has_rotors, sheets={"chambers": (_has_rotors, _chambers)})
