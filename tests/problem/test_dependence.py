@@ -29,7 +29,13 @@ from problem_files import PROBLEMS
 
 ROUNDING = 1e-9
 STEPS = 60
-FEW = ("study-soft-mounts", "single-rod-length", "shaper", "tractor-four-shaft-heights", "opposed-pistons-lead")
+FEW = (
+    "study-soft-mounts",
+    "single-rod-length",
+    "opposed-pistons-masses",
+    "tractor-four-shaft-heights",
+    "opposed-pistons-lead",
+)
 
 
 def _random(problem: Problem, rng: np.random.Generator) -> Problem:
