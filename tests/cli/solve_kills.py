@@ -39,6 +39,11 @@ def results(folder: Path) -> dict[str, bytes]:
     return found
 
 
+def left_behind(folder: Path) -> list[str]:
+    """Return the names of what is neither the problem nor its results."""
+    return sorted(path.name for path in folder.iterdir() if path.name not in ("scene.toml", "out"))
+
+
 def uninterrupted(folder: Path) -> Whole:
     """One run in a new folder, left alone."""
     folder.mkdir()
@@ -67,7 +72,11 @@ def attacked(folder: Path, seed: int, whole: Whole, told: Told) -> None:
             told.wrong.append(f"seed {seed}: a killed solve left files of two runs, or not all of one")
     last = started(folder)
     said = last.communicate()[1]
-    left = sorted(path.name for path in folder.iterdir() if path.name not in ("scene.toml", "out"))
+    if left_behind(folder):
+        # the artist of a killed solve may outlive it by a picture, and write it while the last one sweeps
+        last = started(folder)
+        said += last.communicate()[1]
+    left = left_behind(folder)
     if left:
         told.wrong.append(f"seed {seed}: {', '.join(left)} left behind")
     if last.returncode or said or results(folder) != whole.files:
