@@ -6,42 +6,9 @@ import pytest
 
 import laufruhe
 from laufruhe.prove.certificate import Proof
-from laufruhe.solvers.result import Result
+from open_four import FOUR, solved_each
 from problem_files import PROBLEMS, changed
 from ready import solved
-
-FOUR = """
-title = "Four in line"
-[engine]
-layout = "inline"
-cycle = "four-stroke"
-stroke = "80 mm"
-rod_ratio = 0.28
-reciprocating_mass = "0.5 kg"
-rotating_mass = "0.3 kg"
-cylinder_spacing = "100 mm"
-cylinders = 4
-throws = "open"
-[[operating_points]]
-name = "rated"
-speed = "3000 rpm"
-[mounts]
-positions = [["100 mm", "200 mm", "0 mm"], ["100 mm", "-200 mm", "0 mm"], ["-450 mm", "200 mm", "0 mm"],
-             ["-450 mm", "-200 mm", "0 mm"]]
-[[counterweights]]
-name = "web"
-opposite_throw = 1
-mass = { between = ["0 kg", "1 kg"] }
-angle = { between = [0, 360] }
-radius = "60 mm"
-[objective]
-minimise = "mean mount force"
-"""
-CRANKS = ("[0, 180, 180, 0]", "[0, 180, 0, 180]", "[0, 0, 180, 180]")
-
-
-def _each(text: str) -> list[Result]:
-    return [laufruhe.solve(changed(text, 'throws = "open"', f"throws = {crank}")) for crank in CRANKS]
 
 
 @pytest.mark.slow
@@ -49,7 +16,7 @@ def test_a_stroke_beside_an_open_crank_is_searched_for_each() -> None:
     text = changed(FOUR, 'stroke = "80 mm"', 'stroke = { between = ["70 mm", "90 mm"] }')
     found = laufruhe.solve(text)
     assert found.certificate.kind is Proof.LOCAL
-    assert found.objective.value == pytest.approx(min(one.objective.value for one in _each(text)), rel=1e-6)
+    assert found.objective.value == pytest.approx(min(one.objective.value for one in solved_each(text)), rel=1e-6)
 
 
 @pytest.mark.slow

@@ -5,16 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import xarray as xr
 
 from laufruhe.plots.picture import draw
-from laufruhe.report.document import Document
-from laufruhe.report.study_report import told as blocks_of
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.free_forces import printed_agree
-from laufruhe.studies.reader import load_study
-from laufruhe.studies.runner import run
-from problem_files import PROBLEMS, written
+from problem_files import PROBLEMS
+from studies.parts import part_of, told
 
 LAYOUTS = f"""
 title = "t"
@@ -29,16 +25,6 @@ name = "five"
 problem = "{PROBLEMS}/inline-five.toml"
 literature = {{ couple_1 = 0.449, couple_2 = 4.9798, force_2 = 0.001 }}
 """
-
-
-def part_of(folder: Path, text: str) -> xr.Dataset:
-    datasets, _ = run(load_study(written(folder, text, "study")), folder, folder / "kept")
-    return next(iter(datasets.values()))
-
-
-def told(kind: str, data: xr.Dataset) -> str:
-    blocks = tuple(block for text in KINDS[kind].table(data) for block in blocks_of(text))
-    return Document("part", blocks).as_markdown(".png")
 
 
 def test_free_forces_count_what_agrees(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ SCHEMA = "laufruhe.schema.json"
 
 @dataclass(frozen=True)
 class Given:
-    """What a problem file gives beside the table of an extension.
+    """Parts of a problem file that the table of an extension is read with.
 
     Attributes
     ----------

@@ -75,11 +75,6 @@ class StarProblem:
     samples: int
 
     @property
-    def is_bilinear(self) -> bool:
-        """Tell if unbalances are counted from a throw that is decided, so that no cone program has all stars."""
-        return any(norm.turns is not None for _, norm in (*self.terms, *self.limits))
-
-    @property
     def compressed(self) -> StarProblem:
         """The same with root mean squares in few rows (S12)."""
         terms, limits = (

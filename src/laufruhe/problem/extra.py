@@ -1,4 +1,4 @@
-"""What an extension asks of a problem beyond its drawing."""
+"""Requests of extensions that a problem carries beyond its drawing."""
 
 from __future__ import annotations
 

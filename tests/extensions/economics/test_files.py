@@ -10,12 +10,10 @@ import xarray as xr
 from typer.testing import CliRunner
 
 from laufruhe.cli import app
-from laufruhe.errors import InputError
 from laufruhe.extensions.economics.worth import worths
-from laufruhe.studies.reader import load_study
-from laufruhe.studies.runner import run
 from mounts.files import BLOCK, ENGINE, MOUNTS, SAG, changed
 from problem_files import PROBLEMS, written
+from studies.parts import refused
 
 ECONOMICS = f"""
 title = "t"
@@ -136,16 +134,3 @@ def test_economics_of_a_sag_says_that_it_is_no_load(tmp_path: Path) -> None:
     text = ECONOMICS.replace(f"{PROBLEMS}/tractor-three-shafts.toml", "four.toml")
     text = text.replace(f"{PROBLEMS}/inline-five.toml", "six.toml")
     refused(tmp_path, text, "objective: is static sag, which is no load, so shafts have nothing to lower")
-
-
-def refused(folder: Path, text: str, said: str) -> None:
-    """One line, exit status 2, no results."""
-    path = written(folder, text, "study")
-    with pytest.raises(InputError) as caught:
-        run(load_study(path), folder, folder / "kept")
-    line = str(caught.value)
-    assert said in line
-    assert "\n" not in line
-    answer = CliRunner().invoke(app, ["study", str(path), "--out", str(folder / "out")])
-    assert answer.exit_code == 2
-    assert not (folder / "out").exists()

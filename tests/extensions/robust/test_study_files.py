@@ -5,19 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-import xarray as xr
-from typer.testing import CliRunner
 
-from laufruhe.cli import app
-from laufruhe.errors import InputError
 from laufruhe.extensions.robust.study import verdicts
 from laufruhe.plots.picture import draw
-from laufruhe.report.document import Document
-from laufruhe.report.study_report import told as blocks_of
 from laufruhe.studies.kinds import KINDS
-from laufruhe.studies.reader import load_study
-from laufruhe.studies.runner import run
-from problem_files import PROBLEMS, written
+from problem_files import PROBLEMS
+from studies.parts import part_of, refused, told
 
 TOLERANCE = f"""
 title = "t"
@@ -38,16 +31,6 @@ name = "six"
 problem = "{PROBLEMS}/tractor-six.toml"
 claim = "matters"
 """
-
-
-def part_of(folder: Path, text: str) -> xr.Dataset:
-    datasets, _ = run(load_study(written(folder, text, "study")), folder, folder / "kept")
-    return next(iter(datasets.values()))
-
-
-def told(kind: str, data: xr.Dataset) -> str:
-    blocks = tuple(block for text in KINDS[kind].table(data) for block in blocks_of(text))
-    return Document("part", blocks).as_markdown(".png")
 
 
 @pytest.mark.slow
@@ -90,16 +73,3 @@ def test_several_operating_points_have_no_tolerance(tmp_path: Path) -> None:
     (tmp_path / "two-points.toml").write_text(text, encoding="utf-8")
     part = TOLERANCE.replace(f"{PROBLEMS}/tractor-six.toml", "two-points.toml")
     refused(tmp_path, part, "has several in 'six', and tolerances are studied at one")
-
-
-def refused(folder: Path, text: str, said: str) -> None:
-    """One line, exit status 2, no results."""
-    path = written(folder, text, "study")
-    with pytest.raises(InputError) as caught:
-        run(load_study(path), folder, folder / "kept")
-    line = str(caught.value)
-    assert said in line
-    assert "\n" not in line
-    answer = CliRunner().invoke(app, ["study", str(path), "--out", str(folder / "out")])
-    assert answer.exit_code == 2
-    assert not (folder / "out").exists()

@@ -86,7 +86,7 @@ class MountedLoads:
 
     @cached_property
     def orders(self) -> Orders:
-        """Those that are loaded."""
+        """Return the orders that are loaded."""
         moved = moved_wrench(NUMBERS, mounting_in(self.problem.engine).block.centre_of_gravity).T @ self.root.T
         found: list[tuple[int, int, float, float, ComplexArray]] = []
         at = self._throws.given[self._throws.open] if self._throws else np.zeros(0)

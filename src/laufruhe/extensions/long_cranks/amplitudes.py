@@ -1,4 +1,4 @@
-"""What even stars differ by in norms of forces and couples, order by order (S3, S5)."""
+"""Bound how even stars differ in norms of forces and couples, order by order (S3, S5)."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class StarAmplitudes(AmplitudeObjective):
         return min(self._forces(space, pattern) for pattern in space.patterns)
 
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
-        """Of the order that weighs most: no norm is less than its share in it (S5)."""
+        """Return the window of the order that weighs most: no norm is less than its share in it (S5)."""
         shares = np.sum([np.multiply(term.weight, term.couple) for term in self.terms], axis=0)
         place, room = int(np.argmax(shares)), value - self._forces(space, pattern)
         if room < 0.0:

@@ -134,7 +134,7 @@ class CoupleNorms:
         return float(sum(term.values(np.zeros((1, len(term.couples))))[0] for term in self.terms))
 
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
-        """Of the order that weighs most, by what that order alone leaves (S48)."""
+        """Return the window of the order that weighs most, by what that order alone leaves (S48)."""
         del pattern
         least = self.least(space)
         if value < least:

@@ -87,7 +87,7 @@ class _Search:
         self.looked_at, self.ended = 0, False
 
     def run(self) -> None:
-        """All stars in pieces, in rounds of so many: each piece knows the best of the rounds before it.
+        """Search all stars in pieces and rounds: each piece knows the best of the rounds before it.
 
         Pieces and rounds are the same whoever works, so what is found is too.
         """

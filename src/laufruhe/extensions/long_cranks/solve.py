@@ -124,7 +124,7 @@ def _evaluated(phasing: Phasing, family: Family, steps: tuple[int, ...]) -> tupl
 
 
 def _couples(problem: Problem) -> Problem:
-    """With the couple alone: all that even stars may have of their own."""
+    """Minimise the couple alone: even stars differ in nothing else."""
     return problem.changed(objective=(Term(Measure(ROCKING_COUPLE, NORMS["rms"])),))
 
 

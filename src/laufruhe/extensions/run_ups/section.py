@@ -1,4 +1,4 @@
-"""What mounts and block go through between rest and speed."""
+"""Tell the largest forces and travels between rest and speed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What can be asked of the crankshaft's twist (V4-V12)."""
+"""Channels of the crankshaft's twist (V4-V12)."""
 
 from __future__ import annotations
 
@@ -93,6 +93,6 @@ FACTORS: Mapping[Channel, physics.Factors] = {
     SHAFT_TORQUE: physics.section_stiffness,
     SHAFT_STRESS: physics.stress_factors,
 }
-"""What each place of a load makes of the twist of its section."""
+"""Factors from the twist of a section to the load at each place."""
 RESONANCES: Mapping[Channel, Resonances] = {TORSIONAL_FREQUENCIES: _at_speeds, CRITICAL_SPEEDS: _in_orders}
 """Speeds and orders that natural modes are counted at."""

@@ -44,7 +44,7 @@ def of_what_moves(name: str, signal: Callable[[Engine, PointLoads], Spectrum]) -
 
 @dataclass(frozen=True, eq=False)
 class Need:
-    """What an engine must have before a channel means anything.
+    """A part that an engine must have before a channel means anything.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Need:
 
 
 class Needs:
-    """What channels of the core need."""
+    """Needs of the channels of the core."""
 
     NOTHING = Need(lambda _: True, "", "")
     MOUNTS = Need(lambda e: e.mounts, "mounts", "add [mounts], or ask for a shaking force")
