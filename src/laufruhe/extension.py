@@ -65,7 +65,7 @@ class Extension:
     sections
         Objects of `laufruhe.report.section.Section`: tables and numbers of a result.
     pictures
-        Objects of `laufruhe.present.pictures.Picture`.
+        Objects of `laufruhe.present.pictures.ResultPicture`.
     """
 
     name: str

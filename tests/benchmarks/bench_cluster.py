@@ -28,7 +28,7 @@ from laufruhe.numerics.cluster import cluster as on_cluster
 from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.workers import HERE, each
 from laufruhe.plots.picture import save_picture
-from laufruhe.studies import picture as p
+from laufruhe.present import picture as p
 from laufruhe.studies.sampled import MOST_TABLED
 from studies import clusters
 

@@ -31,9 +31,9 @@ from laufruhe.machine.firing import even_patterns
 from laufruhe.machine.layouts import inline
 from laufruhe.physics.crank_stars import score_stars
 from laufruhe.physics.star_space import StarSpace
+from laufruhe.present.tables import Table
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
-from laufruhe.report.grid import Grid
 from laufruhe.report.sections import stars
 from laufruhe.solvers import solve
 from laufruhe.solvers.stars.cuts import search_designs
@@ -235,7 +235,7 @@ def growth(found: list[Row]) -> None:
     figure.savefig(OUT.with_suffix(".png"))
 
 
-def grid_text(grid: Grid) -> str:
+def grid_text(grid: Table) -> str:
     """A table of the report."""
     return f"**{grid.title}**\n\n{table(grid.head, list(grid.rows))}\n\n{grid.note}"
 

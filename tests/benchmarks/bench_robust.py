@@ -11,7 +11,7 @@ from pages import PAGES, ROOT, publish
 from laufruhe.extensions.robust.built_engines import BuiltEngines, values_of
 from laufruhe.extensions.robust.tolerance import Law, Tolerances, tolerances_of
 from laufruhe.files.reader import load
-from laufruhe.report.grid import piped
+from laufruhe.present.tables import piped
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import unbalances_of
 

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 from cli import scenes
 from laufruhe.cli import app
+from laufruhe.present.tables import Table
 from laufruhe.report.document import Bullets, Code, Document, Heading, Illustration, Paragraph
-from laufruhe.report.grid import Grid
 from laufruhe.report.web_page import as_html
 from problem_files import written
 from shared import once
@@ -41,9 +41,9 @@ SVG = '<svg xmlns="http://www.w3.org/2000/svg" width="1400" height="300"><path d
 BLOCKS = (
     Heading("Result"), Paragraph("**falls** to `227 N`", marked=True), Bullets("Assumptions:", ["rod ratio 0.26"]),
     Illustration("bars", "Mean and maximum of each mount's force"),
-    Grid("Narrow", ("throw", "mass [kg]"), [("front", "1.25")], note="A note."),
-    Grid("Ten columns", [f"heading {k} [N]" for k in range(10)], [["a case by its name", *["-1234 N"] * 9]], left=1),
-    Grid("Fourteen columns", [f"largest {k} [N]" for k in range(14)], [["a case", *["12345.6"] * 13]] * 12),
+    Table(("throw", "mass [kg]"), [("front", "1.25")], title="Narrow", note="A note."),
+    Table([f"heading {k} [N]" for k in range(10)], [["a case by its name", *["-1234 N"] * 9]], title="Ten columns"),
+    Table([f"largest {k} [N]" for k in range(14)], [["a case", *["12345.6"] * 13]] * 12, title="Fourteen columns"),
     Code("laufruhe solve " + "a-problem-with-a-long-name-" * 8 + ".toml"),
 )  # fmt: skip
 LEFT_OUT = {"_build", "jupyter_execute", "gallery", "notebooks", "examples"}

@@ -11,7 +11,7 @@ import pytest
 import laufruhe
 from lanes import first_fast
 from laufruhe.prove.certificate import Proof
-from laufruhe.report.tables import sheets_of
+from laufruhe.report.tables import number_tables
 
 INPUTS = Path(__file__).parent / "inputs"
 
@@ -61,5 +61,5 @@ def test_tables_of_objectives_that_needed_other_numbers_of_angles() -> None:
     result = laufruhe.solve(INPUTS / "ranks-of-a-bearing.toml")
     assert result.initial.samples == result.final.samples
     assert result.objective.value == pytest.approx(796.32, abs=0.01)
-    paths = sheets_of(result)["bearings-on-crank"]
+    paths = number_tables(result)["bearings-on-crank"]
     assert {len(row) for row in paths.rows} == {len(paths.head)}

@@ -17,8 +17,8 @@ from laufruhe.plots import figure, names, style
 from laufruhe.plots.results import firings, torque
 from laufruhe.plots.style import page
 from laufruhe.plots.words import FAINT, INK, READ, beside, contrast, grouped, ink_on, legible, spread, typeset, wrapped
+from laufruhe.present import picture
 from laufruhe.present.pictures import PICTURES, rows_of
-from laufruhe.studies import picture
 from picture_faults import faults_of
 
 # layouts, cycles, mounts, what is open: each fills other pictures

@@ -16,14 +16,13 @@ import pytest
 from cli import scenes
 from laufruhe.files.reader import load
 from laufruhe.physics.torque import torque_parts
-from laufruhe.present.pictures import CURVES, PRINTED, SHEETS
+from laufruhe.present.tables import Table
 from laufruhe.problem.evaluation import measured
-from laufruhe.report import curves, tables
-from laufruhe.report.files import result_files
+from laufruhe.report import tables
+from laufruhe.report.files import TABLES, result_files
 from laufruhe.report.sections import SECTIONS
-from laufruhe.report.sheet import Sheet
-from laufruhe.report.tables import sheets_of, write_csv, writing_tables
-from laufruhe.report.workbook import write_book
+from laufruhe.report.table_files import write_book, write_csv
+from laufruhe.report.tables import number_tables, writing_tables
 from laufruhe.solvers import Result, state
 from problem_files import PROBLEMS, loaded
 from ready import solved
@@ -55,7 +54,7 @@ PLAIN = ["-5", "+5 %", "-3.2 N m", "-1e-5 kg m^2", "-", "a=1", "1-3-4-2", " =1",
 
 @pytest.mark.parametrize("text", FORMULAS)
 def test_no_text_is_computed_by_a_spreadsheet(text: str, tmp_path: Path) -> None:
-    sheet = Sheet([text, "x"], [[text, -1.5], ["a", 2]])
+    sheet = Table([text, "x"], [[text, -1.5], ["a", 2]])
     write_csv(sheet, tmp_path / "t.csv")
     with (tmp_path / "t.csv").open(encoding="utf-8", newline="") as stream:
         rows = list(csv.reader(stream))
@@ -68,7 +67,7 @@ def test_no_text_is_computed_by_a_spreadsheet(text: str, tmp_path: Path) -> None
 
 @pytest.mark.parametrize("text", PLAIN)
 def test_plain_texts_are_left_alone(text: str, tmp_path: Path) -> None:
-    write_csv(Sheet([text], [[text]]), tmp_path / "t.csv")
+    write_csv(Table([text], [[text]]), tmp_path / "t.csv")
     assert (tmp_path / "t.csv").read_text(encoding="utf-8") == f"{text}\n{text}\n"
 
 
@@ -105,7 +104,7 @@ def test_decisions_are_in_full_precision(result: Result, folder: Path) -> None:
 
 def test_the_workbook_has_a_sheet_for_every_file(result: Result, folder: Path) -> None:
     book = openpyxl.load_workbook(folder / "tables.xlsx", read_only=True)
-    assert set(book.sheetnames) == {path.stem for path in folder.glob("*.csv")} == set(sheets_of(result))
+    assert set(book.sheetnames) == {path.stem for path in folder.glob("*.csv")} == set(number_tables(result))
     rows = list(book["orders"].iter_rows(values_only=True))
     table = pd.read_csv(folder / "orders.csv")
     assert list(rows[0]) == list(table.columns)
@@ -128,7 +127,7 @@ def test_the_same_numbers_make_the_same_files(
 
 @pytest.mark.slow
 def test_elastic_mounts_have_modes_travel_and_curves_over_speed(tmp_path: Path) -> None:
-    found = sheets_of(state(load(PROBLEMS / "study-soft-mounts.toml")))
+    found = number_tables(state(load(PROBLEMS / "study-soft-mounts.toml")))
     assert {"modes", "transmissibility", "forces"} <= set(found)
     assert any(head.startswith("travel at front left") for head in found["forces"].head)
     assert len(found["modes"].rows) == 6
@@ -139,7 +138,7 @@ def test_elastic_mounts_have_modes_travel_and_curves_over_speed(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_ranked_stars_are_a_sheet() -> None:
-    found = sheets_of(solved("inline-five-open"))
+    found = number_tables(solved("inline-five-open"))
     assert found["rankings"].rows[0][0] == 1
     assert found["rankings"].rows[0][3] is True
     # an even five-cylinder star has no free force of any order shown
@@ -160,27 +159,27 @@ def test_a_name_that_looks_like_a_formula_stays_text(tmp_path: Path) -> None:
     assert all(cell.data_type != "f" for cell in cells)
     # as it is, also a dash
     assert {cell.value for cell in cells} == {"=1+1"}
-    write_book({"one": Sheet(["a", "b"], [["-", "-26.8 %"]])}, tmp_path / "dash.xlsx")
+    write_book({"one": Table(["a", "b"], [["-", "-26.8 %"]])}, tmp_path / "dash.xlsx")
     assert [cell.value for cell in openpyxl.load_workbook(tmp_path / "dash.xlsx")["one"][2]] == ["-", "-26.8 %"]
 
 
 @pytest.mark.parametrize("text", ["<r>a & b</r>", "<r><t>bold</t></r>", "<r></r>", " <r>", "<r>", "</r>"])
 def test_a_text_that_looks_like_marks_of_formatting_is_a_text(text: str, tmp_path: Path) -> None:
-    write_book({"one": Sheet([text, "b"], [[text, 1.0], [1.0, text]])}, tmp_path / "marks.xlsx")
+    write_book({"one": Table([text, "b"], [[text, 1.0], [1.0, text]])}, tmp_path / "marks.xlsx")
     cells = list(openpyxl.load_workbook(tmp_path / "marks.xlsx")["one"].iter_rows(values_only=True))
     assert cells == [(text, "b"), (text, 1.0), (1.0, text)]
 
 
 def test_names_are_known_before_anything_is_made(result: Result) -> None:
-    assert set(sheets_of(result)) <= {*SHEETS, *CURVES, *PRINTED}
-    assert len({*SHEETS, *CURVES, *PRINTED}) == len(SHEETS) + len(CURVES) + len(PRINTED)
+    assert set(number_tables(result)) <= {*TABLES}
+    assert len({*TABLES}) == len(TABLES)
     # every section of a report is a file: in full precision, or as it is printed
-    named = {section.__name__.rpartition(".")[2]: getsource(section).count('sheet="') for section in SECTIONS}
+    named = {section.__name__.rpartition(".")[2]: getsource(section).count('file="') for section in SECTIONS}
     assert {name for name, count in named.items() if not count} == WHOLE
 
 
 def test_a_file_is_named_after_the_table_that_it_holds() -> None:
-    found = sheets_of(solved("tractor-single"))
+    found = number_tables(solved("tractor-single"))
     assert found["weights"].head[0] == "weight"
     assert found["balance-factors"].head[0] == "throw of"
 
@@ -188,11 +187,10 @@ def test_a_file_is_named_after_the_table_that_it_holds() -> None:
 @pytest.mark.slow
 def test_what_only_the_report_knows_is_a_file_too() -> None:
     result = state(load(PROBLEMS / "inline-five-torsion.toml"))
-    found = sheets_of(result)
+    found = number_tables(result)
     assert "crankshaft-torque" in found
     assert set(found) <= {name.removesuffix(".csv") for name in result_files()}
     assert any(isinstance(cell, float) for row in found["crankshaft-torque"].rows for cell in row)
-    assert set(curves.CURVES) == set(CURVES)
     work = np.array([row[found["torque"].head.index("as given: work stored [J]")] for row in found["torque"].rows])
     whole = np.array([row[found["torque"].head.index("as given: torque of all [N m]")] for row in found["torque"].rows])
     # the work is what the torque does beyond its mean
@@ -205,7 +203,7 @@ def test_what_only_the_report_knows_is_a_file_too() -> None:
 
 def test_pages_of_a_workbook_have_names_that_it_takes(tmp_path: Path) -> None:
     names = ["mean force over 'speed'", "a" * 40, "A" * 40, "n/a [kg]", "'quoted'"]
-    write_book({name: Sheet(["x"], [[1.5], [None], [float("nan")]]) for name in names}, tmp_path / "book.xlsx")
+    write_book({name: Table(["x"], [[1.5], [None], [float("nan")]]) for name in names}, tmp_path / "book.xlsx")
     book = openpyxl.load_workbook(tmp_path / "book.xlsx")
     assert book.sheetnames == ["mean force over 'speed-", "a" * 31, "A" * 29 + " 2", "n-a -kg-", "-quoted-"]
     assert [cell.value for cell in book["n-a -kg-"]["A"]] == ["x", 1.5]
@@ -216,7 +214,7 @@ def test_cells_of_a_workbook_are_those_of_the_sheet(tmp_path: Path) -> None:
     numbers = [1.5e-300, 1 / 3, 12, np.float64(0.1), np.int64(7)]
     row = [*numbers, True, np.False_, "a < b", "https://a", "12", "", None, math.inf, math.nan, np.float64("nan")]
     head = [f"column {k}" for k in range(len(row))]
-    write_book({"one": Sheet(head, [row, row[::-1]])}, tmp_path / "book.xlsx")
+    write_book({"one": Table(head, [row, row[::-1]])}, tmp_path / "book.xlsx")
     found = [[cell.value for cell in cells] for cells in openpyxl.load_workbook(tmp_path / "book.xlsx")["one"]]
     expected = [*numbers, True, False, "a < b", "https://a", "12", *[None] * 5]
     assert found == [head, pytest.approx(expected), pytest.approx(expected[::-1])]
@@ -224,14 +222,14 @@ def test_cells_of_a_workbook_are_those_of_the_sheet(tmp_path: Path) -> None:
 
 
 def test_a_text_that_is_no_unicode_is_spelled_out(tmp_path: Path) -> None:
-    write_book({"one": Sheet(["x"], [["a\udce9"]])}, tmp_path / "book.xlsx")
+    write_book({"one": Table(["x"], [["a\udce9"]])}, tmp_path / "book.xlsx")
     assert openpyxl.load_workbook(tmp_path / "book.xlsx")["one"]["A2"].value == "a\\udce9"
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 def test_a_workbook_that_cannot_be_written_is_an_error_of_files(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError, match="nowhere"):
-        write_book({"one": Sheet(["x"], [[1.0]])}, tmp_path / "nowhere" / "book.xlsx")
+        write_book({"one": Table(["x"], [[1.0]])}, tmp_path / "nowhere" / "book.xlsx")
     # XlsxWriter leaves rows open that it could not write
     gc.collect()
 
@@ -240,7 +238,7 @@ def test_a_workbook_that_cannot_be_written_is_an_error_of_files(tmp_path: Path) 
 def test_indicator_diagrams_enclose_the_work_of_the_gas() -> None:
     """What the forces on the rods do over a turn is what the torque of the gas does."""
     result = state(load(PROBLEMS / "waterworks-steam-pump.toml"))
-    sheet = sheets_of(result)["indicator"]
+    sheet = number_tables(result)["indicator"]
     stroke = {part.name: part.stroke for part in result.final.engine.slider_cranks}
     work = 0.0
     for name in stroke:
@@ -258,7 +256,7 @@ def test_indicator_diagrams_enclose_the_work_of_the_gas() -> None:
 def test_a_willans_line_is_a_file_with_its_readings() -> None:
     """The line of the file is that of NumPy's least squares, and meets no fuel at the friction."""
     result = state(load(PROBLEMS / "car-four-willans.toml"))
-    sheet, test = sheets_of(result)["willans"], result.problem.friction[0]
+    sheet, test = number_tables(result)["willans"], result.problem.friction[0]
     rows = [row for row in sheet.rows if row[0] == test.at]
     measured_rows = np.array([row[2:] for row in rows if row[1] == "measured"], dtype=float)
     assert len(measured_rows) == len(test.x)
@@ -273,7 +271,7 @@ def test_a_willans_line_is_a_file_with_its_readings() -> None:
 @pytest.mark.slow
 def test_wear_and_forces_on_the_crank_are_those_of_the_forces() -> None:
     """Wear counted load by load, and lengths that no turn changes, against the forces of the other file."""
-    found = sheets_of(state(load(PROBLEMS / "tractor-four-bearings.toml")))
+    found = number_tables(state(load(PROBLEMS / "tractor-four-bearings.toml")))
     forces, crank, wear = found["forces"], found["bearings-on-crank"], found["wear"]
     name = wear.head[3].removeprefix("wear of ").removesuffix(" [-]")
     point = crank.rows[0][0]
@@ -304,7 +302,7 @@ def test_wear_and_forces_on_the_crank_are_those_of_the_forces() -> None:
 def test_what_turns_with_and_against_the_crank_adds_up_to_the_order() -> None:
     """Largest and least length of an order's ellipse are the sum and the difference of its two circles."""
     result = state(load(PROBLEMS / "twin-vee-offset-pins.toml"))
-    sheet = sheets_of(result)["turning-parts"]
+    sheet = number_tables(result)["turning-parts"]
     loads = result.final.loads[0]
     row = next(row for row in sheet.rows if row[1] == loads.point.name and row[2] == "force" and row[3] == 1)
     angles = np.radians(np.arange(0.0, 360.0, 0.05))

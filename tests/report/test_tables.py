@@ -11,15 +11,14 @@ import pytest
 
 import laufruhe
 from cli import scenes
+from laufruhe.present.tables import Table, escaped, unmarked
 from laufruhe.report.document import Bullets, Document, Paragraph
-from laufruhe.report.grid import Grid, escaped, unmarked
 from laufruhe.report.result_report import result_document
 from laufruhe.report.screen import show, show_document
 from laufruhe.report.sections import tables_of
-from laufruhe.report.study_report import told
 from laufruhe.report.wording import explained, headline, why_star
 from laufruhe.solvers import Result
-from laufruhe.studies.text import Rows
+from laufruhe.studies.text import marked_table
 from ready import solved
 
 _OPEN_FACTOR = """
@@ -145,15 +144,15 @@ def test_weights_are_in_grams_and_throws_have_their_balance_factor() -> None:
     assert re.fullmatch(r"[\d.]+ kg m = [\d.]+ g mm", tight["Decisions"].rows[0][2])
 
 
-WIDE = Grid(
-    "Wide",
+WIDE = Table(
     ("place of the mount", "first number", *(f"number {k} of many" for k in range(9)), "why"),
     [("front left", "0.01230", *(f"{k}234.5678" for k in range(9)), "there is no gas")],
+    title="Wide",
     left=(0, 11),
 )
 
 
-def document_on(width: int, *blocks: Bullets | Grid | Paragraph) -> list[str]:
+def document_on(width: int, *blocks: Bullets | Table | Paragraph) -> list[str]:
     """Lines of a document on a screen of some width."""
     stream = io.StringIO()
     with pytest.MonkeyPatch.context() as patch:
@@ -180,7 +179,7 @@ def test_a_marked_table_has_no_marks_on_the_screen() -> None:
         Paragraph("**Take** `auto` of *this*", marked=True),
         Paragraph("a * b * c"),
         Bullets("lead", ["`auto` is safe"], marked=True),
-        Grid("", ("problem", "take"), [("[single](single.md)", "`two-order`")], left=2, marked=True),
+        Table(("problem", "take"), [("[single](single.md)", "`two-order`")], left=2, marked=True),
     )
     text = "\n".join(document_on(80, *blocks))
     for line in ("Take auto of this\n", "a * b * c\n", "- auto is safe", "single    two-order"):
@@ -189,10 +188,8 @@ def test_a_marked_table_has_no_marks_on_the_screen() -> None:
 
 
 def test_numbers_of_a_study_stand_below_each_other() -> None:
-    rows = Rows(["case", "speed", "force [N]", "change", "proof"], [
+    rows = marked_table(["case", "speed", "force [N]", "change", "proof"], [
         ["one", "6", "704.88", "–", "as given"], ["**one**", "**8**", "**1.2e-05**", "**-14.4 %**", "**proven**"],
     ])  # fmt: skip
-    (grid,) = told(rows)
-    assert isinstance(grid, Grid)
-    assert grid.texts == {0, 4}
-    assert "| --- | ---: | ---: | ---: | --- |" in grid.as_markdown()
+    assert rows.texts == {0, 4}
+    assert "| --- | ---: | ---: | ---: | --- |" in rows.as_markdown()

@@ -9,8 +9,8 @@ from itertools import pairwise
 import pytest
 
 from cli import scenes
+from laufruhe.present.tables import Table
 from laufruhe.report.document import Bullets, Code, Document, Heading, Illustration, Paragraph
-from laufruhe.report.grid import Grid
 from laufruhe.report.result_report import result_document
 from laufruhe.report.web_page import as_html
 
@@ -109,8 +109,9 @@ def test_both_pages_say_the_same() -> None:
 def test_what_looks_like_a_tag_is_text() -> None:
     blocks = (
         Heading("<b>"), Paragraph("<script>alert(1)</script>"), Paragraph("**yes** `a<b`", marked=True),
-        Bullets("x", ["<i>"]), Code("a && b"), Illustration("p", 'a "picture"'), Grid("t", ("<u>",), [("**no**",)]),
-        Grid("", ("h",), [("**no**",)], marked=True),
+        Bullets("x", ["<i>"]), Code("a && b"), Illustration("p", 'a "picture"'),
+        Table(("<u>",), [("**no**",)], title="t"),
+        Table(("h",), [("**no**",)], marked=True),
     )  # fmt: skip
     text = as_html(Document("<h1>", blocks), {"p": SVG})
     assert "<script>" not in text

@@ -8,9 +8,9 @@ import xarray as xr
 
 from lanes import first_fast
 from laufruhe.plots.picture import draw
+from laufruhe.present.picture import WIDEST, Bars, Picture
 from laufruhe.present.pictures import rows_of
 from laufruhe.studies.kinds import KINDS
-from laufruhe.studies.picture import WIDEST, Bars, Picture
 from picture_faults import faults_of
 
 

@@ -11,11 +11,11 @@ from laufruhe.cli.screen import pace, typed
 from laufruhe.errors import printed, refused
 from laufruhe.files.reader import shown_as
 from laufruhe.numerics.cores import processors
+from laufruhe.present.picture import Picture
 from laufruhe.report import files
 from laufruhe.report.strict_json import strict
 from laufruhe.report.study_report import as_json, file_names, write_study
 from laufruhe.studies.kept_points import KEPT
-from laufruhe.studies.picture import Picture
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
 from laufruhe.studies.scenes import Scenes

@@ -21,7 +21,7 @@ from laufruhe.plots import style
 from laufruhe.plots.letters import prepare
 from laufruhe.plots.style import as_svg, heading, page, save, styled
 from laufruhe.plots.words import SMALL, apart, grouped, ink_on, legible, typeset
-from laufruhe.studies.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
+from laufruhe.present.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
 
 MOST_ENTRIES, FEW_ENTRIES = 8, 5
 

@@ -9,7 +9,7 @@ from laufruhe.extension import extended
 
 
 @dataclass(frozen=True)
-class Picture:
+class ResultPicture:
     """A picture of a result.
 
     Attributes
@@ -50,21 +50,9 @@ _CAPTIONS = {
     "modes": "Share of each motion in the kinetic energy of each natural mode.",
     "trade": "What slightly uneven firing buys.",
 }
-PICTURES: Mapping[str, Picture] = extended("pictures", Picture, [Picture(*each) for each in _CAPTIONS.items()])
-
-SHEETS = (
-    "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "rankings",
-)  # fmt: skip
-"""Curves and tables of a result as files: `report.tables` fills them in full precision."""
-CURVES = (
-    "torque", "indicator", "uneven-firing",
-    "willans", "bearings-on-crank", "wear", "turning-parts", "mount-critical-speeds",
-)  # fmt: skip
-"""Further ones, which `report.curves` fills."""
-PRINTED = (
-    "reach", "objectives-in-order", "equal-optima", "weights", "balance-factors", "crankshaft-torque", "load-cases",
-)  # fmt: skip
-"""Tables of the report that are files as they are printed."""
+PICTURES: Mapping[str, ResultPicture] = extended(
+    "pictures", ResultPicture, [ResultPicture(*each) for each in _CAPTIONS.items()]
+)
 
 
 def rows_of(count: int, most: int) -> tuple[list[range], int]:

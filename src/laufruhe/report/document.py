@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from laufruhe.report.grid import Grid, escaped
+from laufruhe.present.tables import Table, escaped
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ class Code:
         return f"```sh\n{self.text}\n```"
 
 
-Block: TypeAlias = Heading | Paragraph | Bullets | Illustration | Code | Grid
+Block: TypeAlias = Heading | Paragraph | Bullets | Illustration | Code | Table
 
 
 @dataclass(frozen=True)

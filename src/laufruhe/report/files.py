@@ -16,7 +16,7 @@ from typing import Any
 
 from laufruhe.errors import InputError, printed, refused
 from laufruhe.numerics.locks import held
-from laufruhe.present.pictures import CURVES, PICTURES, PRINTED, SHEETS
+from laufruhe.present.pictures import PICTURES
 from laufruhe.report.section import EXTENSION_SECTIONS
 from laufruhe.report.strict_json import is_ours
 
@@ -25,7 +25,13 @@ REPORT = "report.md"
 PAGE, BOOK = "report.html", "tables.xlsx"
 MOTION = "engine.gif"
 KINDS = ("png", "svg")
-"""Of picture files."""
+"""Endings of picture files."""
+TABLES = (
+    "decisions", "limits", "measures", "forces", "orders", "modes", "transmissibility", "rankings", "torque",
+    "indicator", "uneven-firing", "willans", "bearings-on-crank", "wear", "turning-parts", "mount-critical-speeds",
+    "reach", "objectives-in-order", "equal-optima", "weights", "balance-factors", "crankshaft-torque", "load-cases",
+)  # fmt: skip
+"""Names of the tables of a result that are CSV files; extensions add theirs."""
 MADE = ".laufruhe.json"
 """What stands in a folder of results beside them: the command that made them, and their names."""
 _NEXT = f"{MADE}-next"
@@ -39,7 +45,7 @@ def result_files() -> tuple[str, ...]:
     return (
         RESULT, REPORT, PAGE, BOOK, MOTION,
         *(f"{name}.{kind}" for name in PICTURES for kind in KINDS),
-        *(f"{name}.csv" for name in (*SHEETS, *CURVES, *PRINTED, *sum(added, ()))),
+        *(f"{name}.csv" for name in (*TABLES, *sum(added, ()))),
     )  # fmt: skip
 
 

@@ -9,12 +9,12 @@ from typing import Literal, TextIO
 from rich import box
 from rich.cells import cell_len
 from rich.console import Console
-from rich.table import Table
+from rich.table import Table as RichTable
 from rich.text import Text
 
+from laufruhe.present.tables import Table, unmarked
 from laufruhe.report.document import Bullets, Document, Heading, Paragraph
 from laufruhe.report.files import PAGE, placed
-from laufruhe.report.grid import Grid, unmarked
 from laufruhe.report.sections import tables_of
 from laufruhe.report.wording import explained, fidelity_of, headline, told
 from laufruhe.solvers.result import Result, Status
@@ -57,7 +57,7 @@ def show_document(document: Document, stream: TextIO, folder: Path, page: str) -
                 console.print(Text(lead))
                 for item in items:
                     _print_item(console, unmarked(item) if marked else item)
-            case Grid():
+            case Table():
                 _print_grid(console, block)
                 console.print()
     _print_place(console, folder, page)
@@ -78,12 +78,12 @@ def _print_place(console: Console, folder: Path, page: str) -> None:
 
 def _print_item(console: Console, text: str) -> None:
     """An entry of a list, its lines below each other."""
-    item = Table.grid(padding=(0, 1))
+    item = RichTable.grid(padding=(0, 1))
     item.add_row("-", Text(text))
     console.print(item)
 
 
-def _print_grid(console: Console, grid: Grid) -> None:
+def _print_grid(console: Console, grid: Table) -> None:
     console.print()
     if grid.title:
         console.print(Text(grid.title, style="bold"))
@@ -95,7 +95,7 @@ def _print_grid(console: Console, grid: Grid) -> None:
         console.print(Text(grid.note, style="dim"))
 
 
-def _parts(grid: Grid, width: int) -> Iterator[Sequence[int]]:
+def _parts(grid: Table, width: int) -> Iterator[Sequence[int]]:
     """Columns of tables that are no wider than the screen: each begins with the leading columns of text."""
     least = [least for least, _ in _widths(grid)]
     lead = next(k for k in range(len(grid.head) + 1) if k not in grid.texts or k == len(grid.head) - 1)
@@ -108,7 +108,7 @@ def _parts(grid: Grid, width: int) -> Iterator[Sequence[int]]:
     yield columns
 
 
-def _widths(grid: Grid) -> list[tuple[int, int]]:
+def _widths(grid: Table) -> list[tuple[int, int]]:
     """Of every column the least width at which no number and no word of it is broken, and that of whole lines."""
     found = []
     for k, head in enumerate(grid.head):
@@ -119,8 +119,8 @@ def _widths(grid: Grid) -> list[tuple[int, int]]:
     return found
 
 
-def _table(grid: Grid, columns: Sequence[int], width: int) -> Table:
-    table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
+def _table(grid: Table, columns: Sequence[int], width: int) -> RichTable:
+    table = RichTable(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False)
     widths = [_widths(grid)[k] for k in columns]
     room = width - BETWEEN * (len(columns) - 1)
     # the widest lines are wrapped first

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeAlias
 
 from laufruhe.extension import extended
-from laufruhe.report.grid import Grid
-from laufruhe.report.sheet import Sheets
+from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
+
+NumberTables: TypeAlias = Mapping[str, tuple[Callable[[Result], object], Callable[[Result], Table]]]
+"""By file names: a function that returns whether a result has the table, and one that returns it."""
 
 
 @dataclass(frozen=True)
@@ -34,10 +36,10 @@ class Section:
 
     name: str
     applies: Callable[[Result], bool]
-    tables: Callable[[Result], Sequence[Grid]] = lambda _: ()
+    tables: Callable[[Result], Sequence[Table]] = lambda _: ()
     record: Callable[[Result], Mapping[str, Any]] | None = None
     printed: tuple[str, ...] = ()
-    sheets: Sheets = field(default_factory=dict)
+    sheets: NumberTables = field(default_factory=dict)
 
 
 EXTENSION_SECTIONS: Mapping[str, Section] = extended("sections", Section, ())

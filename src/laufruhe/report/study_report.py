@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
+from laufruhe.present.picture import Picture
+from laufruhe.present.tables import Table
 from laufruhe.report import files
 from laufruhe.report.document import Block, Bullets, Document, Heading, Illustration, Paragraph
-from laufruhe.report.grid import Grid, unmarked
-from laufruhe.report.sheet import Sheet
 from laufruhe.report.strict_json import strict
-from laufruhe.report.tables import write_csv
+from laufruhe.report.table_files import write_book, write_csv
 from laufruhe.report.web_page import as_html
-from laufruhe.report.workbook import write_book
 from laufruhe.studies.part import Part
-from laufruhe.studies.picture import Picture
 from laufruhe.studies.reader import StudyFile
-from laufruhe.studies.text import NOTHING, Rows, Text
-
-_NUMBER = re.compile(rf"[-+−]?\d[\d.,]*(e[-+]?\d+)?( %)?|{NOTHING}|")
+from laufruhe.studies.text import Text
 
 
 def file_names(study: StudyFile) -> list[str]:
@@ -62,7 +57,7 @@ def write_study(
         data.rename(spaced).to_netcdf(folder / f"{name}.nc")
         if "csv" in part.ends:
             rows = _flat(data)
-            sheets[name] = Sheet([*rows.index.names, *rows.columns], rows.reset_index().to_numpy(dtype=object).tolist())
+            sheets[name] = Table([*rows.index.names, *rows.columns], rows.reset_index().to_numpy(dtype=object).tolist())
             write_csv(sheets[name], folder / f"{name}.csv")
         if "png" in part.ends:
             drawn[name] = draw(part.picture(data), folder / name)
@@ -89,7 +84,7 @@ def study_document(
     if datasets:
         spent = [(name, f"{duration:.1f}") for name, duration in seconds.items()]
         rows = [*spent, ("all", f"{sum(seconds.values()):.1f}")]
-        blocks += [Heading("Where the time went"), Paragraph("Seconds on one core."), Grid("", ("part", "s"), rows)]
+        blocks += [Heading("Where the time went"), Paragraph("Seconds on one core."), Table(("part", "s"), rows)]
     return Document(study.title, tuple(blocks))
 
 
@@ -106,14 +101,12 @@ def _part(part: Part, data: xr.Dataset) -> Iterator[Block]:
 
 def told(text: Text) -> Iterator[Block]:
     """A paragraph or a table; how many rows stand in the CSV file only."""
-    if not isinstance(text, Rows):
+    if not isinstance(text, Table):
         yield Paragraph(text, marked=True)
         return
-    words = [k for k in range(len(text.head)) if not all(_NUMBER.fullmatch(unmarked(row[k])) for row in text.rows)]
-    yield Grid("", text.head, text.rows, left=words, marked=True)
-    rest = text.whole - len(text.rows)
-    if rest > 0:
-        yield Paragraph(f"{rest} more rows are in the CSV file.")
+    yield text
+    if text.omitted:
+        yield Paragraph(f"{text.omitted} more rows are in the CSV file.")
 
 
 def _flat(data: xr.Dataset) -> Any:

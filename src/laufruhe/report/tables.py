@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
+import cmath
 import math
-import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple, fields
@@ -12,59 +11,74 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.processes import meanwhile
-from laufruhe.present.measures import has_loads, has_ranking, limits_of, loaded, places_of, ranking_of
-from laufruhe.present.mounting import facts_of, is_elastic
+from laufruhe.physics.bearing_wear import wear_of
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.irregularity import swing_of
+from laufruhe.physics.reduced_inertia import turning_inertia
+from laufruhe.physics.torque import torque_parts
+from laufruhe.physics.willans import FrictionTest
+from laufruhe.present.chambers import indicator_of, points_with_chambers
+from laufruhe.present.measures import (
+    BEARINGS,
+    as_crank_turns,
+    asks_torque,
+    bearing_paths,
+    has_bearings,
+    has_loads,
+    has_ranking,
+    limits_of,
+    loaded,
+    objective_unit,
+    places_of,
+    ranking_of,
+)
+from laufruhe.present.mounting import critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import RPM
 from laufruhe.present.speed_curves import speeds_of, transmissibility_of
+from laufruhe.present.tables import Table
+from laufruhe.present.twins import KINDS, is_twin, parts_of
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
 from laufruhe.problem.evaluation import measured
 from laufruhe.report import files
-from laufruhe.report.curves import CURVES
-from laufruhe.report.grid import Grid
-from laufruhe.report.section import EXTENSION_SECTIONS
+from laufruhe.report.section import EXTENSION_SECTIONS, NumberTables
 from laufruhe.report.sections import tables_of as printed_tables
-from laufruhe.report.sheet import Sheet, Sheets
-from laufruhe.report.workbook import write_book
+from laufruhe.report.table_files import write_book, write_csv
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionValue, LimitValue
 
 MOST_ROWS = 20 * STEPS
-_FORMULA = re.compile(r"(?!-?$|[+-]?[0-9.]+(?:e[+-]?[0-9]+)?(?: ?%| [\w ./*^°²³]*)?$)[=+\-@\t＝＋－＠]")
-"""Begins what a spreadsheet may compute: a sign that no plain number with its unit follows."""
 MANY = 5_000
 """Cells that take longer to write than a process to begin."""
 
 
-def sheets_of(result: Result) -> dict[str, Sheet]:
-    """All sheets that a result fills, by name: SI, but for degrees and rpm where their heads say so."""
-    sheets = [_SHEETS, *(section.sheets for section in EXTENSION_SECTIONS.values())]
-    made = {name: of(result) for each in sheets for name, (applies, of) in each.items() if applies(result)}
-    return {name: sheet for name, sheet in made.items() if sheet.rows} | _printed(result)
+def number_tables(result: Result) -> dict[str, Table]:
+    """Return the tables of a result by file name: SI, degrees and rpm where the heads say so, others as printed."""
+    groups = [_TABLES, *(section.sheets for section in EXTENSION_SECTIONS.values())]
+    tables = {name: fill(result) for group in groups for name, (applies, fill) in group.items() if applies(result)}
+    for printed in printed_tables(result):
+        if printed.file:
+            head = [printed.head[0] or printed.title, *printed.head[1:]]
+            tables[printed.file] = Table(head, [[_as_number(cell) for cell in row] for row in printed.rows])
+    return {name: table for name, table in tables.items() if table.rows}
 
 
-def _printed(result: Result) -> dict[str, Sheet]:
-    """Tables of the report that have no sheet of their own, as they are printed."""
-    return {grid.sheet: _as_printed(grid) for grid in printed_tables(result) if grid.sheet}
-
-
-def _as_printed(grid: Grid) -> Sheet:
-    head = [grid.head[0] or grid.title, *grid.head[1:]]
-    return Sheet(head, [[_number(cell) for cell in row] for row in grid.rows])
-
-
-def _number(cell: str) -> str | float:
+def _as_number(cell: str) -> str | float:
     try:
         return float(cell)
     except ValueError:
         return cell
 
 
-def _values(found: Sequence[DecisionValue | LimitValue]) -> Sheet:
-    return Sheet([field.name for one in found[:1] for field in fields(one)], [list(astuple(one)) for one in found])
+def _values(found: Sequence[DecisionValue | LimitValue]) -> Table:
+    return Table([field.name for one in found[:1] for field in fields(one)], [list(astuple(one)) for one in found])
 
 
-def _measures(result: Result) -> Sheet:
+def _measures(result: Result) -> Table:
     """Mean, maximum and RMS of every place, before and after."""
     rows = [
         [places.title, point.name, design, name, each.mean, each.max, each.rms, places.channel.unit]
@@ -75,15 +89,15 @@ def _measures(result: Result) -> Sheet:
             places.channel.places(found.engine), measured(found, k, places.channel), strict=True
         )
     ]  # fmt: skip
-    return Sheet(["quantity", "point", "design", "place", "mean", "maximum", "rms", "unit"], rows)
+    return Table(["quantity", "point", "design", "place", "mean", "maximum", "rms", "unit"], rows)
 
 
-def _forces(result: Result) -> Sheet:
+def _forces(result: Result) -> Table:
     steps = max(min(STEPS, MOST_ROWS // len(result.problem.points)), 36)
-    return Sheet.of(forces_of(loaded(result), steps))
+    return Table.from_fields(forces_of(loaded(result), steps))
 
 
-def _transmissibility(result: Result) -> Sheet:
+def _transmissibility(result: Result) -> Table:
     speeds, orders = speeds_of(result), facts_of(result.final).orders
     columns = [
         (f"{design}, {point.name}: order {orders[k]:g}", curve.tolist())
@@ -92,10 +106,10 @@ def _transmissibility(result: Result) -> Sheet:
         for k, curve in transmissibility_of(found, point, speeds, orders)
     ]
     rows = zip((RPM * speeds).tolist(), *(values for _, values in columns), strict=True)
-    return Sheet(["speed [rpm]", *(head for head, _ in columns)], [list(row) for row in rows] if columns else [])
+    return Table(["speed [rpm]", *(head for head, _ in columns)], [list(row) for row in rows] if columns else [])
 
 
-def _rankings(result: Result) -> Sheet:
+def _rankings(result: Result) -> Table:
     rows = [
         [rank, star.value, star.lower_bound, star.proven, _degrees(star.throws), ", ".join(star.shafts),
          "-".join(map(str, order.order)), _degrees(order.intervals), order.neighbours, order.roll_content,
@@ -109,23 +123,177 @@ def _rankings(result: Result) -> Sheet:
     for order in ranking_of(result).ranking[0].orders:
         # in forces of one throw, and that times their spacing
         head += [f"free force of order {order} [-]", f"free couple of order {order} [-]"]
-    return Sheet(head, rows)
+    return Table(head, rows)
 
 
 def _degrees(angles: Iterable[float]) -> str:
     return " ".join(f"{math.degrees(angle):.6g}" for angle in angles)
 
 
-_SHEETS: Sheets = {
+DIRECTIONS = 180
+"""In which wear is told."""
+TURN = math.tau * np.arange(STEPS) / STEPS
+
+
+def _torque(result: Result) -> Table:
+    """Torque part by part, the work that it stores and the speed that it makes, of every design and point."""
+    points, fidelity = result.problem.points, result.problem.fidelity
+    angles = result.final.engine.cycle.angle * np.arange(STEPS) / STEPS
+    found = [
+        {f"{name}: {of}": values for name, design in result.designs.items()
+         for of, values in _torques(design.engine, point, fidelity, angles).items()}
+        for point in points
+    ]  # fmt: skip
+    # without gas at one point there is none of that part
+    names = list(dict.fromkeys(name for columns in found for name in columns))
+    rows = [
+        [point.name, *row]
+        for point, columns in zip(points, found, strict=True)
+        for row in np.column_stack([np.degrees(angles), *(columns.get(name, 0.0 * angles) for name in names)]).tolist()
+    ]
+    return Table(["point", "angle [deg]", *names], rows)
+
+
+def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, angles: Array) -> dict[str, Array]:
+    """Columns of one design at one point; no speed of a crank that would stop."""
+    parts = torque_parts(engine, point, fidelity)
+    work = parts["all"].integral.values(angles)
+    columns = {f"torque of {part} [N m]": torque.values(angles) for part, torque in parts.items()}
+    columns["work stored [J]"] = work - work.min()
+    swing, inertia = swing_of(engine, point, fidelity), turning_inertia(engine, fidelity)
+    if inertia is not None and swing.irregularity(inertia) <= 1.0:
+        speeds = RPM * swing.speeds(inertia)[: len(swing.work)]
+        at = engine.cycle.angle * np.arange(len(speeds)) / len(speeds)
+        columns["speed [rpm]"] = np.interp(angles, at, speeds, period=engine.cycle.angle)
+    return columns
+
+
+def _uneven_firing(result: Result) -> Table:
+    """What deviations from even firing buy, and what no design with them goes under."""
+    unit = objective_unit(result) or "-"
+    rows = [
+        [math.degrees(one.allowed), math.degrees(one.deviation), one.value, one.lower_bound]
+        for one in ranking_of(result).trade
+    ]
+    return Table(["allowed deviation [deg]", "deviation [deg]", f"objective [{unit}]", f"not under [{unit}]"], rows)
+
+
+def _indicator(result: Result) -> Table:
+    """Pressure in every chamber on both sides of pistons, and what drives the rods, of the final design."""
+    parts, rows, named = result.final.engine.slider_cranks, [], dict[str, None]()
+    found = [
+        (point.name, part.name, indicator_of(gas, part, point, TURN))
+        for point, gas in points_with_chambers(result)
+        for part in parts
+        if gas.of(part)
+    ]
+    for _, _, one in found:
+        named |= dict.fromkeys(one.pressures)
+    for point, part, one in found:
+        # a cylinder has not every chamber
+        pressures = (one.pressures.get(name, np.full(STEPS, math.nan)) for name in named)
+        columns = np.column_stack([np.degrees(TURN), one.travel, one.force, one.needed, *pressures])
+        rows += [[point, part, *row] for row in columns.tolist()]
+    head = ["point", "cylinder", "angle from its dead centre [deg]", "part of the stroke", "force of the chambers [N]",
+            "force that accelerates the rod [N]", *(f"pressure in {name} [Pa]" for name in named)]  # fmt: skip
+    return Table(head, rows)
+
+
+def _willans(result: Result) -> Table:
+    """Readings of friction tests, the line through them, what is asked of it, and the friction that it tells."""
+    rows = [row for test in result.problem.friction for row in _of_test(test)]
+    head = ["point", "what", "brake mean pressure [Pa]", "speed [rpm]", "fuel, as measured", "drag [Pa]",
+            "least squares, as measured", "standard deviation [Pa]"]  # fmt: skip
+    return Table(head, rows)
+
+
+def _of_test(test: FrictionTest) -> Iterator[list[Any]]:
+    (intercept, slope), none = test.line, math.nan
+    friction = test.friction
+    for x, y in zip(test.x, test.y, strict=True):
+        places = (none, RPM * x, none, y) if test.is_motored else (x, none, y, none)
+        yield [test.at, "measured", *places, intercept + slope * x, none]
+    asked, line = test.asked, intercept + slope * test.asked
+    yield [test.at, "asked", *((none, RPM * asked) if test.is_motored else (asked, none)), none, none, line, none]
+    told = (none, RPM * asked, none, friction.mean) if test.is_motored else (-friction.mean, none, 0.0, none)
+    yield [test.at, "friction", *told, line if test.is_motored else 0.0, friction.deviation]
+
+
+def _on_crank(result: Result) -> Table:
+    """Forces on main bearings along and across the crank as it turns, of every design and point (B4)."""
+    names, rows, heads = BEARINGS.channel.places(result.final.engine), [], []
+    designs = loaded(result)
+    for k, point in enumerate(result.problem.points):
+        columns = []
+        for design in designs.values():
+            paths = bearing_paths(design, k)
+            turned = paths * as_crank_turns(design, len(paths))[:, None]
+            columns += [part for path in turned.T for part in (path.real, path.imag)]
+        angles = np.degrees(result.final.engine.cycle.angle) * np.arange(len(paths)) / len(paths)
+        rows += [[point.name, *row] for row in np.column_stack([angles, *columns]).tolist()]
+    for name in designs:
+        lead = f"{name}: force on " if len(designs) > 1 else "force on "
+        heads += [f"{lead}{bearing} {way} the crank [N]" for bearing in names for way in ("along", "across")]
+    return Table(["point", "angle [deg]", *heads], rows)
+
+
+def _wear(result: Result) -> Table:
+    """Load that every direction of each main bearing takes over a cycle, over that of the most loaded (B10)."""
+    names, angles = BEARINGS.channel.places(result.final.engine), math.tau * np.arange(DIRECTIONS) / DIRECTIONS
+    rows = []
+    for name, design in loaded(result).items():
+        for k, point in enumerate(result.problem.points):
+            shares = [wear_of(path, angles) for path in bearing_paths(design, k).T]
+            rows += [[name, point.name, *row] for row in np.column_stack([np.degrees(angles), *shares]).tolist()]
+    head = ["design", "point", "direction from upright towards y [deg]", *(f"wear of {name} [-]" for name in names)]
+    return Table(head, rows)
+
+
+def _turning(result: Result) -> Table:
+    """Forward and backward parts of force and couple of a twin, of every design and point."""
+    rows = [
+        [name, point.name, kind, order, abs(forward), math.degrees(cmath.phase(forward)), abs(backward),
+         math.degrees(cmath.phase(backward)), KINDS[kind][1]]
+        for name, design in loaded(result).items()
+        for k, point in enumerate(result.problem.points)
+        for (kind, order), (forward, backward) in parts_of(result, design.engine, k).items()
+    ]  # fmt: skip
+    head = ["design", "point", "of", "order", "turns with the crank", "its angle [deg]", "turns against it",
+            "its angle against it [deg]", "unit"]  # fmt: skip
+    return Table(head, rows)
+
+
+def _mount_criticals(result: Result) -> Table:
+    """Where the orders that load a block most meet its natural frequencies on its mounts."""
+    rows = []
+    for name, design in loaded(result).items():
+        facts = facts_of(design)
+        for j, (mode, frequency) in enumerate(zip(facts.modes.names, facts.modes.frequencies.tolist(), strict=True)):
+            rows += [
+                [name, j + 1, mode, frequency, j in facts.excited, order, RPM * critical_speed(frequency, order)]
+                for order in facts.orders
+            ]
+    head = ["design", "mode", "name", "natural frequency [Hz]", "excited", "order", "critical speed [rpm]"]
+    return Table(head, rows)
+
+
+_TABLES: NumberTables = {
     "decisions": (lambda result: result.decisions, lambda result: _values(result.decisions)),
     "limits": (limits_of, lambda result: _values(limits_of(result))),
     "measures": (places_of, _measures),
     "forces": (has_loads, _forces),
-    "orders": (has_loads, lambda result: Sheet.of(orders_of(loaded(result)))),
-    "modes": (is_elastic, lambda result: Sheet.of(modes_of(result.designs))),
+    "orders": (has_loads, lambda result: Table.from_fields(orders_of(loaded(result)))),
+    "modes": (is_elastic, lambda result: Table.from_fields(modes_of(result.designs))),
     "transmissibility": (is_elastic, _transmissibility),
     "rankings": (has_ranking, _rankings),
-    **CURVES,
+    "torque": (lambda result: asks_torque(result) and has_loads(result), _torque),
+    "indicator": (points_with_chambers, _indicator),
+    "uneven-firing": (has_ranking, _uneven_firing),
+    "willans": (lambda result: result.problem.friction, _willans),
+    "bearings-on-crank": (has_bearings, _on_crank),
+    "wear": (has_bearings, _wear),
+    "turning-parts": (is_twin, _turning),
+    "mount-critical-speeds": (is_elastic, _mount_criticals),
 }
 
 
@@ -135,25 +303,10 @@ def writing_tables(result: Result, folder: Path) -> Iterator[Callable[[], None]]
 
     Gives what waits for the workbook: a process of its own writes one of many cells.
     """
-    sheets = sheets_of(result)
+    sheets = number_tables(result)
     cells = sum(len(sheet.head) * len(sheet.rows) for sheet in sheets.values())
     book = partial(write_book, sheets, folder / files.BOOK) if sheets else lambda: None
     with meanwhile(book, cells > MANY) as written:
         for name, sheet in sheets.items():
             write_csv(sheet, folder / f"{name}.csv")
         yield written
-
-
-def write_csv(sheet: Sheet, path: Path) -> None:
-    """Write one sheet as comma-separated values: numbers in full precision, no text that a spreadsheet computes."""
-    with path.open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow(map(_cell, sheet.head))
-        writer.writerows(map(_cell, row) for row in sheet.rows)
-
-
-def _cell(cell: Any) -> Any:
-    if isinstance(cell, float) and not math.isfinite(cell):
-        return ""
-    # names are the user's, and spreadsheets take ' for the mark of a text
-    return f"'{cell}" if isinstance(cell, str) and _FORMULA.match(cell) else cell

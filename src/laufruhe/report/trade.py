@@ -10,9 +10,9 @@ from laufruhe.fidelity.knobs import NO_GAS, TWO_ORDER
 from laufruhe.fidelity.mount_knobs import RIGID
 from laufruhe.present.numbers import DASH, figure
 from laufruhe.present.static_load import static_sentence
+from laufruhe.present.tables import Table
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.report.document import Block, Bullets, Code, Document, Illustration, Paragraph
-from laufruhe.report.grid import Grid
 from laufruhe.report.strict_json import strict
 from laufruhe.solvers.nearby import compares_stars
 from laufruhe.studies.trade import KEEPS, REFERENCE_NAME, Row, Trade, is_local, is_open
@@ -71,7 +71,7 @@ def trade_document(found: Trade, picture: str | None, command: str) -> Document:
         blocks.append(Illustration(picture, "Time against error of every fidelity; colour is regret", False))
     elif not problem.load_terms:
         blocks.append(Paragraph("What is asked depends on no load, so every fidelity gives the same number."))
-    blocks.append(Grid("", HEAD, [_cells(row) for row in found.rows]))
+    blocks.append(Table(HEAD, [_cells(row) for row in found.rows]))
     if not found.whole:
         blocks.append(Paragraph("Stopped at the time limit: fidelities beyond the last row were not measured."))
     mounts = OF_MOUNTS if problem.mount_decisions and problem.load_terms else ""
@@ -153,7 +153,7 @@ def index(trades: Sequence[Trade], refused: Sequence[str] = ()) -> Document:
     )
     lead = f"Which fidelity to take, measured on {len(trades)} problem{'s' * (len(trades) > 1)}. In short:"
     rows = sorted(rows, key=lambda row: row[0].strip("[`"))
-    table = Grid("", INDEX, rows, left=(0, 1, 3, len(INDEX) - 1), marked=True)
+    table = Table(INDEX, rows, left=(0, 1, 3, len(INDEX) - 1), marked=True)
     return Document(TITLE, (Bullets(lead, short, marked=True), table, Paragraph(INDEX_COLUMNS, marked=True)))
 
 

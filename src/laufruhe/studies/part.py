@@ -13,7 +13,7 @@ from pydantic import Field
 from laufruhe.files import fields as f
 from laufruhe.files.fields import Name, Table
 from laufruhe.files.study_tables import CaseTable, Value
-from laufruhe.studies.picture import Picture
+from laufruhe.present.picture import Picture
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Text
 

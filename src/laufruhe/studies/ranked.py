@@ -7,8 +7,8 @@ import math
 import numpy as np
 import xarray as xr
 
+from laufruhe.present import picture as p
 from laufruhe.present.numbers import number
-from laufruhe.studies import picture as p
 from laufruhe.units import readable
 
 # height of a row, and of what stands above and below all of them [inch]

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from laufruhe.files import fields as f
 from laufruhe.numerics.arrays import Array
-from laufruhe.studies import picture as p
+from laufruhe.present import picture as p
 from laufruhe.studies.part import Column, Part, Template
 from laufruhe.studies.regions import COLUMNS, VALUES
 from laufruhe.studies.scenes import Point, Scenes

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from laufruhe.present import picture as p
 from laufruhe.present.numbers import number as figures
 from laufruhe.present.numbers import percent
 from laufruhe.present.pictures import rows_of
-from laufruhe.studies import picture as p
-from laufruhe.studies.text import NOTHING, Rows, Text, number
+from laufruhe.studies.text import NOTHING, Text, marked_table, number
 from laufruhe.units import readable
 
 MOST_ROWS, MOST_DOTS = 80, 40
@@ -72,7 +72,7 @@ def by_point(data: xr.Dataset, *named: str) -> list[Text]:
     head += [f"{metric}, as given{in_unit}", f"at the optimum{in_unit}", f"lower bound{in_unit}", "change"]
     head += [*(["largest mount force [N]"] if data.sizes["mount"] else []), "proof"]
     rows = [_row(data.isel(point=k), columns) for k in range(min(data.sizes["point"], MOST_ROWS))]
-    return [Rows(head, rows, data.sizes["point"])]
+    return [marked_table(head, rows, data.sizes["point"] - len(rows))]
 
 
 def _row(row: xr.Dataset, columns: Sequence[str]) -> list[str]:

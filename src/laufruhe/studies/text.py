@@ -7,21 +7,13 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 from laufruhe.present.numbers import trimmed
+from laufruhe.present.tables import Table
 
 NOTHING = "–"
 
 
-@dataclass(frozen=True)
-class Rows:
-    """A table: cells as text under their heads, and how many rows the CSV file has where these are its first."""
-
-    head: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    whole: int = 0
-
-
-Text: TypeAlias = str | Rows
-
+Text: TypeAlias = str | Table
+"""A paragraph or a table of a report."""
 
 UNSTATED = "not in the study"
 """In place of the study's number, where ours goes beyond it."""
@@ -47,6 +39,11 @@ class Verdict:
     why: str
 
 
+def marked_table(head: Sequence[str], rows: Sequence[Sequence[str]], omitted: int = 0) -> Table:
+    """Return a table without a title, its cells marked as in Markdown."""
+    return Table(head, rows, left=None, marked=True, omitted=omitted)
+
+
 def number(value: float, digits: int = 5) -> str:
     """A number of a table; a dash where there is none."""
     return NOTHING if value != value else trimmed(value, digits)
@@ -60,4 +57,4 @@ def said(found: Sequence[Verdict]) -> list[Text]:
     rows = [
         [v.statement, v.paper, own, "yes" if v.agrees else "**no**", v.why] for v, own in zip(found, ours, strict=True)
     ]
-    return [Rows(["what was said of", "said", "here", "confirmed", "why"], rows)]
+    return [marked_table(["what was said of", "said", "here", "confirmed", "why"], rows)]

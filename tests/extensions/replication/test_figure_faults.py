@@ -10,7 +10,7 @@ from tests.extensions.replication.conftest import parts_of
 
 from lanes import first_fast
 from laufruhe.plots.picture import draw
-from laufruhe.studies.picture import Bars
+from laufruhe.present.picture import Bars
 from picture_faults import faults_of
 
 FIGURES = ("fig-25", "fig-10", "fig-08-09", "fig-22", "fig-32", "reciprocating-mass")

@@ -19,8 +19,8 @@ from laufruhe.extensions.replication.judging import CONFIRMED, NOT_CONFIRMED, co
 from laufruhe.extensions.replication.models import Hue, StatementTable
 from laufruhe.extensions.replication.part import Replication
 from laufruhe.plots.picture import draw, hue
+from laufruhe.present.tables import Table
 from laufruhe.studies.scenes import Scenes
-from laufruhe.studies.text import Rows
 from problem_files import PROBLEMS
 
 READY = {
@@ -134,7 +134,7 @@ def test_table_and_count() -> None:
     statements = [StatementTable.model_validate(one) for one in both]
     data = xr.Dataset(coords=judged(statements, {"": NAMES}))
     (table,) = rows(data)
-    assert isinstance(table, Rows)
+    assert isinstance(table, Table)
     assert table.rows == [["holds (p. 3)", "2", "2", "yes", ""], ["fails", "3 kp", "2 kp", "**no**", "2.0"]]
     assert counted([data, xr.Dataset()]) == "1 of 2 statements are confirmed."
 
@@ -146,7 +146,7 @@ def test_readings_stand_side_by_side() -> None:
     in_two = xr.Dataset(coords=judged([table], {"as printed": NAMES, "as meant": {**NAMES, "x": 3.0}}))
     in_one = xr.Dataset(coords=judged([table], {"": {"x": 3.0}}))
     (shown,) = rows(in_two)
-    assert isinstance(shown, Rows)
+    assert isinstance(shown, Table)
     assert list(shown.head) == ["statement", "the source", "as printed", "confirmed", "as meant", "confirmed", "why"]
     assert shown.rows == [["s", "3", "2", "**no**", "3", "yes", "as printed: 2 found<br>as meant: 3 found"]]
     told = "as printed: 1 of 2 statements are confirmed. as meant: 2 of 2 statements are confirmed."

@@ -11,7 +11,7 @@ from laufruhe.extensions.robust.result import SHARES, AssemblyResult, RobustResu
 from laufruhe.plots import figure, names
 from laufruhe.report.json_result import as_dict
 from laufruhe.report.sections import tables_of
-from laufruhe.report.tables import sheets_of
+from laufruhe.report.tables import number_tables
 from laufruhe.solvers.result import Result
 from picture_faults import faults_of
 from problem_files import FOUR, MOUNTS, changed, shaft
@@ -75,11 +75,11 @@ def test_every_cylinder_has_a_row_with_its_parts(chosen: Result) -> None:
 
 def test_shares_are_a_file(built: Result, chosen: Result) -> None:
     for result, columns in ((built, 2), (chosen, 1)):
-        sheet = sheets_of(result)["shares"]
+        sheet = number_tables(result)["shares"]
         assert [row[0] for row in sheet.rows] == pytest.approx([100.0 * share for share in SHARES])
         assert all(len(row) == len(sheet.head) == columns + 1 for row in sheet.rows)
-    assert {"under-tolerance", "tolerances"} <= set(sheets_of(built))
-    assert "assembly" in sheets_of(chosen)
+    assert {"under-tolerance", "tolerances"} <= set(number_tables(built))
+    assert "assembly" in number_tables(chosen)
 
 
 def test_pictures_have_no_fault(built: Result, chosen: Result) -> None:

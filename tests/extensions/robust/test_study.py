@@ -22,7 +22,7 @@ from laufruhe.extensions.robust.study import (
     worst_parts,
 )
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.studies.picture import Words
+from laufruhe.present.picture import Words
 from laufruhe.studies.scenes import Point
 from problem_files import PROBLEMS
 

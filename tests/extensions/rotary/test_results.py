@@ -10,7 +10,7 @@ import pytest
 from laufruhe import load, solve
 from laufruhe.physics.torque import torque_parts
 from laufruhe.plots.results import twins
-from laufruhe.report.tables import sheets_of
+from laufruhe.report.tables import number_tables
 from laufruhe.solvers import state
 from laufruhe.solvers.prices import Price
 from problem_files import PROBLEMS
@@ -19,7 +19,7 @@ from problem_files import PROBLEMS
 @pytest.mark.slow
 def test_chambers_of_rotors_make_the_torque_of_the_gas() -> None:
     result = state(load(PROBLEMS / "rotary-two.toml"))
-    sheet, point = sheets_of(result)["chambers"], result.problem.points[0]
+    sheet, point = number_tables(result)["chambers"], result.problem.points[0]
     rows = np.array([row[2:] for row in sheet.rows if row[0] == point.name], dtype=float)
     steps = len(np.unique(rows[:, 1]))
     mean = rows[:, 4].reshape(-1, steps)[:, :-1].mean(axis=1).sum()

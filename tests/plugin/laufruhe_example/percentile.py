@@ -10,11 +10,11 @@ import xarray as xr
 from pydantic import Field
 
 from laufruhe.numerics.norms import lengths
+from laufruhe.present import picture as p
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.studies import picture as p
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.text import Rows, Text, number
+from laufruhe.studies.text import Text, marked_table, number
 
 
 class PercentilePart(Part):
@@ -52,7 +52,7 @@ class PercentilePart(Part):
             [str(case), number(float(value))]
             for case, value in zip(data["case"].values, data["percentile"].values, strict=True)
         ]
-        return [Rows(["case", f"{about['long_name']} [{about['units']}]"], rows)]
+        return [marked_table(["case", f"{about['long_name']} [{about['units']}]"], rows)]
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:

@@ -16,13 +16,13 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import nearest
 from laufruhe.files.fields import Name, Table
 from laufruhe.files.study_tables import CaseTable
+from laufruhe.present import picture as p
 from laufruhe.present.numbers import percent
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.static_load import with_alternating_loads
-from laufruhe.studies import picture as p
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes, shafts_of
-from laufruhe.studies.text import NOTHING, Rows, Text, number, said
+from laufruhe.studies.text import NOTHING, Text, marked_table, number, said
 
 SAME = 1e-4
 """Relative difference of forces below which proofs cannot tell designs apart."""
@@ -201,7 +201,11 @@ class Economics(Part):
             change = NOTHING if force == plain else percent(force / plain - 1.0)
             cells += [number(float(row["optimum_bound"]), 6), number(float(row["optimum_counterpart"])), change]
             rows.append([*cells, f"{'**yes**' if worth.worth else 'no'}: {worth.why}" if worth else NOTHING])
-        return [Rows(head, rows), *said([v for own in verdicts(data).values() for v in own]), *_front_rows(data)]
+        return [
+            marked_table(head, rows),
+            *said([v for own in verdicts(data).values() for v in own]),
+            *_front_rows(data),
+        ]
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
@@ -304,7 +308,7 @@ def _front_rows(data: xr.Dataset) -> list[Text]:
         rows.append([f"{limit:g}", *(f"**{force:.1f}**" if efficient else f"{force:.1f}" for force, efficient in best)])
     words = f"Least {data.attrs['objective']} [{data['force'].attrs['units']}] by mass allowed on the shafts, every "
     words += f"number proven to {100.0 * float(data['gap'].max()):.1g} %; bold: nothing else has less force, mass and "
-    return [words + "shafts.", Rows(["mass [kg]", *built], rows)]
+    return [words + "shafts.", marked_table(["mass [kg]", *built], rows)]
 
 
 def _lines(data: xr.Dataset, colours: Mapping[str, p.Colour]) -> list[p.Mark]:

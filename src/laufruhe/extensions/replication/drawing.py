@@ -11,8 +11,8 @@ import numpy as np
 from laufruhe.extensions.replication.expressions import ExpressionError, filled, number_of, value_of
 from laufruhe.extensions.replication.functions import join
 from laufruhe.extensions.replication.models import AxisTable, BarsTable, CurveTable, PanelTable, PictureTable
+from laufruhe.present.picture import Area, Axis, Bars, Line, Mark, Panel, Picture, Words, credit
 from laufruhe.present.pictures import rows_of
-from laufruhe.studies.picture import Area, Axis, Bars, Line, Mark, Panel, Picture, Words, credit
 
 if TYPE_CHECKING:
     import xarray as xr

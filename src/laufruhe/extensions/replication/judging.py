@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from laufruhe.extensions.replication.expressions import filled, number_of
 from laufruhe.extensions.replication.models import StatementTable
-from laufruhe.studies.text import UNSTATED, Rows, Text
+from laufruhe.studies.text import UNSTATED, Text, marked_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,7 +66,7 @@ def rows(data: xr.Dataset) -> list[Text]:
         return []
     readings = [str(name) for name in data["by_reading"].values]
     head = ["statement", "the source", *(cell for name in readings for cell in (name or "here", "confirmed")), "why"]
-    return [Rows(head, [_row(data.isel(statement=k), readings) for k in range(data.sizes["statement"])])]
+    return [marked_table(head, [_row(data.isel(statement=k), readings) for k in range(data.sizes["statement"])])]
 
 
 def _row(one: xr.Dataset, readings: Sequence[str]) -> list[str]:

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from laufruhe.files import fields as f
 from laufruhe.files.fields import Table
 from laufruhe.files.study_tables import CaseTable
-from laufruhe.studies.picture import SERIES
+from laufruhe.present.picture import SERIES
 
 Expression: TypeAlias = int | float | str
 Each: TypeAlias = Annotated[

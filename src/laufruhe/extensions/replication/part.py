@@ -31,9 +31,9 @@ from laufruhe.extensions.replication.models import PictureTable, ReplicaCase, St
 from laufruhe.extensions.replication.quantities import DIMENSIONS, AskedTable, asked, check_asked
 from laufruhe.files import fields as f
 from laufruhe.files.study_tables import joined
+from laufruhe.present.picture import Picture
 from laufruhe.solvers import Status, solve
 from laufruhe.studies.part import Part, Record
-from laufruhe.studies.picture import Picture
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Text
 

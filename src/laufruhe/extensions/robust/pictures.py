@@ -1,13 +1,13 @@
 """Pictures of built engines and of chosen parts."""
 
-from laufruhe.present.pictures import Picture
+from laufruhe.present.pictures import ResultPicture
 
-TOLERANCES = Picture(
+TOLERANCES = ResultPicture(
     "robust",
     "The best drawing and the design decided, each built many times, and what each tolerance costs.",
     "laufruhe.extensions.robust.picture",
 )
-ASSEMBLY = Picture(
+ASSEMBLY = ResultPicture(
     "assembly",
     "The best assembly of measured parts beside those at random.",
     "laufruhe.extensions.robust.assembly_picture",

@@ -16,13 +16,12 @@ from laufruhe.extensions.robust.result import (
 )
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import figure, number, percent, price_of, with_unit
-from laufruhe.report.grid import Grid
+from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
-from laufruhe.report.sheet import Sheet
 from laufruhe.solvers.result import Result
 
 
-def _tolerance_tables(result: Result) -> list[Grid]:
+def _tolerance_tables(result: Result) -> list[Table]:
     """Return two designs, and a row a tolerance."""
     found, unit = result.details, objective_unit(result)
     assert isinstance(found, RobustResult)
@@ -36,8 +35,8 @@ def _tolerance_tables(result: Result) -> list[Grid]:
     own = [_tolerance(tolerance, unit) for tolerance in found.tolerances]
     note = "Costs: shadow price times tolerance, an estimate of what removing the tolerance would save."
     return [
-        Grid("Under tolerance", head, rows, note=_checked(found), sheet="under-tolerance"),
-        Grid("Tolerances", told, own, 2, note=note, sheet="tolerances"),
+        Table(head, rows, title="Under tolerance", note=_checked(found), file="under-tolerance"),
+        Table(told, own, title="Tolerances", left=2, note=note, file="tolerances"),
     ]
 
 
@@ -62,7 +61,7 @@ def _checked(found: RobustResult) -> str:
     return f"{told}, so at most {100.0 * found.exceeding_at_most:.2g} % of all do ({100.0 * CONFIDENCE:g} % sure)."
 
 
-def _assembly_tables(result: Result) -> list[Grid]:
+def _assembly_tables(result: Result) -> list[Table]:
     """Return a row a cylinder, with the number of each part in the order of its file."""
     found, unit = result.details, objective_unit(result)
     assert isinstance(found, AssemblyResult)
@@ -70,7 +69,7 @@ def _assembly_tables(result: Result) -> list[Grid]:
     for kind in found.kinds:
         head += [kind, "mass [g]"]
     rows = [_row(place) for place in found.places]
-    return [Grid("Assembly", head, rows, note=_beside(found, unit), sheet="assembly")]
+    return [Table(head, rows, title="Assembly", note=_beside(found, unit), file="assembly")]
 
 
 def _row(place: Place) -> tuple[str, ...]:
@@ -112,7 +111,7 @@ def _assembly_record(result: Result) -> dict[str, Any]:
     return {**told, "quantiles": list(found.quantiles), "places": places}
 
 
-def _shares(result: Result) -> Sheet:
+def _shares(result: Result) -> Table:
     """Return the share of engines built, or of assemblies, that stay below a value."""
     unit, found = objective_unit(result) or "-", result.details
     if isinstance(found, RobustResult):
@@ -121,7 +120,7 @@ def _shares(result: Result) -> Sheet:
         assert isinstance(found, AssemblyResult)
         columns = {"assemblies at random": found.quantiles}
     rows = [[100.0 * share, *values] for share, *values in zip(SHARES, *columns.values(), strict=True)]
-    return Sheet(["below [%]", *(f"{name} [{unit}]" for name in columns)], rows)
+    return Table(["below [%]", *(f"{name} [{unit}]" for name in columns)], rows)
 
 
 TOLERANCES = Section(

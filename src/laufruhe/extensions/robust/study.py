@@ -27,15 +27,15 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.physics.modes import GRAVITY
 from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.present import picture as p
 from laufruhe.present.numbers import percent
 from laufruhe.problem.drawing import Drawing
 from laufruhe.problem.evaluation import evaluate, over
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE
 from laufruhe.problem.problem import Problem
-from laufruhe.studies import picture as p
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.text import NEGLIGIBLE, Rows, Text, Verdict, number, said
+from laufruhe.studies.text import NEGLIGIBLE, Text, Verdict, marked_table, number, said
 
 ANGLES, PIECE = 360, 500
 MAXIMUM, CLOSE = NORMS["maximum"], 1e-5
@@ -256,7 +256,7 @@ class Tolerance(Part):
             cells = [str(name), number(nominal, 3), f"{worst:.1f}", *parts, f"{float(row['mean']) / GRAVITY:.1f}"]
             cells += [f"{often:.1f}", f"{nominal / worst:.2g}", number(float(row["mount"]) / GRAVITY, 3)]
             rows.append([*cells, percent(rise_of(row))])
-        return [Rows(head, rows), *said(verdicts(data))]
+        return [marked_table(head, rows), *said(verdicts(data))]
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:

@@ -13,10 +13,10 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.physics.cylinder_volume import chamber_volume
 from laufruhe.physics.gas_cycle import thrust_at
 from laufruhe.physics.gas_loads import chamber_torque
-from laufruhe.present.pictures import Picture
+from laufruhe.present.pictures import ResultPicture
 from laufruhe.problem.problem import Problem
 
-PICTURE = Picture(
+PICTURE = ResultPicture(
     "chambers",
     "Volume, pressure and torque of each chamber of a rotor over three turns of the shaft.",
     "laufruhe.extensions.rotary.chambers_picture",

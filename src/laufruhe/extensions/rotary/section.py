@@ -7,13 +7,13 @@ import math
 import numpy as np
 
 from laufruhe.extensions.rotary.chambers import rotor_chambers, rotors_of
+from laufruhe.present.tables import Table
 from laufruhe.problem.curves import STEPS
 from laufruhe.report.section import Section
-from laufruhe.report.sheet import Sheet
 from laufruhe.solvers.result import Result
 
 
-def _chambers(result: Result) -> Sheet:
+def _chambers(result: Result) -> Table:
     """Return volume, pressure and torque of every chamber of every rotor, of the final design."""
     rows = []
     for point in result.problem.points:
@@ -26,7 +26,7 @@ def _chambers(result: Result) -> Sheet:
                 rows += [[point.name, part.name, k + 1, *row] for row in values]
     head = ["point", "rotor", "chamber", "angle [deg]", "volume over the least [m^3]",
             "pressure over the crankcase [Pa]", "torque [N m]"]  # fmt: skip
-    return Sheet(head, rows)
+    return Table(head, rows)
 
 
 def _has_rotors(result: Result) -> bool:

@@ -10,16 +10,15 @@ import numpy as np
 from laufruhe.extensions.run_ups.facts import run_of, run_point, runs_up, shown_runs
 from laufruhe.present.measures import has_loads, loaded
 from laufruhe.present.numbers import RPM, figure
-from laufruhe.report.grid import Grid
+from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
-from laufruhe.report.sheet import Sheet
 from laufruhe.solvers.result import Result
 from laufruhe.units import shown
 
 HEAD = ("", "time", "largest force", "largest travel", "largest roll")
 
 
-def _tables(result: Result) -> list[Grid]:
+def _tables(result: Result) -> list[Table]:
     """Return run-up and shut-down, where the problem says how these go."""
     if result.problem.engine.run is None:
         return []
@@ -30,7 +29,7 @@ def _tables(result: Result) -> list[Grid]:
         for name, time, found in (("run-up", run.up, up), ("shut-down", run.down, down))
     )  # fmt: skip
     note = f"On any mount, between rest and {shown(run.speed, 'rad/s')}, with the gas of {run_point(result).name}."
-    return [Grid("Through resonance", HEAD, rows, note=note, sheet="through-resonance")]
+    return [Table(HEAD, rows, title="Through resonance", note=note, file="through-resonance")]
 
 
 def _record(result: Result) -> dict[str, Any]:
@@ -43,14 +42,14 @@ def _record(result: Result) -> dict[str, Any]:
     return {"up_to": run.speed, "point": run_point(result).name, **most}
 
 
-def _over_speed(result: Result) -> Sheet:
+def _over_speed(result: Result) -> Table:
     rows = [
         [design, way, RPM * speed, force, travel, math.degrees(twist)]
         for design, found in loaded(result).items()
         for way, run in zip(("run-up", "shut-down"), shown_runs(result, found), strict=True)
         for speed, force, travel, twist in np.column_stack([run.speeds, run.force, run.travel, run.twist]).tolist()
     ]
-    return Sheet(
+    return Table(
         ["design", "way", "speed [rpm]", "largest mount force [N]", "largest mount travel [m]", "largest roll [deg]"],
         rows,
     )

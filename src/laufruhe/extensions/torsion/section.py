@@ -22,15 +22,14 @@ from laufruhe.extensions.torsion.facts import (
 from laufruhe.extensions.torsion.physics import absorber_heat, chain_of
 from laufruhe.present.measures import changed
 from laufruhe.present.numbers import DASH, RPM, number
-from laufruhe.report.grid import Grid
+from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
-from laufruhe.report.sheet import Sheet
 from laufruhe.solvers.result import Result
 
 MOST_MODES, MOST_CRITICALS = 4, 8
 
 
-def _tables(result: Result) -> list[Grid]:
+def _tables(result: Result) -> list[Table]:
     """Modes, the critical speeds that twist it most, before and after, and barred ranges."""
     reach = speed_range(result)
     before, after = facts_of(result.initial, *reach), facts_of(result.final, *reach)
@@ -38,7 +37,7 @@ def _tables(result: Result) -> list[Grid]:
     return [_modes(result, after), *criticals, _barred(result)]
 
 
-def _modes(result: Result, facts: TorsionFacts) -> Grid:
+def _modes(result: Result, facts: TorsionFacts) -> Table:
     names = [disc.name for disc in chain_of(result.final.engine).discs]
     shown = range(min(MOST_MODES, len(facts.modes.frequencies)))
     swings = [[f"{swing:+.3f}" for swing in shape] for shape in facts.modes.shapes.T]
@@ -46,10 +45,12 @@ def _modes(result: Result, facts: TorsionFacts) -> Grid:
     rest = len(facts.modes.frequencies) - len(shown)
     more = f" {counted(rest, 'higher mode')} in result.json." if rest else ""
     note = f"Undamped. Angle of every disc, the largest of each mode one.{more}"
-    return Grid("Natural modes of the crankshaft", ("mode", "Hz", *names), rows, note=note, sheet="crankshaft-modes")
+    return Table(
+        ("mode", "Hz", *names), rows, title="Natural modes of the crankshaft", note=note, file="crankshaft-modes"
+    )
 
 
-def _criticals(facts: TorsionFacts, which: str) -> Grid:
+def _criticals(facts: TorsionFacts, which: str) -> Table:
     rows = tuple(
         (number(each.speed * RPM), f"{each.order:g}" + (" main" if each.is_main else ""), f"{each.mode}",
          number(each.vector_sum, 3, 1.0), DASH if each.torque is None else number(each.torque))
@@ -63,17 +64,17 @@ def _criticals(facts: TorsionFacts, which: str) -> Grid:
     )
     head = ("rpm", "order", "mode", "vector sum", "torque [N m]")
     sheet = f"strongest-critical-speeds-{which.replace(' ', '-')}"
-    return Grid(f"Critical speeds of the crankshaft {which}", head, rows, note=note, sheet=sheet)
+    return Table(head, rows, title=f"Critical speeds of the crankshaft {which}", note=note, file=sheet)
 
 
-def _barred(result: Result) -> Grid:
+def _barred(result: Result) -> Table:
     rows = tuple(
         (each.limit, f"{number(each.lowest * RPM)} to {number(each.highest * RPM)}")
         for each in barred_ranges(result, result.final)
     )
     low, high = (number(speed * RPM) for speed in speed_range(result))
     note = f"Between {low} and {high} rpm, with the load of the operating points: where the limit would be exceeded."
-    return Grid("Barred speed ranges", ("limit", "rpm"), rows, note=note, sheet="barred-speeds")
+    return Table(("limit", "rpm"), rows, title="Barred speed ranges", note=note, file="barred-speeds")
 
 
 def _record(result: Result) -> Mapping[str, Any]:
@@ -103,7 +104,7 @@ def _record(result: Result) -> Mapping[str, Any]:
     }  # fmt: skip
 
 
-def _twist_response(result: Result) -> Sheet:
+def _twist_response(result: Result) -> Table:
     """Return half of the peak to peak torque in every section of the crankshaft, over its speed."""
     speeds = speeds_between(result.final, *speed_range(result))
     head, columns = ["speed [rpm]"], [RPM * speeds]
@@ -111,10 +112,10 @@ def _twist_response(result: Result) -> Sheet:
         sections = [section.name for section in chain_of(design.engine).sections]
         head += [f"{name}: alternating torque in {section} [N m]" for section in sections]
         columns += list(torque_over_speed(design, speeds).T)
-    return Sheet(head, np.column_stack(columns).tolist())
+    return Table(head, np.column_stack(columns).tolist())
 
 
-def _twist_modes(result: Result) -> Sheet:
+def _twist_modes(result: Result) -> Table:
     """Return the swing of every disc in every natural mode of the crankshaft."""
     rows = []
     for name, design in result.designs.items():
@@ -125,10 +126,10 @@ def _twist_modes(result: Result) -> Sheet:
                 [name, m + 1, frequency, disc, swing]
                 for disc, swing in zip(discs, modes.shapes[:, m].tolist(), strict=True)
             ]
-    return Sheet(["design", "mode", "natural frequency [Hz]", "disc", "swing"], rows)
+    return Table(["design", "mode", "natural frequency [Hz]", "disc", "swing"], rows)
 
 
-def _critical_speeds(result: Result) -> Sheet:
+def _critical_speeds(result: Result) -> Table:
     """Return all speeds at which orders meet natural modes of the crankshaft."""
     rows = [
         [name, RPM * each.speed, each.order, each.mode, each.vector_sum, each.is_main,
@@ -136,7 +137,7 @@ def _critical_speeds(result: Result) -> Sheet:
         for name, design in result.designs.items()
         for each in facts_of(design, *speed_range(result)).criticals
     ]  # fmt: skip
-    return Sheet(["design", "speed [rpm]", "order", "mode", "vector sum", "main order", "torque [N m]"], rows)
+    return Table(["design", "speed [rpm]", "order", "mode", "vector sum", "main order", "torque [N m]"], rows)
 
 
 SECTION = Section(

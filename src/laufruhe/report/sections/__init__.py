@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from laufruhe.report.grid import Grid
+from laufruhe.present.tables import Table
 from laufruhe.report.section import EXTENSION_SECTIONS
 from laufruhe.report.sections import (
     decisions,
@@ -25,7 +25,7 @@ SECTIONS = (
 )  # fmt: skip
 
 
-def tables_of(result: Result) -> list[Grid]:
+def tables_of(result: Result) -> list[Table]:
     """Every table that this result fills, in the order of a report."""
     own = [section.tables(result) for section in SECTIONS]
     added = [section.tables(result) for section in EXTENSION_SECTIONS.values() if section.applies(result)]

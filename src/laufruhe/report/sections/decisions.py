@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import DASH, figure, in_grams, prices_of, trimmed, with_unit
-from laufruhe.report.grid import Grid
+from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionValue
 from laufruhe.units import readable
@@ -14,11 +14,11 @@ from laufruhe.units import readable
 HEAD = ("open", "as given", "decided", "bounds", "at bound", "shadow price")
 
 
-def tables(result: Result) -> list[Grid]:
+def tables(result: Result) -> list[Table]:
     """A row a decision."""
     pairs = pairwise([None, *result.decisions])
     rows = tuple(_row(before, d, objective_unit(result)) for before, d in pairs if d is not None)
-    return [Grid("Decisions", HEAD, rows, note=_free(result))]
+    return [Table(HEAD, rows, title="Decisions", note=_free(result))]
 
 
 def _free(result: Result) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from laufruhe.present.measures import changed, is_met, limits_of, objective_unit
 from laufruhe.present.numbers import DASH, number, prices_of, with_unit
-from laufruhe.report.grid import Grid
+from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import LimitValue
 from laufruhe.units import readable
@@ -16,7 +16,7 @@ TOLD = 1e-5
 """Relative error of a value from which a reader is told."""
 
 
-def tables(result: Result) -> list[Grid]:
+def tables(result: Result) -> list[Table]:
     """A row a limit."""
     limits = limits_of(result)
     decided = result.certificate is not None
@@ -31,7 +31,7 @@ def tables(result: Result) -> list[Grid]:
         for limit in limits
         if limit.error_estimate > TOLD
     ]
-    return [Grid(title, head, rows, note=" ".join(notes))]
+    return [Table(head, rows, title=title, note=" ".join(notes))]
 
 
 def _row(limit: LimitValue, unit: str, decided: bool) -> tuple[str, ...]:

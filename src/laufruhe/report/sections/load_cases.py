@@ -7,14 +7,14 @@ import numpy as np
 from laufruhe.physics.static_cases import settled
 from laufruhe.present.mounting import is_elastic
 from laufruhe.present.numbers import DASH, number
+from laufruhe.present.tables import Table
 from laufruhe.problem.channels import mounting_in
-from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
 
 HEAD = ("load case", "mount", "travel x [mm]", "y [mm]", "z [mm]", "force [N]", "on its stop")
 
 
-def tables(result: Result) -> list[Grid]:
+def tables(result: Result) -> list[Table]:
     """Of the design as decided."""
     if not is_elastic(result) or not result.final.engine.load_cases:
         return []
@@ -26,4 +26,4 @@ def tables(result: Result) -> list[Grid]:
             met = "yes" if mount.name in found.on_stops else DASH
             rows.append((case.name, mount.name, *moved, number(float(np.linalg.norm(force))), met))
     note = "From where the engine stands without these loads."
-    return [Grid("Load cases", HEAD, tuple(rows), left=2, note=note, sheet="load-cases")]
+    return [Table(HEAD, tuple(rows), title="Load cases", left=2, note=note, file="load-cases")]

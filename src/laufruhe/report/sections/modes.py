@@ -7,13 +7,13 @@ from laufruhe.physics.modes import MOTIONS
 from laufruhe.present.measures import changed
 from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import DASH, RPM, figure, number, trimmed
+from laufruhe.present.tables import Table
 from laufruhe.problem.channels import MOUNT_TRAVEL
 from laufruhe.problem.evaluation import measured
-from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
 
 
-def tables(result: Result) -> list[Grid]:
+def tables(result: Result) -> list[Table]:
     """Modes before and after, and the mounts as they are now; none for rigid mounts."""
     if not is_elastic(result):
         return []
@@ -23,7 +23,7 @@ def tables(result: Result) -> list[Grid]:
     return [*modes, _mounts(result, found[-1])]
 
 
-def _modes(facts: MountingFacts, title: str) -> Grid:
+def _modes(facts: MountingFacts, title: str) -> Table:
     order = facts.orders[0] if facts.orders else 0.0
     rows = []
     for j, (name, frequency) in enumerate(zip(facts.modes.names, facts.modes.frequencies, strict=True)):
@@ -35,7 +35,7 @@ def _modes(facts: MountingFacts, title: str) -> Grid:
     still = 6 - len(facts.excited)
     rest = f"{still} of 6 modes are not excited and not computed" if still else "every mode is excited"
     head = ("mode", "Hz", "excited", f"order {order:g} at rpm" if order else "critical rpm", *MOTIONS)
-    return Grid(title, head, tuple(rows), note=f"Kinetic energy in %; {rest}.{_of_fluid(facts)}")
+    return Table(head, tuple(rows), title=title, note=f"Kinetic energy in %; {rest}.{_of_fluid(facts)}")
 
 
 def _of_fluid(facts: MountingFacts) -> str:
@@ -46,7 +46,7 @@ def _of_fluid(facts: MountingFacts) -> str:
     return f" Modes are those of the stiffness at rest{fluid}."
 
 
-def _mounts(result: Result, facts: MountingFacts) -> Grid:
+def _mounts(result: Result, facts: MountingFacts) -> Table:
     rows, points = [], result.problem.points
     slowest = min(range(len(points)), key=lambda k: points[k].speed)
     travels = measured(result.final, slowest, MOUNT_TRAVEL)
@@ -65,4 +65,4 @@ def _mounts(result: Result, facts: MountingFacts) -> Grid:
     )
     head = ("mount", "place [mm]", "stiffness along own axes [N/mm]", "loss factor", "sag [mm]",
             f"travel at {points[slowest].name} [mm]")  # fmt: skip
-    return Grid("Mounts", head, tuple(rows), left=3, note=note)
+    return Table(head, tuple(rows), title="Mounts", left=3, note=note)

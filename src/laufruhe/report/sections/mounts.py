@@ -5,21 +5,21 @@ from __future__ import annotations
 from laufruhe.physics.metrics import CycleMeasures
 from laufruhe.present.measures import Places, load_designs, places_of
 from laufruhe.present.numbers import DASH, number, percent
+from laufruhe.present.tables import Table
 from laufruhe.problem.evaluation import measured
 from laufruhe.problem.measure import Measure
-from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable
 
 ONE, TWO = ("mean", "max", "rms"), ("mean before", "mean after", "change", "max before", "max after")
 
 
-def tables(result: Result) -> list[Grid]:
+def tables(result: Result) -> list[Table]:
     """A row a place, at every operating point."""
     return [_table(result, places) for places in places_of(result)]
 
 
-def _table(result: Result, places: Places) -> Grid:
+def _table(result: Result, places: Places) -> Table:
     points, designs = result.problem.points, load_designs(result)
     names = places.channel.places(result.problem.engine)
     found = [
@@ -36,7 +36,7 @@ def _table(result: Result, places: Places) -> Grid:
         sums = [number(design.value(Measure(places.channel))) for design in designs]
         note = f"In sum {' before and '.join(sums)}{' after' if len(sums) > 1 else ''}, on average over the cycle."
     head = (*first, *(TWO if len(designs) > 1 else ONE))
-    return Grid(f"{places.title}{at} [{unit}]", head, rows, note=note, left=len(first))
+    return Table(head, rows, title=f"{places.title}{at} [{unit}]", note=note, left=len(first))
 
 
 def _cells(each: list[CycleMeasures], scale: float) -> list[str]:

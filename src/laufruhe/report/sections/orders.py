@@ -16,15 +16,15 @@ from laufruhe.present.measures import (
     shaking_orders,
 )
 from laufruhe.present.numbers import aligned
+from laufruhe.present.tables import Table
 from laufruhe.problem.loads import PointLoads
-from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
 
 SHOWN = 8
 SHARE = 0.005
 
 
-def tables(result: Result) -> list[Grid]:
+def tables(result: Result) -> list[Table]:
     """Orders that make at least a small share of the largest, of the hardest operating point."""
     if not has_loads(result):
         return []
@@ -45,7 +45,7 @@ def tables(result: Result) -> list[Grid]:
     head = ("order", *(f"{name}{side}" for name in names for side in (("",), (" before", " after"))[len(designs) - 1]))
     many = f"the largest {SHOWN} of {len(present)} orders" if len(present) > len(kept) else "orders"
     note = f"Amplitudes; {many} of at least {100.0 * SHARE:g} % of the largest. result.json has every order."
-    return [Grid(f"Orders at {result.problem.points[k].name} [N, N m]", head, rows, note=note)]
+    return [Table(head, rows, title=f"Orders at {result.problem.points[k].name} [N, N m]", note=note)]
 
 
 def _columns(loads: PointLoads) -> list[Array]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from laufruhe.present.numbers import DASH, figure, price_of, trimmed
-from laufruhe.report.grid import Grid
+from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import RankValue
 from laufruhe.units import readable
@@ -19,7 +19,7 @@ EQUAL = (
 )
 
 
-def tables(result: Result) -> list[Grid]:
+def tables(result: Result) -> list[Table]:
     """A row an objective; and a row a decision with its ends after each of them."""
     ranks = result.ranks
     if not ranks:
@@ -29,8 +29,8 @@ def tables(result: Result) -> list[Grid]:
     ends = tuple((name, *(_ends(rank, name) for rank in ranks)) for name in names)
     head = ("decision", *(f"best by {k}" if k == 1 else f"by 1 to {k}" for k in range(1, len(ranks) + 1)))
     return [
-        Grid("Objectives in order", HEAD, rows, note=ORDER, sheet="objectives-in-order"),
-        Grid("Equal optima", head, ends, note=EQUAL, sheet="equal-optima"),
+        Table(HEAD, rows, title="Objectives in order", note=ORDER, file="objectives-in-order"),
+        Table(head, ends, title="Equal optima", note=EQUAL, file="equal-optima"),
     ]
 
 

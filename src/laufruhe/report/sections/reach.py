@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 
 from laufruhe.present.numbers import DASH, figure, trimmed, with_unit
+from laufruhe.present.tables import Table
 from laufruhe.prove.certificate import Proof
-from laufruhe.report.grid import Grid
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionValue, Nearest, Reached, meaningful
 
 NOTE = "None of these designs is an answer: each breaks the limit that it is named by."
 
 
-def tables(result: Result) -> list[Grid]:
+def tables(result: Result) -> list[Table]:
     """A row a decision, a column a design: those of each limit, and the one that breaks limits least."""
     designs: list[tuple[str, Reached | Nearest]] = [
         (f"nearest to '{found.name}'", found) for found in result.reached if found.decisions
@@ -24,7 +24,7 @@ def tables(result: Result) -> list[Grid]:
     first = ("value reached", *(figure(found.value, found.unit) for _, found in designs))
     rows = tuple((name, *(_value(each.get(name)) for each in known)) for name in names)
     head = ("", *(title for title, _ in designs))
-    return [Grid("What the limits can reach", head, (first, *rows) if names else (), note=NOTE, sheet="reach")]
+    return [Table(head, (first, *rows) if names else (), title="What the limits can reach", note=NOTE, file="reach")]
 
 
 def _value(decision: DecisionValue | None) -> str:

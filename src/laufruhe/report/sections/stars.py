@@ -9,7 +9,7 @@ from laufruhe.errors import counted
 from laufruhe.machine.crank_names import name_of_crank
 from laufruhe.present.measures import objective_unit, ranking_of
 from laufruhe.present.numbers import DASH, number, percent, trimmed
-from laufruhe.report.grid import Grid
+from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import PhasingResult, RankedStar
 from laufruhe.units import readable
@@ -17,7 +17,7 @@ from laufruhe.units import readable
 ORDERS_SHOWN = 6
 
 
-def tables(result: Result) -> list[Grid]:
+def tables(result: Result) -> list[Table]:
     """Stars, firing orders, and the trade against even firing where there is one."""
     if result.phasing is None:
         return []
@@ -29,7 +29,7 @@ def _degrees(angle: float, digits: int = 4) -> str:
     return trimmed(math.degrees(angle), digits)
 
 
-def _stars(result: Result, phasing: PhasingResult) -> Grid:
+def _stars(result: Result, phasing: PhasingResult) -> Table:
     unit, factor = readable(objective_unit(result))
     scale = factor * (result.objective.initial if result.objective else 0.0)
     built = any(star.shafts for star in phasing.ranking)
@@ -49,7 +49,7 @@ def _stars(result: Result, phasing: PhasingResult) -> Grid:
         "Free force / couple of the star alone by order, in forces of one throw and that times the throw spacing. "
         f"{counted(phasing.designs, 'star')} to choose from; {phasing.method}."
     )
-    return Grid("Crank stars", head, tuple(rows), left=3 if built else 2, note=note)
+    return Table(head, tuple(rows), title="Crank stars", left=3 if built else 2, note=note)
 
 
 def _angles(star: RankedStar, decided: Container[str]) -> str:
@@ -65,7 +65,7 @@ def _span(intervals: tuple[float, ...]) -> str:
     return _degrees(low) if math.degrees(high - low) < 1e-6 else f"{_degrees(low)} to {_degrees(high)}"
 
 
-def _orders(phasing: PhasingResult) -> Grid:
+def _orders(phasing: PhasingResult) -> Table:
     rows = tuple(
         (f"{k + 1}", "-".join(map(str, order.order)), f"{order.neighbours}", _degrees(order.longest_gap),
          number(order.roll_content, 3, 1.0), f"{star.order_count}")
@@ -78,10 +78,10 @@ def _orders(phasing: PhasingResult) -> Grid:
         "not fire. Roll content: what is left of the largest torque order below the firing order. Orders: how many "
         "belong to the star."
     )
-    return Grid("Firing orders", head, rows, left=2, note=note)
+    return Table(head, rows, title="Firing orders", left=2, note=note)
 
 
-def _trade(result: Result, phasing: PhasingResult) -> Grid:
+def _trade(result: Result, phasing: PhasingResult) -> Table:
     even = phasing.trade[0].value
     rows = tuple(
         (f"{_degrees(p.allowed)} deg", _degrees(p.deviation), number(p.value, scale=even),
@@ -92,4 +92,4 @@ def _trade(result: Result, phasing: PhasingResult) -> Grid:
     objective = f"objective [{objective_unit(result)}]"
     head = ("deviation allowed", "used [deg]", objective, "not under", "change", "KKT residual")
     note = "Local optima, the best found of every freedom; no design with that freedom goes under the bound."
-    return Grid("Objective against even firing", head, rows, note=note)
+    return Table(head, rows, title="Objective against even firing", note=note)

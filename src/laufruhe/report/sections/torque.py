@@ -5,7 +5,7 @@ from __future__ import annotations
 from laufruhe.physics.torque import TorqueFacts, torque_facts
 from laufruhe.present.measures import asks_torque
 from laufruhe.present.numbers import DASH, number
-from laufruhe.report.grid import Grid
+from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
 
 NOTE = (
@@ -15,14 +15,14 @@ NOTE = (
 HEAD = ("at", "mean [N m]", "power [kW]", "least [N m]", "largest [N m]", "stored [J]", "irregularity")
 
 
-def tables(result: Result) -> list[Grid]:
+def tables(result: Result) -> list[Table]:
     """A row an operating point, where a flywheel is told or the inside of the crankcase is asked for."""
     engine, problem = result.final.engine, result.problem
     if not asks_torque(result):
         return []
     facts = ((point.name, torque_facts(engine, point, problem.fidelity)) for point in problem.points)
     rows = tuple(_row(*pair) for pair in facts)
-    return [Grid("Torque of the crankshaft", HEAD, rows, note=NOTE, sheet="crankshaft-torque")]
+    return [Table(HEAD, rows, title="Torque of the crankshaft", note=NOTE, file="crankshaft-torque")]
 
 
 def _row(name: str, facts: TorqueFacts) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from laufruhe.machine import Role, Rotor
 from laufruhe.physics.balance_factor import balance_factors
 from laufruhe.present.measures import changed
 from laufruhe.present.numbers import DASH, number, trimmed
-from laufruhe.report.grid import Grid
+from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
 
 GRAMS = 1e3
@@ -22,12 +22,12 @@ _FACTOR = (
 )
 
 
-def tables(result: Result) -> list[Grid]:
+def tables(result: Result) -> list[Table]:
     """A row a weight, and a row a throw that has counterweights."""
     return [_weights(result), _factors(result)]
 
 
-def _weights(result: Result) -> Grid:
+def _weights(result: Result) -> Table:
     before = {rotor.name: rotor for rotor in result.initial.engine.rotors}
     made = [r for r in result.final.engine.rotors if r.role in (Role.COUNTERWEIGHT, Role.BALANCER)]
     scale = max((abs(rotor.unbalance) for rotor in made), default=0.0)
@@ -46,7 +46,7 @@ def _weights(result: Result) -> Grid:
     sides = (" before", " after") if two else ("",)
     sizes = [f"{what}{side} [{unit}]" for side in sides for what, unit in (("unbalance", "g mm"), ("angle", "deg"))]
     head = ("weight", "x [mm]", *sizes, "in kg m", "mass [g]", "at radius [mm]")
-    return Grid("Weights" + (" as decided" if two else ""), head, tuple(rows), note=_ANGLES, sheet="weights")
+    return Table(head, tuple(rows), title="Weights" + (" as decided" if two else ""), note=_ANGLES, file="weights")
 
 
 def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
@@ -58,7 +58,7 @@ def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
     return number(GRAM_MILLIMETRES * size), trimmed(turned, 5)
 
 
-def _factors(result: Result) -> Grid:
+def _factors(result: Result) -> Table:
     designs = [result.initial, result.final] if changed(result) else [result.final]
     names = dict.fromkeys(one.cylinders for design in designs for one in balance_factors(design.engine))
     # a weight that one of the designs has is in the other a weight of nothing
@@ -68,4 +68,4 @@ def _factors(result: Result) -> Grid:
         for cylinders in names
     ]
     head = ("throw of", *(("as given", "as decided") if len(found) > 1 else ("balance factor",)))
-    return Grid("Balance factors", head, tuple(rows), note=_FACTOR, sheet="balance-factors")
+    return Table(head, tuple(rows), title="Balance factors", note=_FACTOR, file="balance-factors")

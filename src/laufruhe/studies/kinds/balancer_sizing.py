@@ -11,10 +11,10 @@ import numpy as np
 import xarray as xr
 
 from laufruhe.files.study_tables import MOST_POINTS
+from laufruhe.present.picture import Picture
 from laufruhe.problem.measure import Measure, counted_rotors
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Record
-from laufruhe.studies.picture import Picture
 from laufruhe.studies.scenes import Point, Scenes, shafts_of
 from laufruhe.studies.swept import SweptPart, solved
 from laufruhe.studies.swept_shown import bars, by_point, over_sweep, swept_names

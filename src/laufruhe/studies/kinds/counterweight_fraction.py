@@ -11,7 +11,7 @@ import xarray as xr
 
 from laufruhe.files.rotors import FACTORS
 from laufruhe.files.study_tables import Axis, at
-from laufruhe.studies import picture as p
+from laufruhe.present import picture as p
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import SweptPart, coordinates, dataset
 from laufruhe.studies.swept_shown import (

@@ -25,10 +25,10 @@ from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.metrics import turning_parts
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import reciprocating_loads
-from laufruhe.studies import picture as p
+from laufruhe.present import picture as p
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.text import Rows, Text
+from laufruhe.studies.text import Text, marked_table
 
 ORDERS, WHAT = (1, 2), ("force", "couple")
 SPEED = 100.0
@@ -158,7 +158,7 @@ class FreeForces(Part):
         agreed, of = printed_agree(data)
         words = f"{agreed} of {of} printed values agree to half of the last of {data.attrs['digits']} digits."
         legend = "Forces over one cylinder's of the same order, couples over that times the spacing; printed values "
-        return [legend + "in brackets.", Rows(head, rows), words]
+        return [legend + "in brackets.", marked_table(head, rows), words]
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:

@@ -17,16 +17,16 @@ from laufruhe.files.asked import QuantityName
 from laufruhe.files.scene import QuantityTable, Scene
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.physics.irregularity import swing_of
+from laufruhe.present.picture import Picture
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import MEASURES, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Record
-from laufruhe.studies.picture import Picture
 from laufruhe.studies.ranked import side_by_side
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import SweptPart, solved
 from laufruhe.studies.swept_shown import MOST_ROWS, bars, by_point, claimed, over_sweep, swept_names
-from laufruhe.studies.text import NOTHING, Rows, Text, number
+from laufruhe.studies.text import NOTHING, Text, marked_table, number
 from laufruhe.units import readable
 
 EQUAL = "equal cylinders"
@@ -169,7 +169,7 @@ def _ranking(data: xr.Dataset) -> list[Text]:
         ])  # fmt: skip
     head = ["case", *swept, *(f"{name} [{unit}]" if unit else name for name, unit, *_ in scaled)]
     words = "Ranked by the first quantity; in parentheses the place by each. A dash: why that engine has none."
-    return [words, Rows(head, rows[:MOST_ROWS], len(rows))]
+    return [words, marked_table(head, rows[:MOST_ROWS], len(rows[MOST_ROWS:]))]
 
 
 def _places(values: np.ndarray) -> list[int]:

@@ -11,15 +11,15 @@ import xarray as xr
 
 from laufruhe.load_models.batch import Designs, prepare
 from laufruhe.numerics.arrays import Array
+from laufruhe.present import picture as p
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import decision_values
-from laufruhe.studies import picture as p
 from laufruhe.studies.part import Column, Record, variable
 from laufruhe.studies.regions import VALUES
 from laufruhe.studies.sampled import Sampled, in_unit, listed, share_below
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import solved
-from laufruhe.studies.text import Rows, Text, number
+from laufruhe.studies.text import Text, marked_table, number
 
 WITHIN = "within_limits"
 _PREPARED: dict[str, tuple[Problem, Designs, list[str]]] = {}
@@ -115,7 +115,7 @@ class RandomDesigns(Sampled):
             ]
             cells += [number(float(best[k])), number(float(bound[k])), str(data["proof"].values[k])]
             rows.append([*cells, str(int((kept < bound[k] * (1.0 - 1e-9)).sum()))])
-        return [Rows(head, rows)]
+        return [marked_table(head, rows)]
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:

@@ -14,14 +14,14 @@ from pydantic import Field
 
 from laufruhe.errors import InputError, ModelError
 from laufruhe.files.study_tables import DrawnTable, Span, span_of
+from laufruhe.present import picture as p
 from laufruhe.solvers.conclusion import decision_values
-from laufruhe.studies import picture as p
 from laufruhe.studies.part import Column, Record
 from laufruhe.studies.regions import VALUES
 from laufruhe.studies.sampled import Sampled, in_unit, listed, share_below
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import solved
-from laufruhe.studies.text import Rows, Text, number
+from laufruhe.studies.text import Text, marked_table, number
 
 STATUSES = ("optimal", "feasible", "infeasible", "failed", "impossible")
 PROOFS = ("global", "global within gap", "local", "none", "as given")
@@ -119,7 +119,7 @@ class RandomScenes(Sampled):
             proven = own.isel(draw=np.flatnonzero(status == 0))
             gap = (proven["objective"] - proven["lower_bound"]) / np.maximum(proven["objective"], 1e-300)
             rows.append([*cells, f"{float(gap.max()):.1e}" if gap.notnull().any() else "–"])
-        return [Rows(head, rows)]
+        return [marked_table(head, rows)]
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:

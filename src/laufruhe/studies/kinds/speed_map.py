@@ -20,15 +20,15 @@ from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.elastic_mounts import ResonanceError
+from laufruhe.present import picture as p
 from laufruhe.problem.channels import LoadChannel, mounting_in
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure, selected
 from laufruhe.problem.problem import Problem
-from laufruhe.studies import picture as p
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import AS_GIVEN, FAILED, decided
-from laufruhe.studies.text import NOTHING, Rows, Text, number
+from laufruhe.studies.text import NOTHING, Text, marked_table, number
 from laufruhe.units import readable
 
 DesignName = Literal["as given", "as decided"]
@@ -176,7 +176,7 @@ class SpeedMap(Part):
                 # what one case does not ask for is no line of it
                 if cells is not None or proof in ("infeasible", FAILED):
                     rows.append([case, design, label, *(cells or [NOTHING] * 5), proof])
-        return [Rows([*head, "proof"], rows)]
+        return [marked_table([*head, "proof"], rows)]
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:

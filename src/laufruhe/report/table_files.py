@@ -1,0 +1,87 @@
+"""Tables as files: comma-separated values, and one workbook of several tables."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Iterable, Mapping
+from datetime import UTC, datetime
+from functools import partial
+from itertools import chain, count
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from laufruhe.present.tables import Table
+
+_FORMULA = re.compile(r"(?!-?$|[+-]?[0-9.]+(?:e[+-]?[0-9]+)?(?: ?%| [\w ./*^°²³]*)?$)[=+\-@\t＝＋－＠]")
+"""Begins what a spreadsheet may compute: a sign that no plain number with its unit follows."""
+_OPTIONS = {"constant_memory": True, "strings_to_formulas": False, "strings_to_urls": False}
+_CREATED = datetime(2000, 1, 1, tzinfo=UTC)
+
+
+def write_csv(table: Table, path: Path) -> None:
+    """Write a table as comma-separated values: numbers in full precision, no text that a spreadsheet computes."""
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(map(_csv_cell, table.head))
+        writer.writerows(map(_csv_cell, row) for row in table.rows)
+
+
+def _csv_cell(cell: Any) -> Any:
+    if isinstance(cell, float) and not math.isfinite(cell):
+        return ""
+    # names are the user's, and spreadsheets take ' for the mark of a text
+    return f"'{cell}" if isinstance(cell, str) and _FORMULA.match(cell) else cell
+
+
+def write_book(tables: Mapping[str, Table], path: Path) -> None:
+    """Write tables as the pages of a workbook; the same numbers always make the same file."""
+    from xlsxwriter import Workbook
+    from xlsxwriter.exceptions import FileCreateError
+
+    with TemporaryDirectory() as rows:
+        book = Workbook(path, {**_OPTIONS, "tmpdir": rows})
+        book.set_properties({"created": _CREATED})
+        plain = book.add_format()
+        for name, table in zip(_page_names(tables), tables.values(), strict=True):
+            page = book.add_worksheet(name)
+            page.add_write_handler(str, partial(_write_text, plain=plain))
+            page.freeze_panes(1, 0)
+            for k, row in enumerate(chain([table.head], table.rows)):
+                # numbers first: most cells are
+                page.write_row(
+                    k, 0, [cell if type(cell) is float and math.isfinite(cell) else _book_cell(cell) for cell in row]
+                )
+        try:
+            book.close()
+        except FileCreateError as error:
+            # a full disk is reported as for any other file
+            raise error.args[0] from None
+
+
+def _write_text(page: Any, row: int, column: int, text: str, _: Any, plain: Any) -> int | None:
+    """Write a text that XlsxWriter would take for its own formatting as two pieces; else return None."""
+    if not (text.startswith("<r>") and text.endswith("</r>")):
+        return None
+    return int(page.write_rich_string(row, column, text[:2], plain, text[2:]))
+
+
+def _page_names(names: Iterable[str]) -> list[str]:
+    """Return page names: at most 31 letters, none that a workbook forbids, no two that differ in case only."""
+    pages: list[str] = []
+    for name in names:
+        allowed = re.sub(r"[\[\]:*?/\\]|^'|'$", "-", name)
+        tries = (f"{allowed[: 31 - len(end)]}{end}" for k in count(1) for end in [f" {k}" if k > 1 else ""])
+        pages.append(next(text for text in tries if text.lower() not in {page.lower() for page in pages}))
+    return pages
+
+
+def _book_cell(cell: Any) -> Any:
+    if isinstance(cell, str):
+        return cell.encode("utf-8", "backslashreplace").decode()
+    value = cell.item() if isinstance(cell, np.generic) else cell
+    return None if isinstance(value, float) and not math.isfinite(value) else value
