@@ -12,7 +12,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Block, Mount
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import elastic_mounting
-from laufruhe.physics.run_up import periodic_state, run_through
+from laufruhe.physics.steady_state import periodic_state
 from laufruhe.physics.time_model import time_model
 from laufruhe.physics.time_mounting import INTEGRATION
 from mounts.powertrain import powertrain, random_mounting, wrench
@@ -94,36 +94,6 @@ def test_a_stop_that_is_never_met_changes_nothing_and_one_that_is_met_limits_tra
     assert near.mismatch < 1e-7
 
 
-def test_run_up_passes_resonance_with_less_than_the_steady_peak_and_slow_ones_reach_it():
-    mounting = powertrain(loss=0.15)
-    unit = Spectrum(wrench().base, np.array([np.zeros(6), [0, 0, 0.02, 0, 0, 0]], dtype=complex))
-    top = 2 * np.pi * 20.0
-    speeds = np.linspace(1.0, top, 600)
-    peaks = []
-    for speed in speeds:
-        load = Spectrum(unit.base, unit.coefficients * speed**2)
-        peaks.append(np.linalg.norm(mounting.forces(load, speed).sample(64), axis=-1).max())
-    quick = run_through(mounting, unit, None, 0.0, top, 0.6, stretches=60)
-    slow = run_through(mounting, unit, None, 0.0, top, 12.0, stretches=120)
-    below = speeds < 2 * np.pi * 14.0
-    steady = np.max(np.array(peaks)[below])
-
-    def resonance(run):
-        return run.force[run.speeds < 2 * np.pi * 14.0].max()
-
-    assert resonance(quick) < 0.97 * steady
-    assert resonance(slow) == pytest.approx(steady, rel=0.05)
-
-
-def test_shut_down_meets_the_same_resonance():
-    mounting = powertrain(loss=0.15)
-    unit = Spectrum(wrench().base, np.array([np.zeros(6), [0, 0, 0.02, 0, 0, 0]], dtype=complex))
-    up = run_through(mounting, unit, None, 0.0, 2 * np.pi * 15.0, 6.0, stretches=60)
-    down = run_through(mounting, unit, None, 2 * np.pi * 15.0, 0.0, 6.0, stretches=60)
-    assert down.speeds[-1] == pytest.approx(0.0, abs=1e-9)
-    assert down.worst_travel == pytest.approx(up.worst_travel, rel=0.15)
-
-
 def test_free_vibration_keeps_its_energy_without_damping_and_forces_balance_inertia():
     mounting = random_mounting(5, loss=0.2, damping=100.0)
     model = time_model(mounting)
@@ -135,27 +105,10 @@ def test_free_vibration_keeps_its_energy_without_damping_and_forces_balance_iner
     assert model.accelerations(y, rate, load)[:, 0] == pytest.approx(load[:, 0] - pulled, rel=1e-9, abs=1e-9)
 
 
-def test_standstill_and_runs_without_duration_are_refused():
+def test_standstill_is_refused():
     with pytest.raises(ModelError, match="speed above zero"):
         periodic_state(powertrain(), wrench(), 0.0)
-    with pytest.raises(ModelError, match="duration"):
-        run_through(powertrain(), wrench(), None, 0.0, 1.0, 0.0)
     assert elastic_mounting(powertrain().block, [replace(m, stop_gap=0.01) for m in powertrain().mounts])
-
-
-def test_a_mode_far_too_fast_to_resolve_is_followed_in_a_run_up():
-    """A block with hardly any inertia in roll runs up like any other as long as nothing rolls it."""
-    corners = [(x, y, 0.0) for x in (0.3, -0.3) for y in (0.2, -0.2)]
-    mounts = [Mount(f"m{k}", place, (1.2e5, 1.2e5, 4e5), loss_factor=0.1) for k, place in enumerate(corners)]
-    lift = np.zeros((3, 6), dtype=complex)
-    lift[2, 2] = 0.05
-    runs = []
-    for roll, method in ((20.0, "RK45"), (1e-9, "Radau")):
-        block = Block(420.0, ((roll, 0.0, 0.0), (0.0, 50.0, 0.0), (0.0, 0.0, 50.0)))
-        mounting = elastic_mounting(block, mounts)
-        assert (mounting.modes.frequencies[-1] > 1e5) == (method == "Radau")
-        runs.append(run_through(mounting, Spectrum(Fraction(1), lift), None, 0.0, 60.0, 0.6, 12, method, 1e-5))
-    assert runs[1].force == pytest.approx(runs[0].force, rel=1e-2, abs=1e-2 * runs[0].worst_force)
 
 
 def test_roll_of_the_block_is_the_turn_that_its_mounts_tell():

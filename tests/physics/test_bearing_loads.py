@@ -282,3 +282,11 @@ def test_pins_drive_the_crank_with_its_torque(seed: int) -> None:
         velocity = 1j * POINT.speed * part.crank_radius * np.exp(1j * (phi + part.throw))
         power += velocity.real * pins[:, k, 2] + velocity.imag * pins[:, k, 1]
     assert power == pytest.approx(POINT.speed * torque, rel=1e-8, abs=1e-8 * np.abs(power).max())
+
+
+def test_a_journal_drags_at_its_radius_and_the_speed_of_its_shaft() -> None:
+    assert Bearing("b", 0.0, diameter=0.06, friction=0.004).drag == pytest.approx(0.004 * 0.03)
+    half = Shaft("slow", -0.5, 0.0, 0.1)
+    assert Bearing("b", 0.0, diameter=0.06, friction=0.004, shaft=half).drag == pytest.approx(0.002 * 0.03)
+    with pytest.raises(ModelError, match="no friction"):
+        _ = Bearing("b", 0.0, diameter=0.06).drag

@@ -20,7 +20,6 @@ from laufruhe.solvers import Status, solve
 from laufruhe.solvers.conclusion import KEPT, broken_limits, state
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import is_empty
-from laufruhe.solvers.mounts.limits_kept import LimitsKept
 from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.design import StarDesign
@@ -164,21 +163,6 @@ def test_a_design_that_few_angles_alone_allow_is_not_one_that_was_overlooked() -
     assert result.nearest.broken == ("quiet",)
 
 
-def test_a_run_up_is_designed_for_where_few_angles_forbid_a_mean() -> None:
-    """Steps of a run are gathered at 48 angles, at which no design keeps this force; over the cycle 7.073 N is kept."""
-    left, right = SINGLE["balancer_shafts"]
-    turned = {**left, "unbalances": [{**left["unbalances"][0], "angle": 183}]}
-    told = {
-        **SINGLE, "engine": {**SINGLE["engine"], "throws": [3]}, "balancer_shafts": [turned, right],
-        **mounted(),
-        "run_up": {"up_to": "3000 rpm", "time": "0.5 s"},
-        "objective": {"minimise": "run-up travel"},
-        "constraints": [{"limit": "mean mount force", "max": "7.0745 N"}],
-    }  # fmt: skip
-    result = laufruhe.solve(load_tables(told, Path("mounted.toml")))
-    assert result.status is Status.OPTIMAL
-
-
 @pytest.mark.slow
 def test_stars_are_not_excluded_by_means_at_the_few_angles_of_a_program() -> None:
     """The mixed-integer program has 24 angles, at which no star keeps this couple; over the cycle 470.2 N m is."""
@@ -273,14 +257,3 @@ def test_stiffness_is_bounded_by_what_the_cycle_has(samples: int) -> None:
     assert result.certificate.lower_bound <= LEAST * (1.0 + 1e-6)
     assert result.status is Status.OPTIMAL
     assert result.objective.value == pytest.approx(LEAST, rel=1e-4)
-
-
-def test_limits_of_run_ups_are_not_excluded_beside_what_few_angles_read() -> None:
-    travel = {"name": "travel", "limit": "run-up travel", "max": "1 m"}
-    asked = on_open_mounts(
-        0, run_up={"up_to": "3000 rpm", "time": "0.5 s"}, objective={"minimise": "rms mount force"},
-        constraints=[second(1.0001), travel],
-    )  # fmt: skip
-    assert not LimitsKept(asked).together(asked.limits).is_proven
-    tighter = on_open_mounts(0, objective={"minimise": "rms mount force"}, constraints=[second(0.99)])
-    assert LimitsKept(tighter).together(tighter.limits).is_proven

@@ -20,9 +20,8 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report.trade import INDEX, choices, index, trade_document
-from laufruhe.solvers.conclusion import decision_values, state, values_of
+from laufruhe.solvers.conclusion import decision_values, state
 from laufruhe.solvers.nearby import NEAR_BOXES, _begun, _is_like, first_of, next_to
-from laufruhe.solvers.result import Status
 from laufruhe.studies.trade import Row, Trade, trade
 from problem_files import PROBLEMS
 
@@ -107,22 +106,6 @@ def test_nothing_is_lost_by_searching_nearby(name: str) -> None:
     assert near is not None
     values = [objective_value(own, evaluate(own, engine)) for engine in (near, anew.final.engine)]
     assert values[0] <= values[1] * (1.0 + 1e-5)
-
-
-@pytest.mark.slow
-def test_limits_of_a_run_up_are_decided_by_from_a_good_start_too() -> None:
-    """A design as given that keeps them is not taken for the best because a better one breaks a step or two."""
-    problem = load(PROBLEMS / "soft-single-run-up.toml").at(Fidelity(samples=720, mounts="rigid"))
-    whole = laufruhe.solve(problem)
-    start = laufruhe.solve(problem.at(Fidelity(samples=720)))
-    assert start.objective is not None
-    values = values_of(problem, start)
-    decisions = tuple(replace(d, start=value) for d, value in zip(problem.decisions, values, strict=True))
-    again = laufruhe.solve(replace(problem, engine=start.final.engine, decisions=decisions))
-    assert whole.objective is not None
-    assert again.objective is not None
-    assert again.objective.value == pytest.approx(whole.objective.value, rel=1e-5)
-    assert again.status is Status.OPTIMAL
 
 
 @pytest.mark.slow

@@ -81,8 +81,8 @@ def chosen_by(scale: Scale, tolerance: float) -> Choice:
 
 def automatic(problem: Problem, tolerance: float, scale: Scale | None = None) -> Problem:
     """The problem at the fidelity chosen for it, beside a reference where one is known."""
-    if not problem.load_terms or any(measure.channel.is_checked for measure in problem.measures):
-        # nothing tells what run-ups lose with an order
+    if not problem.load_terms or any(measure.channel.simulation for measure in problem.measures):
+        # no bound says what a simulation loses with an order
         return problem.at(replace(problem.fidelity, tolerance=tolerance))
     return problem.at(chosen_by(scale or Scale.of(problem), tolerance).fidelity)
 
@@ -91,7 +91,7 @@ def ladder(scale: Scale) -> list[tuple[str, Problem]]:
     """Every fidelity that a trade sets side by side, those that differ on this problem (F13)."""
     problem = scale.problem
     rungs = [(name, problem.at(fidelity)) for knob in KNOBS for name, fidelity in knob.rungs(scale)]
-    if not problem.load_terms and not any(term.measure.channel.is_checked for term in problem.objective):
+    if not problem.load_terms and not any(term.measure.channel.simulation for term in problem.objective):
         return [("mounts alone, no loads", replace(problem, points=())), *rungs]
     return rungs + [(f"auto {tolerance:g}", automatic(problem, tolerance, scale)) for tolerance in TRIED]
 

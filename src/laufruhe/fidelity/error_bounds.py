@@ -19,7 +19,6 @@ from laufruhe.numerics.corners import SAME_ANGLE
 from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.runs import missed_share
 from laufruhe.physics.shaking_loads import rotor_loads
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation, evaluate, over, value_of_loads
@@ -54,9 +53,8 @@ def relative(bound: float, value: float) -> float:
 
 def missed(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
     """What the samples of an evaluation miss of a measure at most [its unit] (F7, F8); nothing of what has none."""
-    run = evaluation.engine.run
-    if measure.channel.is_checked and run is not None:
-        return missed_share(run) * evaluation.value(measure)
+    if measure.channel.simulation:
+        return measure.channel.missed(evaluation.engine) * evaluation.value(measure)
     if measure.channel.of_torque:
         return _missed_of_torque(measure, evaluation, finest)
     if not measure.is_load:

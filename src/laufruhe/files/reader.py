@@ -315,7 +315,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     points = operating_points(told, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)
     geared, of_geared = geared_of(file.geared_inertias)
     engine = Engine(
-        file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, wheel, None, gear, geared,
+        file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, wheel, gear, geared,
         load_cases_of(file.load_cases, found.block),
     )  # fmt: skip
     of_sizes = _sizes(file, table, told_bearings, bearings, gear)

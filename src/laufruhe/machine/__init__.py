@@ -10,7 +10,6 @@ from laufruhe.machine.gas import Charge, PressureTrace, Seiliger, Wiebe
 from laufruhe.machine.geared import GearedInertia
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
-from laufruhe.machine.run import Run
 from laufruhe.machine.running_gear import Bolts, PistonPin, RunningGear, Shank, Webs
 from laufruhe.machine.slider_crank import SliderCrank
 
@@ -37,7 +36,6 @@ __all__ = [
     "Rod",
     "Role",
     "Rotor",
-    "Run",
     "RunningGear",
     "Seiliger",
     "Shaft",

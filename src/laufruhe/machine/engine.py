@@ -21,7 +21,6 @@ from laufruhe.machine.geared import GearedInertia
 from laufruhe.machine.load_case import LoadCase
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Rotor, Shaft
-from laufruhe.machine.run import Run
 from laufruhe.machine.running_gear import Moving, RunningGear, Size
 from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.numerics.spectrum import as_order
@@ -89,8 +88,6 @@ class Engine:
         Main bearings of its shafts; empty where nothing is asked of them.
     flywheel
         What turns with the crank; None where nothing is asked of it.
-    run
-        How it is run up and shut down; None where nothing is said of that.
     gear
         Sizes of its running gear; None where nothing is asked of them.
     geared
@@ -109,7 +106,6 @@ class Engine:
     block: Block | None = None
     bearings: tuple[Bearing, ...] = ()
     flywheel: Flywheel | None = None
-    run: Run | None = None
     gear: RunningGear | None = None
     geared: tuple[GearedInertia, ...] = ()
     load_cases: tuple[LoadCase, ...] = ()

@@ -8,7 +8,7 @@ import numpy as np
 
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.elastic_mounts import ElasticMounting
-from laufruhe.physics.run_up import SteadyState, periodic_state
+from laufruhe.physics.steady_state import SteadyState, periodic_state
 from laufruhe.physics.time_model import time_model
 
 INTEGRATION = 1e-9

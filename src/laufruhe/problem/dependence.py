@@ -111,9 +111,6 @@ flywheel inertia                    0 0 0  0 0 0  0  0 0  +
 flywheel mass                       0 0 0  0 0 0  0  0 0  +
 rim stress                          0 0 0  0 0 0  0  0 0  +
 arm stress                          0 0 0  0 s s  0  0 0  +
-run-up force                        s s s  s s s  s  s s  s
-run-up travel                       s s s  s s s  s  s s  s
-run-up twist                        s s s  s s s  s  s s  s
 throw clearance                     0 0 0  0 - 0  0  0 0  0
 running-gear mass                   0 0 0  0 + 0  0  0 0  0
 """

@@ -127,7 +127,7 @@ class Measure:
         if self.is_load:
             return self.load.feels_gas
         channel = self.channel
-        return channel.is_flywheel or channel.of_run is not None or (channel.is_number and channel.of_loads)
+        return channel.is_flywheel or bool(channel.simulation) or (channel.is_number and channel.of_loads)
 
     @property
     def feels_order(self) -> bool:

@@ -27,7 +27,7 @@ def error_of(problem: Problem, evaluation: Evaluation) -> float:
     A fidelity chosen by hand is taken as wanted, so that only its samples are judged.
     """
     told = [(term, term.measure.channel) for term in problem.objective]
-    runs = [term for term, channel in told if channel.is_checked or channel.of_torque]
+    runs = [term for term, channel in told if channel.simulation or channel.of_torque]
     loads = _error_of_loads(problem, evaluation)
     if not runs or evaluation.resonance:
         return loads
@@ -90,7 +90,7 @@ def solve_within(problem: Problem, solve: Callable[[Problem], Result]) -> Result
     if asked is None:
         return _with_gas(problem, solve, result)
     for _ in () if passed() else in_time(range(_ROUNDS)):
-        # steps of a run-up are those of every fidelity
+        # steps of a simulation are the same at every fidelity
         if _error_of_loads(result.problem, result.final) <= asked:
             break
         better = choose(problem, asked, result.final.engine).fidelity

@@ -9,7 +9,7 @@ from typing import Any
 
 from laufruhe.numerics.norms import Norm
 from laufruhe.numerics.processes import called
-from laufruhe.problem.channels import AT_EACH_MOUNT, OF_MOUNTING, OF_RUNS, OF_SIZES, Channel
+from laufruhe.problem.channels import AT_EACH_MOUNT, CHANNELS, OF_MOUNTING, OF_SIZES, Channel
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence, kinds_of
 from laufruhe.problem.measure import Measure
@@ -20,8 +20,8 @@ from laufruhe.solvers.result import Result
 
 # of stars and choices of shafts: masses are those of the shafts that are built, numbers of a signal are told apart
 BUILT = (Dependence.SHIFT, Dependence.AFFINE, Dependence.SWING)
-OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *OF_RUNS}
-"""Channels that programs of mounts have formulas for."""
+OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *(channel for channel in CHANNELS.values() if channel.simulation)}
+"""Channels that programs of mounts have formulas for, or peaks of a simulation."""
 OF_SIZES_ALONE = frozenset(channel for channel in OF_SIZES if channel.of_engine is not None)
 """Channels that are functions of the sizes of an engine alone."""
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.load_models.affine import AffineModel
-from laufruhe.load_models.run_look import asks_runs
+from laufruhe.load_models.simulated import simulated_measures
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.machine import Engine
 from laufruhe.physics.fidelity import Fidelity
@@ -38,7 +38,11 @@ STEPS = 96
 
 def is_convex(problem: Problem) -> bool:
     """Whether unbalances alone are open, and loads alone are asked about."""
-    return problem.phasing is None and len(problem.unbalances) == len(problem.decisions) and not asks_runs(problem)
+    return (
+        problem.phasing is None
+        and len(problem.unbalances) == len(problem.decisions)
+        and not simulated_measures(problem)
+    )
 
 
 def compares_stars(problem: Problem) -> bool:

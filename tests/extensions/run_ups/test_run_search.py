@@ -11,15 +11,17 @@ from scipy.integrate import solve_ivp
 
 import laufruhe
 from laufruhe.errors import LaufruheError
+from laufruhe.extensions.run_ups.channels import FORCE, TRAVEL, TWIST
+from laufruhe.extensions.run_ups.machine import Run
+from laufruhe.extensions.run_ups.peaks import RunPeaks
+from laufruhe.extensions.run_ups.runs import run_loads, runs_of
 from laufruhe.fidelity.automatic import ladder
 from laufruhe.fidelity.error_bounds import Scale
 from laufruhe.files.reader import load_tables, tables_of
-from laufruhe.load_models.run_peaks import RunPeaks
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.runs import run_loads, runs_of
 from laufruhe.physics.time_model import time_model
-from laufruhe.problem.channels import RUN_FORCE, RUN_TRAVEL, RUN_TWIST, mounting_in
+from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
@@ -28,7 +30,7 @@ from laufruhe.solvers import Result, Status
 from problem_files import PROBLEMS
 
 READY = PROBLEMS / "soft-single-run-up-mounts.toml"
-OF_RUNS = tuple(Measure(channel) for channel in (RUN_FORCE, RUN_TRAVEL, RUN_TWIST))
+OF_RUNS = tuple(Measure(channel) for channel in (FORCE, TRAVEL, TWIST))
 SHORT = {"up_to": "700 rpm", "time": "0.4 s", "shut_down_time": "0.5 s"}
 STOP = {"gap": "1 mm", "stiffness": "300 N/mm"}
 
@@ -65,7 +67,7 @@ def ready() -> tuple[Problem, Result]:
 
 def by_scipy(engine: Engine, problem: Problem) -> tuple[float, float]:
     """Largest force and travel of both runs: E25 written here once more, matrices of the mounts alone shared."""
-    run, model = problem.engine.run, time_model(mounting_in(engine))
+    run, model = problem.engine.extra(Run), time_model(mounting_in(engine))
     inertia, gas = run_loads(engine, problem.points[0], problem.fidelity)
     assert gas is None
     orders, coefficients = 1j * inertia.orders, model.load @ inertia.coefficients.T
@@ -151,7 +153,7 @@ def test_peaks_are_those_of_the_last_word_and_slope_as_they_differ() -> None:
         own = [numbers[name] for name in order]
         x = np.array([*own, unbalance.real, unbalance.imag])
         engine = problem.design([unbalance, *own])
-        told = runs_of(engine, problem.points[0], problem.fidelity, problem.engine.run)
+        told = runs_of(engine, problem.points[0], problem.fidelity, problem.engine.extra(Run))
         for coarser, most in ((1, 1e-9), (4, error)):
             peaks = RunPeaks(problem, OF_RUNS, coarser)
             parts = np.split(peaks.values(x), np.cumsum(peaks.counts)[:-1])
@@ -174,7 +176,7 @@ def test_a_peak_at_the_end_of_a_run_counts(stop: dict[str, str] | None) -> None:
     for speed in range(360, 480, 10):
         run = {"up_to": f"{speed} rpm", "time": "0.3 s", "shut_down_time": "0.3 s"}
         problem = limited(mounts=given, run_up=run)
-        told = runs_of(problem.engine, problem.points[0], problem.fidelity, problem.engine.run)
+        told = runs_of(problem.engine, problem.points[0], problem.fidelity, problem.engine.extra(Run))
         peaks = RunPeaks(problem, OF_RUNS[:1])
         for values, own in zip(np.split(peaks.values(np.array([1e-3])), 2), told, strict=True):
             assert values.max() == pytest.approx(own.worst_force, rel=1e-9)
@@ -205,7 +207,7 @@ def test_a_design_of_which_one_run_is_not_followed_has_no_peaks() -> None:
 @pytest.mark.slow
 def test_runs_on_bump_stops_are_those_of_scipy() -> None:
     problem = limited(mounts=mounts(STOP))
-    told = runs_of(problem.engine, problem.points[0], problem.fidelity, problem.engine.run)
+    told = runs_of(problem.engine, problem.points[0], problem.fidelity, problem.engine.extra(Run))
     force, travel = by_scipy(problem.engine, problem)
     assert travel > 1.3e-3
     assert max(run.worst_force for run in told) == pytest.approx(force, rel=1e-3)

@@ -7,7 +7,7 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import InputError
-from laufruhe.physics.run_up import run_through
+from laufruhe.extensions.run_ups.runs import run_through
 from laufruhe.physics.speed_map import split_loads
 from laufruhe.plots import names
 from laufruhe.problem.channels import mounting_in

@@ -11,7 +11,7 @@ import numpy as np
 from laufruhe.extensions.mount_relaxation.ends import Aims, ends_ahead
 from laufruhe.extensions.mount_relaxation.open_mounts import is_lifted
 from laufruhe.extensions.mount_relaxation.search import SpringBoxes
-from laufruhe.load_models.run_look import asks_runs
+from laufruhe.load_models.simulated import simulated_measures
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.witness import EXCESS
@@ -41,7 +41,7 @@ WON = 0.3
 def applies(problem: Problem) -> bool:
     """Return whether forces of springs bound something that boxes of one number do not."""
     alone = len(problem.decisions) == 1 and not divides(problem)
-    return not alone and not asks_runs(problem) and is_bounded(named_part(problem))
+    return not alone and not simulated_measures(problem) and is_bounded(named_part(problem))
 
 
 def bounds(question: Question) -> Iterator[Divided]:

@@ -5,6 +5,10 @@ from laufruhe.extension import Extension
 _HERE = "laufruhe.extensions.run_ups"
 EXTENSION = Extension(
     "run_ups",
+    channels=(f"{_HERE}.channels:FORCE", f"{_HERE}.channels:TRAVEL", f"{_HERE}.channels:TWIST"),
+    dependences=tuple(
+        f"run-up {number}  s s s  s s s  s  s s  s  torsion=s" for number in ("force", "travel", "twist")
+    ),
     keys=(f"{_HERE}.file:KEY",),
     reductions=(f"{_HERE}.reduction:REDUCTION",),
     sections=(f"{_HERE}.section:SECTION",),

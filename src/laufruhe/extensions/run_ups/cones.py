@@ -67,7 +67,7 @@ class _Steps:
     def problem(self) -> Problem:
         """With those steps; limits that none comes near are left out."""
         known = {measure: self._rows.known(measure, places) for measure, places in self._places.items()}
-        kept = (x for x in self._whole.limits if not x.measure.channel.is_checked or x.measure in known)
+        kept = (x for x in self._whole.limits if not x.measure.channel.simulation or x.measure in known)
         return replace(self._whole, known_rows=known, limits=tuple(kept))
 
     def affine(self, samples: int = _COARSE, averaged: bool = False) -> AffineProblem:

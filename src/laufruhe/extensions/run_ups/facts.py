@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from laufruhe.machine import OperatingPoint, Run
-from laufruhe.physics.run_up import RunUp
-from laufruhe.physics.runs import point_of, runs_of
+from laufruhe.extensions.run_ups.machine import Run
+from laufruhe.extensions.run_ups.runs import RunUp, point_of, runs_of
+from laufruhe.machine import OperatingPoint
 from laufruhe.present.mounting import critical_speed, driven, facts_of, is_elastic, main_order
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation
@@ -22,8 +22,9 @@ def runs_up(result: Result) -> bool:
 
 def run_of(result: Result) -> Run:
     """As the problem says, or in three seconds past every critical speed that is not far from the operating points."""
-    if result.problem.engine.run is not None:
-        return result.problem.engine.run
+    given = result.problem.engine.extra(Run)
+    if given is not None:
+        return given
     facts = facts_of(result.final)
     top = max(point.speed for point in result.problem.points)
     critical = [critical_speed(frequency, main_order(facts)) for frequency in driven(facts)]

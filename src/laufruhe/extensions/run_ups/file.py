@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.fields import Table
 from laufruhe.files.problem_file import Given, Key
-from laufruhe.machine import Run
 from laufruhe.machine.dynamic import FluidTrack
 from laufruhe.machine.mount import every_spring
 from laufruhe.problem.problem import Problem
@@ -41,7 +41,7 @@ def _read(table: RunUpTable, problem: Problem, __: Given) -> Problem:
             "run_up.operating_point", table.operating_point, "is none here", nearest(table.operating_point, points)
         )
     run = Run(table.up_to, table.time, table.shut_down_time or table.time, table.operating_point or "")
-    return replace(problem, engine=replace(engine, run=run))
+    return replace(problem, engine=engine.with_extra(run))
 
 
 KEY = Key("run_up", RunUpTable, _read)

@@ -7,7 +7,8 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
-from laufruhe.load_models.run_look import COARSER
+from laufruhe.extensions.run_ups.boxes import bounds_runs
+from laufruhe.load_models.simulated import COARSER
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import Evaluation
@@ -16,7 +17,6 @@ from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach
-from laufruhe.prove.mounts.box_runs import bounds_runs
 from laufruhe.prove.mounts.provers import EARLY
 from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, none_within

@@ -6,18 +6,18 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
+from laufruhe.extensions.run_ups.channels import FORCE, TRAVEL, TWIST
 from laufruhe.extensions.run_ups.facts import run_of, run_point, runs_up, shown_runs
 from laufruhe.plots.speed_axis import LIMIT, limits_on
 from laufruhe.plots.style import entry, headed, page, series_of, styled
 from laufruhe.plots.words import INK
 from laufruhe.present.numbers import RPM
 from laufruhe.present.numbers import figure as words
-from laufruhe.problem.channels import RUN_FORCE, RUN_TRAVEL, RUN_TWIST
 from laufruhe.solvers.result import Result
 from laufruhe.units import readable
 
 _RUNS: tuple[tuple[Any, str], ...] = (("-", "run-up"), ((0, (4, 1.5)), "shut-down"))
-_ROWS = (("largest force [N]", RUN_FORCE), ("largest travel [mm]", RUN_TRAVEL), ("largest roll [°]", RUN_TWIST))
+_ROWS = (("largest force [N]", FORCE), ("largest travel [mm]", TRAVEL), ("largest roll [°]", TWIST))
 applies = runs_up
 
 

@@ -1,6 +1,6 @@
 """Reduction: what else is asked is decided first, and run-ups after it."""
 
-from laufruhe.load_models.run_look import asks_runs
+from laufruhe.load_models.simulated import simulated_measures
 from laufruhe.numerics.processes import called
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import kinds_of
@@ -10,7 +10,7 @@ from laufruhe.solvers.result import Result
 
 
 def _applies(problem: Problem) -> bool:
-    return asks_runs(problem) and bool(kinds_of(problem)) and Kind.NUMBER not in kinds_of(problem)
+    return bool(simulated_measures(problem)) and bool(kinds_of(problem)) and Kind.NUMBER not in kinds_of(problem)
 
 
 def _solve(problem: Problem, decide: Decide, _: Decide) -> Result:

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.load_models.run_peaks import RunPeaks
+from laufruhe.extensions.run_ups.peaks import RunPeaks
+from laufruhe.extensions.run_ups.runs import STRETCHES
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.runs import STRETCHES
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import KnownRows, Problem

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from laufruhe.extensions.run_ups.facts import run_of, run_point, runs_up, shown_runs
+from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.present.measures import has_loads, loaded
 from laufruhe.present.numbers import RPM, figure
 from laufruhe.present.tables import Table
@@ -20,7 +21,7 @@ HEAD = ("", "time", "largest force", "largest travel", "largest roll")
 
 def _tables(result: Result) -> list[Table]:
     """Return run-up and shut-down, where the problem says how these go."""
-    if result.problem.engine.run is None:
+    if result.problem.engine.extra(Run) is None:
         return []
     run, (up, down) = run_of(result), shown_runs(result, result.final)
     rows = tuple(

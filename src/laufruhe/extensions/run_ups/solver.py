@@ -15,7 +15,7 @@ from dataclasses import replace
 from laufruhe.errors import ModelError
 from laufruhe.extensions.run_ups.cones import solve_run_cones
 from laufruhe.extensions.run_ups.rows import RunRows
-from laufruhe.load_models.run_look import run_measures
+from laufruhe.load_models.simulated import simulated_measures
 from laufruhe.machine.mount import every_spring
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.measure import Limit, Term
@@ -44,7 +44,7 @@ def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Resu
     ModelError
         If a run-up is minimised over what nothing decides it by.
     """
-    asked = run_measures(problem)
+    asked = simulated_measures(problem)
     limits = tuple(limit for limit in problem.limits if limit.measure in asked)
     terms = tuple(term for term in problem.objective if term.measure in asked)
     apart = problem.changed(
@@ -83,7 +83,7 @@ def _designed(
     """A design that is made for them; None where no method does that."""
     if problem.phasing is not None:
         return _of_stars(problem, problem.phasing, decide) if kinds <= _LINEAR | {Kind.STAR} else None
-    rows = RunRows.of(problem, run_measures(problem)) if kinds <= _LINEAR else None
+    rows = RunRows.of(problem, simulated_measures(problem)) if kinds <= _LINEAR else None
     if rows is not None:
         return solve_run_cones(problem, limits, terms, rows, decide)
     if not kinds <= _SMOOTH:

@@ -63,7 +63,7 @@ def can_follow(problem: Problem) -> bool:
     told = bool(problem.objective) and not any(term.measure.channel.is_number for term in problem.objective)
     alone = not problem.extras and problem.phasing is None
     # limits on run-ups wait, and are named; what else is not known to be affine is followed by no program and no bound
-    asked = [measure for measure in problem.measures if not measure.channel.is_checked]
+    asked = [measure for measure in problem.measures if not measure.channel.simulation]
     affine = all(is_affine(measure.channel, kinds, problem) for measure in asked)
     convex = all(measure.norm.is_convex for measure in problem.measures if measure.is_load)
     return bool(kinds) and kinds <= _FOLLOWED and told and alone and affine and convex

@@ -58,7 +58,6 @@ from laufruhe.problem.channels.mounting import (
     motion_indices,
     mounting_in,
 )
-from laufruhe.problem.channels.runs import OF_RUNS, RUN_FORCE, RUN_TRAVEL, RUN_TWIST
 from laufruhe.problem.channels.sizes import (
     AT_EACH_BEARING,
     AT_EACH_CRANK_PIN,
@@ -83,14 +82,10 @@ __all__ = [
     "OF_FLYWHEEL",
     "OF_MOUNTING",
     "OF_MOUNTS",
-    "OF_RUNS",
     "OF_SHAFT_PLACES",
     "OF_SIZES",
     "ON_BLOCK",
     "RAW_TORQUE_ROLL",
-    "RUN_FORCE",
-    "RUN_TRAVEL",
-    "RUN_TWIST",
     "SAG",
     "STATIC_FORCE",
     "STATIC_TRAVEL",
@@ -195,5 +190,5 @@ CHANNELS: Mapping[str, Channel] = extended("channels", Channel, (
     MOUNT_FORCE, MOUNT_TRAVEL, *OF_BLOCK,
     HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,
     SIDE_FORCE, FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS,
-    ADDED_MASS, *OF_MOUNTING, *OF_RUNS, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES,
+    ADDED_MASS, *OF_MOUNTING, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES,
 ))  # fmt: skip

@@ -14,7 +14,6 @@ from laufruhe.machine import Block, Engine, Flywheel, OperatingPoint, Role
 from laufruhe.machine.clearances import Span
 from laufruhe.numerics.norms import MEAN, NORMS
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.linear_run import Response
 from laufruhe.physics.mount_numbers import AxisResidual, Band
 from laufruhe.physics.strength import Factor
 from laufruhe.problem.asking import Answered, Asked
@@ -77,9 +76,6 @@ class Needs:
         "the arms of a flywheel",
         "add [flywheel.rim.arms]",
     )
-    RUN = Need(
-        lambda e: e.run, "elastic mounts that an engine is run up on", "add [run_up] and [mounts] of kind elastic"
-    )
     CASES = Need(lambda e: e.load_cases, "load cases", "add [[load_cases]], and [mounts] of kind elastic")
 
 
@@ -116,8 +112,6 @@ class Channel:
         Whether it never falls where a number of the flywheel grows; else it never rises.
     of_wheel
         The value as a function of the flywheel of an engine, if it is of that.
-    of_run
-        Of a linear run-up what it is the largest length of, if it is of that.
     of_torque
         Whether the torque of the crank is in it, which other decisions than the flywheel move too.
     of_engine
@@ -126,6 +120,10 @@ class Channel:
         Whether it has no meaning where stiffness depends on frequency, and is of the shares of motions in modes.
     of_cases
         Of a block under a held load what it is the largest length of, shape (mounts, 3), if it is of that.
+    simulation
+        Module that simulates it, where no expression has it: `peaks` for searches of mounts, `boxes` for bounds.
+    missed
+        Share of its value that may stand between the steps of a simulation.
     of_axis
         What turning about the torque-roll axis lacks to be a mode, if it is of that.
     open_frequency
@@ -149,13 +147,14 @@ class Channel:
     of_loads: bool = True
     rises: bool = True
     of_wheel: Callable[[Asked, Answered], OfWheel] | None = None
-    of_run: Callable[[Response], NDArray[np.float64]] | None = None
     of_engine: Callable[[Engine], float] | None = None
     of_torque: bool = False
     of_constant_stiffness: bool = False
     of_shares: bool = False
     of_cases: Callable[[Any], Any] | None = None
     of_axis: Callable[[Block, Band], AxisResidual] | None = None
+    simulation: str = ""
+    missed: Callable[[Engine], float] = lambda _: 0.0
     open_frequency: bool = False
     places: Callable[[Engine], Sequence[str]] = lambda _: ()
     title: str = ""
@@ -166,7 +165,6 @@ class Channel:
     is_number: ClassVar[bool] = False
     is_mounting: ClassVar[bool] = False
     is_placing: ClassVar[bool] = False
-    is_checked: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         _KNOWN[self.name] = self

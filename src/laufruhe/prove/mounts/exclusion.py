@@ -60,9 +60,9 @@ class LimitBoxes:
         found, pull = boxes.excess, boxes.pull
         broken = self._boxes.breaks(lower, upper) | (found > 0.0)
         left = np.flatnonzero(~broken)
-        if self._boxes.runs is not None and len(left):
+        if self._boxes.simulated is not None and len(left):
             own = boxes.kept(left)
-            self._boxes.add_runs(own, lower[left], upper[left])
+            self._boxes.add_simulated(own, lower[left], upper[left])
             found[left], pull[left] = own.excess, own.pull
         found = np.where(broken | (found > 0.0), np.inf, found)
         return found, worth_halving(pull, lower, upper)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from laufruhe.numerics.norms import Norm
-from laufruhe.problem.channels import AT_EACH_MOUNT, OF_MOUNTING, OF_RUNS
+from laufruhe.problem.channels import AT_EACH_MOUNT, CHANNELS, OF_MOUNTING
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
-NAMED = AT_EACH_MOUNT | {*OF_MOUNTING, *OF_RUNS}
+NAMED = AT_EACH_MOUNT | {*OF_MOUNTING, *(channel for channel in CHANNELS.values() if channel.simulation)}
 """Channels that have formulas over boxes of mounts."""
 _AFFINE = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
 

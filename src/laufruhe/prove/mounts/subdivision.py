@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from laufruhe.load_models.simulated import simulated_measures
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import NORMS
+from laufruhe.numerics.processes import called
 from laufruhe.problem import channels
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import at_many
@@ -23,10 +26,9 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import NEARLY, Divided, divided_on
 from laufruhe.prove.mounts.box_lines import BoxLines
-from laufruhe.prove.mounts.box_norms import under
+from laufruhe.prove.mounts.box_norms import Under, under
 from laufruhe.prove.mounts.box_numbers import RANGES, SAID, UNDER, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, Lines
-from laufruhe.prove.mounts.box_runs import run_boxes
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.ranges import SLACK
 from laufruhe.prove.mounts.ratios import groups_of, is_ratio, ratio_under
@@ -39,7 +41,7 @@ MOST_BOXES = 60_000
 # numbers held at once
 HELD = 3e6
 # numbers of a motion in time that cost as much as one of an order
-RUN_SHARE = 18
+SIMULATED_SHARE = 18
 # of the gap that counts as proven, what small orders may take of it
 LEFT_OUT = 0.05
 # of the length of a side, what counts where nothing is told of it
@@ -82,6 +84,28 @@ def worth_halving(pull: Array, lower: Array, upper: Array) -> NDArray[np.intp]:
     return np.asarray(np.argmax(np.nan_to_num(pull) + EVEN * (upper - lower) / upper.max(), axis=1))
 
 
+class SimulatedBoxes(Protocol):
+    """Bounds of simulated measures over boxes of stiffness."""
+
+    measures: tuple[Measure, ...]
+
+    @property
+    def cost(self) -> int:
+        """Work of one box, in numbers."""
+
+    def under(self, measure: Measure, lower: Array, upper: Array, asked: Mask | None = None, /) -> Under:
+        """Return linear functions under a measure on boxes, shapes (boxes, open numbers), or on those asked for."""
+
+
+def simulated_boxes(model: BoxModel) -> SimulatedBoxes | None:
+    """Return the bounds of the simulated measures of a problem; None where nothing bounds them."""
+    measures = simulated_measures(model.problem)
+    if not measures:
+        return None
+    found: SimulatedBoxes | None = called(f"{measures[0].channel.simulation}:boxes", model, measures)
+    return found
+
+
 class StiffnessBoxes:
     """Bounds of boxes.
 
@@ -89,8 +113,8 @@ class StiffnessBoxes:
     ----------
     constant
         Of the objective: loads of the block and masses are the same on all mounts.
-    runs
-        Bounds of run-ups that are asked about; none where nothing bounds them.
+    simulated
+        Bounds of simulated measures; None where nothing bounds them.
 
     Parameters
     ----------
@@ -120,7 +144,7 @@ class StiffnessBoxes:
         ]
         numbers = [limit for limit in problem.mount_limits if math.isfinite(limit.maximum)]
         self._priced = [limit for limit in numbers if limit.measure.channel in UNDER]
-        self.runs = run_boxes(self.model)
+        self.simulated = simulated_boxes(self.model)
 
     @property
     def is_sampled_fully(self) -> bool:
@@ -133,8 +157,8 @@ class StiffnessBoxes:
         lines = sum(len(lines.omegas) for _, _, lines, _ in (*self._terms, *self._limits))
         ratios = [term.measure for term in self.problem.mount_terms]
         lines += sum(2 * len(self._ratio_lines(q).omegas) for q in ratios if is_ratio(q))
-        runs = self.runs.cost // RUN_SHARE if self.runs is not None else 0
-        return max(lines, 1) * len(self.problem.decisions) ** 2 * max(mounts, 2) + runs
+        simulated = self.simulated.cost // SIMULATED_SHARE if self.simulated is not None else 0
+        return max(lines, 1) * len(self.problem.decisions) ** 2 * max(mounts, 2) + simulated
 
     @property
     def at_once(self) -> int:
@@ -164,17 +188,17 @@ class StiffnessBoxes:
         broken = self.breaks(lower, upper)
         found = self.constant + numbers + boxes.least
         pull = (pull + pulled) / np.where(size + numbers > 0.0, size + numbers, 1.0)[:, None]
-        # run-ups cost most, and tell nothing of boxes that are ruled out
+        # simulations cost most, and tell nothing of boxes that are ruled out
         left = np.flatnonzero(~broken & (found < self.enough))
-        if self.runs is not None and len(left):
+        if self.simulated is not None and len(left):
             own = boxes.kept(left)
-            pull[left] = np.maximum(pull[left], self.add_runs(own, lower[left], upper[left]))
+            pull[left] = np.maximum(pull[left], self.add_simulated(own, lower[left], upper[left]))
             found[left] = self.constant + numbers[left] + own.least
         found = np.where(broken, np.inf, found)
         return found, worth_halving(pull, lower, upper)
 
     def hold(self, boxes: BoxLines, lower: Array, upper: Array) -> None:
-        """Add limits that have linear functions under them, those of run-ups left out."""
+        """Add limits that have linear functions under them, simulated ones left out."""
         for maximum, quantity, lines, left_out in self._limits:
             least = under(self.model, quantity, lines, self.model.expanded(lines, lower, upper))
             boxes.hold(least, left_out, maximum)
@@ -182,14 +206,14 @@ class StiffnessBoxes:
             least = UNDER[limit.measure.channel](self.model, limit.measure, lower, upper)
             boxes.hold(least, 0.0, limit.maximum * (1.0 + SLACK))
 
-    def add_runs(self, boxes: BoxLines, lower: Array, upper: Array) -> Array:
-        """Add what run-ups tell of boxes (E65); the pull of sides."""
-        assert self.runs is not None
+    def add_simulated(self, boxes: BoxLines, lower: Array, upper: Array) -> Array:
+        """Add what simulations tell of boxes (E65); return the pull of sides, shape (boxes, open numbers)."""
+        assert self.simulated is not None
         pull, problem = np.zeros_like(lower), self.problem
         weights = {term.measure: term.weight for term in problem.objective}
-        for measure in self.runs.measures:
+        for measure in self.simulated.measures:
             # one limit that is broken is enough
-            found = self.runs.under(measure, lower, upper, boxes.excess <= 0.0)
+            found = self.simulated.under(measure, lower, upper, boxes.excess <= 0.0)
             boxes.add(weights.get(measure, 0.0), found)
             for limit in problem.limits:
                 if limit.measure == measure:

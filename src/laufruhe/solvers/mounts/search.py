@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.run_look import COARSER
+from laufruhe.load_models.simulated import COARSER
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed, rounds
@@ -34,10 +34,10 @@ MOST_MARGINS = 6
 NEAR = 0.05
 ITERATIONS = 100
 MOST_AROUND = 3
-# ends of a search that run-ups are followed exactly from
+# ends of a search from which simulations are followed exactly
 MOST_REFINED = 1
-# of a search whose every step follows run-ups
-RUN_ITERATIONS = 60
+# of a search whose every step takes a simulation
+SIMULATED_ITERATIONS = 60
 # share of the size that a search counted in from which it is done again in a smaller one, and how often
 SMALL = 1e-2
 MOST_SIZES = 3
@@ -86,7 +86,7 @@ class MountSearch:
         Mounts and columns to start from before all others, in place of those given or `beside` them; without columns
         the unbalances are those that are best on the mounts as given.
     coarser
-        Times as long as those of the last word steps of run-ups are.
+        Times as long as those of the last word steps of simulations are.
 
     Attributes
     ----------
@@ -137,7 +137,7 @@ class MountSearch:
         self._tighten()
 
     def refined(self) -> None:
-        """Once more from the best ends, with run-ups in the steps of the last word."""
+        """Once more from the best ends, with simulations in the steps of the last word."""
         ends = distinct(self.optima, max(abs(self.best.design.value) if self.best else 0.0, 1e-12), 1e-3)
         ends = ends or tuple(sorted(self.optima, key=lambda optimum: optimum.violation)[:1])
         places = [_parted(self.joint, optimum.x) for optimum in ends[:MOST_REFINED]]
@@ -212,7 +212,7 @@ class MountSearch:
         """Limits on loads that are kept where the search starts, with room to spare: each is hundreds of rows."""
         if self.moves is not None:
             return set()
-        limits = [x for x in self.problem.load_limits if not x.measure.is_mass and not x.measure.channel.is_checked]
+        limits = [x for x in self.problem.load_limits if not x.measure.is_mass and not x.measure.channel.simulation]
         for place in self._points[:LOOKED] if limits else ():
             design = started_at(self.problem, place)
             limits = [x for x in limits if design is not None and design.evaluation.standing(x).excess < -ROOM]
@@ -234,7 +234,7 @@ class MountSearch:
 
     @property
     def _iterations(self) -> int:
-        return ITERATIONS if self.joint.program.told is None else RUN_ITERATIONS
+        return ITERATIONS if self.joint.program.told is None else SIMULATED_ITERATIONS
 
     def _ends(self, starts: Sequence[Array], enough: Enough | None = None, known: int = 0) -> tuple[LocalOptimum, ...]:
         """Where starts of the program lead to, which has had so many before."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.run_look import RunLook, asks_runs
+from laufruhe.load_models.simulated import COARSER, Peaks, peaks_of, simulated_measures
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time, left, limited
 from laufruhe.numerics.foresight import foresight
@@ -30,10 +30,10 @@ POOL = 16
 ROUGHLY = 1e-2
 # share of the time that is left for looking at points to start from
 LOOKING = 0.25
-# times as many candidates where run-ups, that have many optima, are asked about
-RUN_POOL = 4
-# of what is missed beside run-ups: limits that many designs nearly keep, few keep
-RUN_WEIGHT = 10.0
+# times as many candidates where a simulation, that has many optima, is asked about
+SIMULATED_POOL = 4
+# of what limits are missed by where a simulation is asked: limits that many designs nearly keep, few keep
+MISSED_WEIGHT = 10.0
 POOL_SAMPLES, POOL_ORDERS = 72, 18
 
 
@@ -43,7 +43,7 @@ def looks(problem: Problem) -> int:
 
 
 def _candidates(problem: Problem) -> int:
-    return POOL * (_most_starts(problem) + 1) * (RUN_POOL if asks_runs(problem) else 1)
+    return POOL * (_most_starts(problem) + 1) * (SIMULATED_POOL if simulated_measures(problem) else 1)
 
 
 def _most_starts(problem: Problem) -> int:
@@ -161,8 +161,9 @@ def _look(share: tuple[Problem, Evaluation, Array]) -> Array:
     count = len(problem.mount_decisions)
     # unbalances are still to be decided, and may keep a limit on loads
     limits = problem.mount_limits if problem.unbalances else problem.limits
-    plain = problem.changed(objective=tuple(term for term in problem.objective if not term.measure.channel.is_checked))
-    runs, limits = RunLook(problem), tuple(limit for limit in limits if not limit.measure.channel.is_checked)
+    plain = problem.changed(objective=tuple(term for term in problem.objective if not term.measure.channel.simulation))
+    limits = tuple(limit for limit in limits if not limit.measure.channel.simulation)
+    peaks = peaks_of(problem, COARSER, roughly=True)
     found = np.full((len(points), 2), math.inf)
     for k, row in in_time(enumerate(points)):
         try:
@@ -170,8 +171,17 @@ def _look(share: tuple[Problem, Evaluation, Array]) -> Array:
         except ModelError:
             continue
         missed, value = sum(max(design.standing(limit).excess, 0.0) for limit in limits), objective_value(plain, design)
-        if runs.asked:
-            of_run, worth = runs.at(row)
-            missed, value = RUN_WEIGHT * (missed + of_run), value + worth
+        if peaks is not None and peaks.is_known:
+            excess, worth = _of_peaks(problem, peaks, row)
+            missed, value = MISSED_WEIGHT * (missed + excess), value + worth
         found[k] = missed, value
     return found
+
+
+def _of_peaks(problem: Problem, peaks: Peaks, row: Array) -> tuple[float, float]:
+    """Return the relative excess of simulated measures over their limits, and their share of the objective."""
+    parts = np.split(peaks.values(row), np.cumsum(peaks.counts)[:-1])
+    most = dict(zip(simulated_measures(problem), map(np.max, parts), strict=True))
+    over = (float(most[x.measure]) / (x.maximum or 1.0) - 1.0 for x in problem.limits if x.measure in most)
+    terms = (term.weight * float(most[term.measure]) for term in problem.objective if term.measure in most)
+    return sum(max(each, 0.0) for each in over), sum(terms)

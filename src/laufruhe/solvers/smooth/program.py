@@ -27,7 +27,7 @@ from laufruhe.load_models.affine import AffineModel
 from laufruhe.load_models.mount_loads import FixedThrows, Loads, MovedThrows
 from laufruhe.load_models.mount_rows import PointResponse, sampled_rows, transmitted
 from laufruhe.load_models.mount_symbols import elimination, response, symbolic_mounts
-from laufruhe.load_models.run_look import COARSER
+from laufruhe.load_models.simulated import COARSER
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.load_models.uneven_model import UnevenModel, rides_of
 from laufruhe.numerics.arrays import Array
@@ -50,7 +50,7 @@ from laufruhe.solvers.smooth.gathered import Gathered
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum
 from laufruhe.solvers.smooth.modes import ModeVariables
 from laufruhe.solvers.smooth.nonlinear import NonlinearProgram
-from laufruhe.solvers.smooth.runs import RunVariables
+from laufruhe.solvers.smooth.simulated import SimulatedVariables
 
 SOFTNESS, SOFTEST = (1e-2, 1e-4), 1e-7
 # bounds of a stiffness that are further apart leave a start no place between them
@@ -80,7 +80,7 @@ class SmoothProgram:
     softest
         Share of the objective that norms are softened by in the last stage (N4).
     coarser
-        Times as long as those of the last word steps of run-ups are.
+        Times as long as those of the last word steps of simulations are.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class SmoothProgram:
         self._e = ca.MX.sym("softness")
         self._held = Gathered()
         self._modes = ModeVariables(problem, self._held)
-        self._runs = RunVariables(problem, ca.vertcat(self._d, self._u), self._held, coarser)
+        self._simulated = SimulatedVariables(problem, ca.vertcat(self._d, self._u), self._held, coarser)
         self.unit = unit
         self._points: list[PointResponse] = []
         if problem.asks_mounts:
@@ -149,14 +149,14 @@ class SmoothProgram:
             parameters=self._e,
             stages=self._stages,
             expand=True,
-            told=self._runs.told,
+            told=self._simulated.told,
             deciding=self._turned.stop,
         )
 
     @property
     def _stages(self) -> tuple[tuple[float, ...], ...]:
-        """All softness at once where it costs run-ups and nothing that is minimised is softened (N4)."""
-        plain = self._runs.told is not None and not self.problem.load_terms
+        """All softness at once where it costs simulations and nothing that is minimised is softened (N4)."""
+        plain = self._simulated.told is not None and not self.problem.load_terms
         return tuple((share,) for share in (*(() if plain else SOFTNESS), self._softest))
 
     def _bounds(self) -> tuple[Array, Array]:
@@ -210,8 +210,8 @@ class SmoothProgram:
             return evaluate(off_resonance(self.problem)).value(measure)
         if measure.is_mounting:
             return self._mount_number(measure)
-        if measure.channel.is_checked:
-            return self._runs.least(measure)
+        if measure.channel.simulation:
+            return self._simulated.least(measure)
         rows, grid = self._rows(measure)
         return measure.norm.least(self._held.named(measure.name), grid, rows, unit, self._e)
 
@@ -221,8 +221,8 @@ class SmoothProgram:
             self._limit_mounts(limit)
             return
         tight = 1.0 - self._slack - self._margin
-        if measure.channel.is_checked:
-            self._runs.limit(limit, tight)
+        if measure.channel.simulation:
+            self._simulated.limit(limit, tight)
             return
         rows, grid = self._rows(measure)
         unit = limit.maximum * tight or self.unit
@@ -341,8 +341,8 @@ class SmoothProgram:
         if self._modes.asked:
             parts += self._modes.start(mounting_in(self.problem.design(list(mounts), self._decisions)))
         if self._held.heads:
-            given = [self._v, self._u, self._t, self._runs.symbols]
+            given = [self._v, self._u, self._t, self._simulated.symbols]
             values = ca.Function("tops", given, [ca.vertcat(*(value for _, value in self._held.heads))])
-            told = values(self._inner(mounts), columns, turns, self._runs.at(mounts, columns))
+            told = values(self._inner(mounts), columns, turns, self._simulated.at(mounts, columns))
             parts.append(1.05 * np.asarray(told, dtype=float).reshape(-1))
         return np.concatenate(parts)

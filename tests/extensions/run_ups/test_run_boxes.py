@@ -13,32 +13,32 @@ import pytest
 
 import laufruhe
 from lanes import first_fast
+from laufruhe.extensions.run_ups.boxes import RunBoxes, _Look, bounds_runs
+from laufruhe.extensions.run_ups.channels import FORCE, TRAVEL, TWIST
+from laufruhe.extensions.run_ups.dampers import pairs_of, roots
+from laufruhe.extensions.run_ups.linear_run import LinearRun
+from laufruhe.extensions.run_ups.machine import Run
+from laufruhe.extensions.run_ups.matrices import RunMatrices
+from laufruhe.extensions.run_ups.moments import RunMoments
+from laufruhe.extensions.run_ups.motion import Steps, _force, equations
+from laufruhe.extensions.run_ups.peaks import RunPeaks
+from laufruhe.extensions.run_ups.runs import run_loads, run_through
 from laufruhe.files.reader import load_tables, tables_of
-from laufruhe.load_models.run_moments import RunMoments
-from laufruhe.load_models.run_peaks import RunPeaks
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.linear_run import LinearRun
-from laufruhe.physics.run_up import run_through
-from laufruhe.physics.runs import run_loads
 from laufruhe.physics.time_model import time_model
-from laufruhe.problem.channels import RUN_FORCE, RUN_TRAVEL, RUN_TWIST
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.mounts.box_dampers import pairs_of, roots
 from laufruhe.prove.mounts.box_norms import Under
 from laufruhe.prove.mounts.box_response import BoxModel
-from laufruhe.prove.mounts.box_runs import RunBoxes, _Look, bounds_runs
-from laufruhe.prove.mounts.run_matrices import RunMatrices
-from laufruhe.prove.mounts.run_motion import Steps, _force, equations
 from laufruhe.solvers import Status
 from problem_files import PROBLEMS
 from prove.test_subdivision import divided_bound
 
 READY = PROBLEMS / "soft-single-run-up-mounts.toml"
-OF_RUNS = tuple(Measure(channel) for channel in (RUN_FORCE, RUN_TRAVEL, RUN_TWIST))
+OF_RUNS = tuple(Measure(channel) for channel in (FORCE, TRAVEL, TWIST))
 SIZES = (0.02, 0.1, 0.3)
 FLUID = {"mass": "25 kg", "bulge_stiffness": "260 N/mm", "damping": "500 N s/m"}
 
@@ -186,7 +186,7 @@ def test_the_place_and_time_with_the_highest_bound_is_taken(seed: int) -> None:
 def test_scipy_reaches_what_boxes_are_not_under() -> None:
     """Integrated by its eighth order, with loads at every moment and no modes."""
     boxes = of_seed(3)
-    problem, run = boxes.problem, boxes.problem.engine.run
+    problem, run = boxes.problem, boxes.problem.engine.extra(Run)
     assert run is not None
     bounds = np.array([least(boxes.runs.under(measure, boxes.lower, boxes.upper)) for measure in OF_RUNS])
     inertia, gas = run_loads(problem.engine, problem.points[0], problem.fidelity)

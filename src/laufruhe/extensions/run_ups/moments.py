@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from laufruhe.extensions.run_ups.linear_run import NODES, Sweep, largest_share, step_moments
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.linear_run import NODES, Sweep, largest_share, step_moments
 
 MOMENTS = 14
 """Of a long step."""

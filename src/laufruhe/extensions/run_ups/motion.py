@@ -21,12 +21,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from laufruhe.load_models.run_moments import MOMENTS
+from laufruhe.extensions.run_ups.dampers import Maps, Roots, mapped, pairs_of, roots
+from laufruhe.extensions.run_ups.matrices import RunMatrices
+from laufruhe.extensions.run_ups.moments import MOMENTS
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.physics.modes import FREE_STIFFNESS
-from laufruhe.prove.mounts.box_dampers import Maps, Roots, mapped, pairs_of, roots
 from laufruhe.prove.mounts.box_response import BoxModel
-from laufruhe.prove.mounts.run_matrices import RunMatrices
 
 # a long step times the quickest motion: as it is chosen, and as far as moments reach
 REACH, FARTHEST = 0.35, 1.0

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Engine, OperatingPoint, Run
+from laufruhe.extensions.run_ups.linear_run import Response, Sweep
+from laufruhe.extensions.run_ups.machine import Run
+from laufruhe.extensions.run_ups.stopped_run import responses_to
+from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.linear_run import Response, Sweep
-from laufruhe.physics.run_up import LEAST_STEPS, MOST_STEPS, STEPS_PER_PERIOD, RunUp, run_through
 from laufruhe.physics.speed_map import split_loads
-from laufruhe.physics.stopped_run import responses_to
-from laufruhe.physics.time_model import time_model
+from laufruhe.physics.steady_state import integrated, motion_rates, static_size
+from laufruhe.physics.time_model import TimeModel, time_model
 
 HIGHEST = 12.0
 """Last order of the loads that is followed: those beyond shake the block by less than what the steps leave open."""
@@ -29,6 +31,42 @@ STRETCHES, FOLLOWED, RESOLVED = 60, 1e-4, 1e-6
 MOST_SWINGS = 2e3
 COARSEST = 4.0
 """Times as long as usual that steps may be."""
+STEPS_PER_PERIOD = 24
+LEAST_STEPS, MOST_STEPS = 16, 4000
+"""Steps at which a stretch of a run is read."""
+
+
+@dataclass(frozen=True, eq=False)
+class RunUp:
+    """Run-up or shut-down through resonance.
+
+    Attributes
+    ----------
+    speeds
+        Crank speed at the end of every stretch [rad/s], shape (n,).
+    force, travel, twist
+        Largest on any mount within the stretch, and largest roll of the block, shape (n,) [N], [m], [rad].
+    """
+
+    speeds: Array
+    force: Array
+    travel: Array
+    twist: Array
+
+    @property
+    def worst_force(self) -> float:
+        """Over the whole run [N]."""
+        return float(self.force.max())
+
+    @property
+    def worst_travel(self) -> float:
+        """Over the whole run [m]."""
+        return float(self.travel.max())
+
+    @property
+    def worst_twist(self) -> float:
+        """Over the whole run [rad]."""
+        return float(self.twist.max())
 
 
 def point_of(run: Run, points: Sequence[OperatingPoint]) -> OperatingPoint:
@@ -45,7 +83,7 @@ def runs_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run)
     ModelError
         If the engine stands on no elastic mounts.
     """
-    return _found_runs(replace(engine, bearings=(), flywheel=None, extras=(), run=None), point, fidelity, run)
+    return _found_runs(replace(engine, bearings=(), flywheel=None, extras=()), point, fidelity, run)
 
 
 @lru_cache(maxsize=32)
@@ -109,6 +147,72 @@ def _envelope(response: Response, first: float, last: float) -> RunUp:
     signals = (response.force, response.travel, response.twist)
     edges = np.arange(0, len(response.twist), (len(response.twist) - 1) // STRETCHES)
     sizes = [np.linalg.norm(signal, axis=-1).max(axis=-1) for signal in signals]
-    most = [np.array([own[a : b + 1].max() for a, b in itertools.pairwise(edges)]) for own in sizes]
+    most = [np.array([own[a : b + 1].max() for a, b in pairwise(edges)]) for own in sizes]
     speeds = first + (last - first) * edges[1:] / edges[-1]
     return RunUp(speeds, *most)
+
+
+def run_through(
+    mounting: ElasticMounting,
+    inertia: Spectrum,
+    gas: Spectrum | None,
+    first: float,
+    last: float,
+    duration: float,
+    stretches: int = 200,
+    method: Literal["DOP853", "RK45", "Radau"] = "DOP853",
+    tolerance: float = 1e-6,
+) -> RunUp:
+    """Run-up (or shut-down) at constant acceleration, from rest at `first` (E28).
+
+    Parameters
+    ----------
+    inertia
+        Wrench per square of crank speed [N s2, N m s2].
+    gas
+        Wrench that does not depend on speed; none for a motored engine.
+    stretches
+        Into which the run is cut for its envelope.
+
+    Raises
+    ------
+    ModelError
+        If the run has no duration.
+    """
+    if not duration > 0.0 or first < 0.0 or last < 0.0:
+        raise ModelError("a run-up needs a duration and speeds that are not negative")
+    model, gain = time_model(mounting), (last - first) / duration
+    loads = [(part.orders, part.coefficients @ model.load.T) for part in (inertia, gas) if part is not None]
+    rates = motion_rates(model, _sweeping(loads, first, gain))
+    fastest = max(first, last) * float(max(orders.max(initial=0.0) for orders, _ in loads))
+    state, edges = np.zeros(2 * model.size), np.linspace(0.0, duration, stretches + 1)
+    force, travel, twist = np.zeros((3, stretches))
+    least = 1e-3 * tolerance * static_size(model, loads[0][1] * max(first, last) ** 2)
+    count = int(STEPS_PER_PERIOD * fastest * (duration / stretches) / (2.0 * np.pi)) + 1
+    for k, (start, end) in enumerate(pairwise(edges)):
+        times = np.linspace(start, end, min(max(count, LEAST_STEPS), MOST_STEPS))
+        states = integrated(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=least)
+        force[k], travel[k], twist[k] = _most(model, *np.split(states, 2))
+        state = states[:, -1]
+    return RunUp(first + gain * edges[1:], force, travel, twist)
+
+
+def _most(model: TimeModel, y: Array, rate: Array) -> tuple[float, float, float]:
+    """Largest force and travel of any mount, and largest roll."""
+    force, travel = model.mount_forces(y, rate), model.mount_travels(y)
+    sizes = (np.linalg.norm(each, axis=-1).max() for each in (force, travel))
+    force_most, travel_most = (float(size) for size in sizes)
+    return force_most, travel_most, float(np.abs(model.roll @ y).max())
+
+
+def _sweeping(
+    loads: Sequence[tuple[Array, NDArray[np.complex128]]], first: float, gain: float
+) -> Callable[[float], Array]:
+    """Loads at a crank speed that grows by `gain`; the first is inertia, which grows with its square (E28)."""
+
+    def load(t: float) -> Array:
+        speed, angle = first + gain * t, first * t + 0.5 * gain * t * t
+        parts = [(np.exp(1j * orders * angle) @ coefficients).real for orders, coefficients in loads]
+        return np.asarray(sum(parts[1:], speed * speed * parts[0]))
+
+    return load

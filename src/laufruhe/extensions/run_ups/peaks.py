@@ -16,12 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
+from laufruhe.extensions.run_ups.channels import RunChannel
+from laufruhe.extensions.run_ups.linear_run import Response, Sweep
+from laufruhe.extensions.run_ups.machine import Run
+from laufruhe.extensions.run_ups.runs import STRETCHES, point_of, run_loads, sweep_of
+from laufruhe.extensions.run_ups.stopped_run import responses_to
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.elastic_mounts import elastic_mounting
-from laufruhe.physics.linear_run import Response, Sweep
-from laufruhe.physics.runs import STRETCHES, point_of, run_loads, sweep_of
-from laufruhe.physics.stopped_run import responses_to
 from laufruhe.physics.time_model import TimeModel, time_model
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.measure import Measure
@@ -153,7 +155,7 @@ class RunPeaks:
         runs = [responses_to(models, sweep, own) for sweep, own in zip(self.sweeps, wrenches, strict=True)]
         return [
             None if any(response is None for response in both) else [
-                _of(measure, response) for measure in self.measures for response in both if response is not None
+                signal_of(measure, response) for measure in self.measures for response in both if response is not None
             ]
             for both in zip(*runs, strict=True)
         ]  # fmt: skip
@@ -171,7 +173,7 @@ class RunPeaks:
     @cached_property
     def sweeps(self) -> tuple[Sweep, ...]:
         """Of run-up and shut-down; none where they take too many steps."""
-        run = self._problem.engine.run
+        run = self._problem.engine.extra(Run)
         if run is None:
             raise TypeError("there is no run-up")
         told = ((0.0, run.speed, run.up), (run.speed, 0.0, run.down))
@@ -187,12 +189,12 @@ class RunPeaks:
     def _wrenches(self) -> list[tuple[Array, list[Array]]]:
         """Of both runs: those of the bare design, and of one unit of every column (E28)."""
         problem, opened = self._problem, self._problem.unbalances
-        run = problem.engine.run
+        run = problem.engine.extra(Run)
         assert run is not None
         units = [(k, way) for k, domain in enumerate(self._domains) for way in domain.set.directions]
         values = [[0.0] * len(opened)] + [[way if j == k else 0.0 for j in range(len(opened))] for k, way in units]
         point = point_of(run, problem.points)
-        plain = replace(problem.engine, bearings=(), flywheel=None, extras=(), run=None)
+        plain = replace(problem.engine, bearings=(), flywheel=None, extras=())
         designs = [problem.numbers(value, opened).engine(plain) if opened else plain for value in values]
         loads = [run_loads(design, point, problem.fidelity) for design in designs]
         out = []
@@ -204,11 +206,12 @@ class RunPeaks:
         return out
 
 
-def _of(measure: Measure, response: Response) -> Array:
-    of_run = measure.channel.of_run
-    if of_run is None:
+def signal_of(measure: Measure, response: Response) -> Array:
+    """Return what a measure is the largest length of, shape (times, places, d)."""
+    channel = measure.channel
+    if not isinstance(channel, RunChannel):
         raise TypeError(f"{measure.name} is not of a run-up")
-    return of_run(response)
+    return channel.part(response)
 
 
 def _peaks(parts: Sequence[Array], between: bool) -> Array:

@@ -10,26 +10,26 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from laufruhe.errors import ModelError, UncarriedLoadError
-from laufruhe.machine import Block, Mount, Run
+from laufruhe.errors import ModelError
+from laufruhe.extensions.run_ups.linear_run import NODES, Sweep
+from laufruhe.extensions.run_ups.machine import Run
+from laufruhe.extensions.run_ups.runs import (
+    HIGHEST,
+    MOST_STEPS,
+    STEPS_PER_PERIOD,
+    STRETCHES,
+    missed_share,
+    run_through,
+    sweep_of,
+)
+from laufruhe.extensions.run_ups.stopped_run import responses_to
+from laufruhe.machine import Block, Mount
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
-from laufruhe.physics.linear_run import NODES, Sweep
-from laufruhe.physics.modes import modes_of, static_motion
-from laufruhe.physics.run_up import MOST_STEPS, STEPS_PER_PERIOD, run_through
-from laufruhe.physics.runs import HIGHEST, STRETCHES, missed_share, sweep_of
-from laufruhe.physics.stopped_run import responses_to
-from laufruhe.physics.time_model import TimeModel, time_model
-
-HEAVE = np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
-
-
-def four_mounts(stiffness: float, **more: float) -> ElasticMounting:
-    """Return a block of 50 kg amid four equal mounts, so that it heaves by itself."""
-    block = Block(50.0, ((1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 2.5)))
-    places = [(x, y, 0.0) for x in (-0.3, 0.3) for y in (-0.2, 0.2)]
-    return elastic_mounting(block, [Mount(f"{k}", at, (stiffness,) * 3, **more) for k, at in enumerate(places)])
+from laufruhe.physics.elastic_mounts import elastic_mounting
+from laufruhe.physics.time_model import TimeModel
+from mounts.powertrain import powertrain, wrench
+from physics.test_static_motion import HEAVE, four_mounts
 
 
 def test_loads_of_a_run_are_taken_at_the_gauss_points() -> None:
@@ -138,15 +138,46 @@ def test_a_mode_next_to_rest_is_pushed_by_stops_as_by_integration() -> None:
     assert np.abs(found.y[0] - told).max() < 1e-4 * told.max()
 
 
-def test_a_steady_load_turns_the_block_only_where_mounts_resist() -> None:
-    """F / k where they do, whatever else is free; a load along what is free names the motion and the remedy."""
-    held = np.diag([4e5, 5e5, 0.0, 2e4, 3e4, 6e4])
-    modes = modes_of(np.diag([50.0, 50.0, 50.0, 1.0, 2.0, 3.0]), held)
-    wrench = np.array([100.0, -40.0, 0.0, 3.0, 0.0, 9.0])
-    expected = [100.0 / 4e5, -40.0 / 5e5, 0.0, 3.0 / 2e4, 0.0, 9.0 / 6e4]
-    assert static_motion(modes, wrench) == pytest.approx(expected, rel=1e-9, abs=1e-15)
-    with pytest.raises(UncarriedLoadError, match="drives the block in bounce, which no mount resists; add a mount"):
-        static_motion(modes, wrench + HEAVE)
-    mounting = four_mounts(3e4)
-    assert static_motion(mounting.modes, 600.0 * HEAVE) == pytest.approx(600.0 / 1.2e5 * HEAVE, abs=1e-12)
-    assert time_model(mounting).size == 6
+def test_run_up_passes_resonance_with_less_than_the_steady_peak_and_slow_ones_reach_it():
+    mounting = powertrain(loss=0.15)
+    unit = Spectrum(wrench().base, np.array([np.zeros(6), [0, 0, 0.02, 0, 0, 0]], dtype=complex))
+    top = 2 * np.pi * 20.0
+    speeds = np.linspace(1.0, top, 600)
+    peaks = []
+    for speed in speeds:
+        load = Spectrum(unit.base, unit.coefficients * speed**2)
+        peaks.append(np.linalg.norm(mounting.forces(load, speed).sample(64), axis=-1).max())
+    quick = run_through(mounting, unit, None, 0.0, top, 0.6, stretches=60)
+    slow = run_through(mounting, unit, None, 0.0, top, 12.0, stretches=120)
+    below = speeds < 2 * np.pi * 14.0
+    steady = np.max(np.array(peaks)[below])
+
+    def resonance(run):
+        return run.force[run.speeds < 2 * np.pi * 14.0].max()
+
+    assert resonance(quick) < 0.97 * steady
+    assert resonance(slow) == pytest.approx(steady, rel=0.05)
+
+
+def test_shut_down_meets_the_same_resonance():
+    mounting = powertrain(loss=0.15)
+    unit = Spectrum(wrench().base, np.array([np.zeros(6), [0, 0, 0.02, 0, 0, 0]], dtype=complex))
+    up = run_through(mounting, unit, None, 0.0, 2 * np.pi * 15.0, 6.0, stretches=60)
+    down = run_through(mounting, unit, None, 2 * np.pi * 15.0, 0.0, 6.0, stretches=60)
+    assert down.speeds[-1] == pytest.approx(0.0, abs=1e-9)
+    assert down.worst_travel == pytest.approx(up.worst_travel, rel=0.15)
+
+
+def test_a_mode_far_too_fast_to_resolve_is_followed_in_a_run_up():
+    """A block with hardly any inertia in roll runs up like any other as long as nothing rolls it."""
+    corners = [(x, y, 0.0) for x in (0.3, -0.3) for y in (0.2, -0.2)]
+    mounts = [Mount(f"m{k}", place, (1.2e5, 1.2e5, 4e5), loss_factor=0.1) for k, place in enumerate(corners)]
+    lift = np.zeros((3, 6), dtype=complex)
+    lift[2, 2] = 0.05
+    runs = []
+    for roll, method in ((20.0, "RK45"), (1e-9, "Radau")):
+        block = Block(420.0, ((roll, 0.0, 0.0), (0.0, 50.0, 0.0), (0.0, 0.0, 50.0)))
+        mounting = elastic_mounting(block, mounts)
+        assert (mounting.modes.frequencies[-1] > 1e5) == (method == "Radau")
+        runs.append(run_through(mounting, Spectrum(Fraction(1), lift), None, 0.0, 60.0, 0.6, 12, method, 1e-5))
+    assert runs[1].force == pytest.approx(runs[0].force, rel=1e-2, abs=1e-2 * runs[0].worst_force)

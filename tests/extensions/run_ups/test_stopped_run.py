@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from laufruhe.physics.linear_run import BLOCK
-from laufruhe.physics.stopped_run import _followed, _Side
+from laufruhe.extensions.run_ups.linear_run import BLOCK
+from laufruhe.extensions.run_ups.stopped_run import _followed, _Side
 
 
 def test_what_touches_no_stop_goes_on_from_where_it_was() -> None:

@@ -8,20 +8,20 @@ from functools import cached_property
 
 import numpy as np
 
-from laufruhe.load_models.run_look import run_measures
-from laufruhe.load_models.run_moments import RunMoments
-from laufruhe.load_models.run_peaks import RunPeaks, parabola_tops
+from laufruhe.extensions.run_ups.dampers import Maps, mapped, pairs_of
+from laufruhe.extensions.run_ups.matrices import Rows, RunMatrices
+from laufruhe.extensions.run_ups.moments import RunMoments
+from laufruhe.extensions.run_ups.motion import FARTHEST, REACH, Equations, Motion, Steps, equations, motion_of
+from laufruhe.extensions.run_ups.peaks import RunPeaks, parabola_tops
+from laufruhe.extensions.run_ups.stopped_run import QUICKEST, quickest
+from laufruhe.load_models.simulated import simulated_measures
 from laufruhe.numerics.arrays import Array, Indices, Mask
-from laufruhe.physics.stopped_run import QUICKEST, quickest
 from laufruhe.physics.time_model import time_model
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.box_dampers import Maps, mapped, pairs_of
 from laufruhe.prove.mounts.box_norms import Under
 from laufruhe.prove.mounts.box_response import BoxModel
-from laufruhe.prove.mounts.run_matrices import Rows, RunMatrices
-from laufruhe.prove.mounts.run_motion import FARTHEST, REACH, Equations, Motion, Steps, equations, motion_of
 
 # long steps that a run has at least
 LEAST_STEPS = 60
@@ -94,14 +94,9 @@ class RunBoxes:
         return Under(*(np.array([getattr(each, part) for each in found])[best, pick] for part in parts))
 
 
-def run_boxes(model: BoxModel) -> RunBoxes | None:
-    """Of the run-ups that a problem asks about; none where nothing bounds them."""
-    return RunBoxes(model, run_measures(model.problem)) if bounds_runs(model.problem) else None
-
-
 def bounds_runs(problem: Problem) -> bool:
     """Whether run-ups are asked about that go in steps, and that meet no bump stop in any design allowed."""
-    measures = run_measures(problem)
+    measures = simulated_measures(problem)
     peaks = RunPeaks(problem, measures)
     return bool(measures) and peaks.is_known and (not peaks.is_stopped or _stays_off_stops(problem, peaks))
 

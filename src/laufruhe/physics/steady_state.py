@@ -1,4 +1,4 @@
-"""The block on its mounts in the time domain: judge of the frequency domain, and run-up (E25-E28).
+"""The block on its mounts in the time domain, the judge of the frequency domain (E25-E28).
 
     M q'' + C q' + K q + stops(q) = w(t)                                                (E25)
 
@@ -11,10 +11,9 @@ mount beyond its gap (E27).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +24,6 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.time_model import TimeModel, time_model
 
-STEPS_PER_PERIOD = 24
-LEAST_STEPS, MOST_STEPS = 16, 4000
-"""At which a stretch of a run-up is read."""
 MOST_SHOTS = 60
 CLOSED = 1e-9
 # what integration over a period makes of its tolerance
@@ -74,23 +70,23 @@ def periodic_state(
     loaded = np.any(wrench.coefficients != 0.0, axis=1)
     loads, orders = wrench.coefficients[loaded] @ model.load.T, wrench.orders[loaded]
 
-    rates = _rates(model, lambda t: (np.exp(1j * orders * speed * t) @ loads).real)
+    rates = motion_rates(model, lambda t: (np.exp(1j * orders * speed * t) @ loads).real)
     # what an even star cancels leaves a shorter period, which closes faster and farther from any resonance
     shortest = period / (math.gcd(*np.flatnonzero(loaded).tolist()) or 1)
 
     def ends(first: Array) -> Array:
-        return _integrated(rates, first, shortest, tolerance)[:, -1].reshape(2 * model.size, -1)
+        return _over_period(rates, first, shortest, tolerance)[:, -1].reshape(2 * model.size, -1)
 
-    start = _shot(ends, model.size, _static_size(model, loads), tolerance, model.has_stops)
+    start = _shot(ends, model.size, static_size(model, loads), tolerance, model.has_stops)
     times = np.arange(samples + 1) * (period / samples)
-    states = _integrated(rates, start, period, tolerance, np.minimum(times, period))
+    states = _over_period(rates, start, period, tolerance, np.minimum(times, period))
     y, rate = np.split(states[:, :-1], 2)
     mismatch = float(np.abs(states[:, -1] - start).max() / max(np.abs(states).max(), 1e-300))
     travels = model.mount_travels(y)
     return SteadyState(np.asarray(times[:-1] * speed, dtype=float), model.mount_forces(y, rate), travels, mismatch)
 
 
-def _rates(model: TimeModel, load: Callable[[float], Array]) -> Callable[[float, Array], Array]:
+def motion_rates(model: TimeModel, load: Callable[[float], Array]) -> Callable[[float, Array], Array]:
     """Right side of E25 in columns (y, y'), under a load (n,) that time tells."""
 
     def rates(t: float, state: Array) -> Array:
@@ -100,18 +96,18 @@ def _rates(model: TimeModel, load: Callable[[float], Array]) -> Callable[[float,
     return rates
 
 
-def _integrated(
+def _over_period(
     rates: Callable[[float, Array], Array], start: Array, until: float, tolerance: float, times: Array | None = None
 ) -> Array:
     """States from a start on, those of several columns one below the other."""
     scale = float(np.abs(start).max(initial=0.0)) or 1e-6
-    return _solved(
+    return integrated(
         rates, (0.0, until), start.reshape(-1), "DOP853", t_eval=times, rtol=tolerance,
         atol=tolerance * min(scale, 1e-3), max_step=until / 64,
     )  # fmt: skip
 
 
-def _solved(*told: Any, **more: Any) -> Array:
+def integrated(*told: Any, **more: Any) -> Array:
     """States that SciPy finds; loaded late, for a check or a solve needs none of it."""
     from scipy.integrate import solve_ivp
 
@@ -135,105 +131,7 @@ def _shot(run: Callable[[Array], Array], count: int, size: float, tolerance: flo
     raise SolverError(f"{why} repeat itself in one period; integrate a run-up instead")
 
 
-def _static_size(model: TimeModel, loads: NDArray[np.complex128]) -> float:
+def static_size(model: TimeModel, loads: NDArray[np.complex128]) -> float:
+    """Return a typical coordinate of the block under loads; never zero."""
     stiffness = float(np.linalg.norm(model.stiffness)) or 1.0
     return float(np.abs(loads).max(initial=0.0)) / stiffness or 1e-9
-
-
-@dataclass(frozen=True, eq=False)
-class RunUp:
-    """Run-up or shut-down through resonance.
-
-    Attributes
-    ----------
-    speeds
-        Crank speed at the end of every stretch [rad/s], shape (n,).
-    force, travel, twist
-        Largest on any mount within the stretch, and largest roll of the block, shape (n,) [N], [m], [rad].
-    """
-
-    speeds: Array
-    force: Array
-    travel: Array
-    twist: Array
-
-    @property
-    def worst_force(self) -> float:
-        """Over the whole run [N]."""
-        return float(self.force.max())
-
-    @property
-    def worst_travel(self) -> float:
-        """Over the whole run [m]."""
-        return float(self.travel.max())
-
-    @property
-    def worst_twist(self) -> float:
-        """Over the whole run [rad]."""
-        return float(self.twist.max())
-
-
-def run_through(
-    mounting: ElasticMounting,
-    inertia: Spectrum,
-    gas: Spectrum | None,
-    first: float,
-    last: float,
-    duration: float,
-    stretches: int = 200,
-    method: Literal["DOP853", "RK45", "Radau"] = "DOP853",
-    tolerance: float = 1e-6,
-) -> RunUp:
-    """Run-up (or shut-down) at constant acceleration, from rest at `first` (E28).
-
-    Parameters
-    ----------
-    inertia
-        Wrench per square of crank speed [N s2, N m s2].
-    gas
-        Wrench that does not depend on speed; none for a motored engine.
-    stretches
-        Into which the run is cut for its envelope.
-
-    Raises
-    ------
-    ModelError
-        If the run has no duration.
-    """
-    if not duration > 0.0 or first < 0.0 or last < 0.0:
-        raise ModelError("a run-up needs a duration and speeds that are not negative")
-    model, gain = time_model(mounting), (last - first) / duration
-    loads = [(part.orders, part.coefficients @ model.load.T) for part in (inertia, gas) if part is not None]
-    rates = _rates(model, _sweeping(loads, first, gain))
-    fastest = max(first, last) * float(max(orders.max(initial=0.0) for orders, _ in loads))
-    state, edges = np.zeros(2 * model.size), np.linspace(0.0, duration, stretches + 1)
-    force, travel, twist = np.zeros((3, stretches))
-    least = 1e-3 * tolerance * _static_size(model, loads[0][1] * max(first, last) ** 2)
-    count = int(STEPS_PER_PERIOD * fastest * (duration / stretches) / (2.0 * np.pi)) + 1
-    for k, (start, end) in enumerate(pairwise(edges)):
-        times = np.linspace(start, end, min(max(count, LEAST_STEPS), MOST_STEPS))
-        states = _solved(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=least)
-        force[k], travel[k], twist[k] = _most(model, *np.split(states, 2))
-        state = states[:, -1]
-    return RunUp(first + gain * edges[1:], force, travel, twist)
-
-
-def _most(model: TimeModel, y: Array, rate: Array) -> tuple[float, float, float]:
-    """Largest force and travel of any mount, and largest roll."""
-    force, travel = model.mount_forces(y, rate), model.mount_travels(y)
-    sizes = (np.linalg.norm(each, axis=-1).max() for each in (force, travel))
-    force_most, travel_most = (float(size) for size in sizes)
-    return force_most, travel_most, float(np.abs(model.roll @ y).max())
-
-
-def _sweeping(
-    loads: Sequence[tuple[Array, NDArray[np.complex128]]], first: float, gain: float
-) -> Callable[[float], Array]:
-    """Loads at a crank speed that grows by `gain`; the first is inertia, which grows with its square (E28)."""
-
-    def load(t: float) -> Array:
-        speed, angle = first + gain * t, first * t + 0.5 * gain * t * t
-        parts = [(np.exp(1j * orders * angle) @ coefficients).real for orders, coefficients in loads]
-        return np.asarray(sum(parts[1:], speed * speed * parts[0]))
-
-    return load

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+from laufruhe.machine import SliderCrank
+from laufruhe.machine.extra import Extra
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(Extra):
     """From rest to a speed and back, at a constant rate each way.
 
     Attributes
@@ -19,7 +24,16 @@ class Run:
         Name of the operating point whose gas drives the engine meanwhile; the slowest where it is empty.
     """
 
+    name: ClassVar[str] = "run-up"
     speed: float
     up: float
     down: float
     point: str = ""
+
+    def moved(self, _: Mapping[Any, float], __: Sequence[SliderCrank], ___: Sequence[SliderCrank]) -> Self:
+        """Return the same: no decision moves it."""
+        return self
+
+    def scaled(self, _: float, __: float) -> Self:
+        """Return the same: speeds and times have no size."""
+        return self

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from laufruhe.load_models.run_moments import MOMENTS, RunMoments
+from laufruhe.extensions.run_ups.linear_run import NODES, Sweep
+from laufruhe.extensions.run_ups.moments import MOMENTS, RunMoments
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.linear_run import NODES, Sweep
 
 
 @pytest.mark.parametrize("place", [0, 1, 3])

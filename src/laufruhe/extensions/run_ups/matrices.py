@@ -8,11 +8,12 @@ from typing import TypeAlias
 
 import numpy as np
 
+from laufruhe.extensions.run_ups.dampers import Felt, Linear
+from laufruhe.extensions.run_ups.linear_run import Response
+from laufruhe.extensions.run_ups.peaks import signal_of
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.linear_run import Response
 from laufruhe.physics.time_model import time_model
 from laufruhe.problem.measure import Measure
-from laufruhe.prove.mounts.box_dampers import Felt, Linear
 from laufruhe.prove.mounts.box_response import BoxModel
 
 Rows: TypeAlias = tuple[Felt, int]
@@ -93,12 +94,12 @@ class RunMatrices:
         """From motion, or from its rate, to what a measure is the length of, shape (rows, n)."""
         one, nothing = np.eye(self.size), np.zeros((self.size, self.size))
         model = replace(self.base, forces=forces, drag=drag)
-        found = _of_run(measure, Response(model, *((nothing, one) if moves else (one, nothing))))
+        found = signal_of(measure, Response(model, *((nothing, one) if moves else (one, nothing))))
         return np.asarray(found.reshape(self.size, -1).T)
 
     def _shape(self, measure: Measure) -> tuple[int, ...]:
         nothing = np.zeros((self.size, 1))
-        return _of_run(measure, Response(self.base, nothing, nothing)).shape
+        return signal_of(measure, Response(self.base, nothing, nothing)).shape
 
     def _lowest(self, name: str) -> Array:
         return np.asarray(self._model.at(name, self._model.lower[None])[0])
@@ -109,9 +110,3 @@ class RunMatrices:
     def _square(self, name: str) -> Linear:
         wider = [(0, self.size - 6)] * 2
         return Linear(np.pad(self._lowest(name), wider), np.pad(self._model.slopes[name], [(0, 0), *wider]))
-
-
-def _of_run(measure: Measure, response: Response) -> Array:
-    if measure.channel.of_run is None:
-        raise TypeError(f"{measure.name} is not of a run-up")
-    return measure.channel.of_run(response)

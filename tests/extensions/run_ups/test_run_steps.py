@@ -8,21 +8,16 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from laufruhe.errors import ModelError, UncarriedLoadError
-from laufruhe.machine import Block, Mount, Shaft
-from laufruhe.machine.bearing import Bearing
-from laufruhe.machine.dynamic import FluidTrack
-from laufruhe.machine.run import Run
+from laufruhe.errors import ModelError
+from laufruhe.extensions.run_ups.linear_run import NODES, LinearRun, Sweep
+from laufruhe.extensions.run_ups.machine import Run
+from laufruhe.extensions.run_ups.runs import missed_share, run_through, sweep_of
+from laufruhe.extensions.run_ups.stopped_run import _side_by_side
+from laufruhe.machine import Mount
 from laufruhe.physics.elastic_mounts import elastic_mounting
-from laufruhe.physics.linear_run import NODES, LinearRun, Sweep
-from laufruhe.physics.modes import static_motion
-from laufruhe.physics.run_up import run_through
-from laufruhe.physics.runs import missed_share, sweep_of
-from laufruhe.physics.stopped_run import _side_by_side
 from laufruhe.physics.time_model import time_model
 from mounts.powertrain import random_mounting, wrench
-
-CUBE = Block(100.0, ((4.0, 0.0, 0.0), (0.0, 5.0, 0.0), (0.0, 0.0, 6.0)))
+from mounts.test_hydraulic_mounts import hydraulic
 
 
 def test_wrenches_of_steps_have_the_integral_of_the_load() -> None:
@@ -100,26 +95,11 @@ def test_forces_of_stops_that_grow_within_a_step_are_integrated_exactly() -> Non
             assert found[0] + 1j * found[1] == pytest.approx(own, rel=1e-9)
 
 
-def test_a_steady_load_is_refused_by_what_no_mount_resists_alone() -> None:
-    mounting = elastic_mounting(CUBE, [Mount("only", (0.0, 0.0, 0.0), (1e5, 2e5, 4e5))])
-    assert static_motion(mounting.modes, np.array([0.0, 50.0, 80.0, 0.0, 0.0, 0.0])) == pytest.approx(
-        [0.0, 50.0 / 2e5, 80.0 / 4e5, 0.0, 0.0, 0.0]
-    )
-    with pytest.raises(UncarriedLoadError, match="roll"):
-        static_motion(mounting.modes, np.array([0.0, 50.0, 0.0, 3.0, 0.0, 0.0]))
-
-
-def test_a_journal_drags_at_its_radius_and_the_speed_of_its_shaft() -> None:
-    assert Bearing("b", 0.0, diameter=0.06, friction=0.004).drag == pytest.approx(0.004 * 0.03)
-    half = Shaft("slow", -0.5, 0.0, 0.1)
-    assert Bearing("b", 0.0, diameter=0.06, friction=0.004, shaft=half).drag == pytest.approx(0.002 * 0.03)
-    with pytest.raises(ModelError, match="no friction"):
-        _ = Bearing("b", 0.0, diameter=0.06).drag
-
-
-@pytest.mark.parametrize(
-    "numbers", [(0.0, 1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (1.0, 1.0, -1.0, 0.0), (1.0, 1.0, 0.0, -1.0)]
-)
-def test_a_fluid_track_that_cannot_be_is_refused(numbers: tuple[float, float, float, float]) -> None:
-    with pytest.raises(ModelError, match="a fluid track"):
-        FluidTrack(0, *numbers)
+def test_a_run_up_in_equal_steps_is_that_of_scipy() -> None:
+    mounting, load = hydraulic(0, damping=200.0), wrench(0, orders=2)
+    sized = load.each(lambda values: values / 60.0**2)
+    steps = LinearRun(time_model(mounting), sweep_of(0.0, 60.0, 1.0))
+    assert steps.is_known
+    own = steps.response(steps.sweep.wrenches([(sized.orders, sized.coefficients)]))
+    theirs = run_through(mounting, sized, None, 0.0, 60.0, 1.0, tolerance=1e-8)
+    assert np.linalg.norm(own.force, axis=-1).max() == pytest.approx(theirs.worst_force, rel=5e-3)

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from laufruhe.extensions.run_ups.linear_run import BLOCK, LinearRun, Response, Sweep
 from laufruhe.numerics.arrays import Array, ComplexArray
-from laufruhe.physics.linear_run import BLOCK, LinearRun, Response, Sweep
 from laufruhe.physics.time_model import TimeModel
 
 QUICKEST = 0.5

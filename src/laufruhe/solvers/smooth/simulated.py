@@ -1,4 +1,4 @@
-"""Run-up and shut-down in a smooth program: peaks that the exact model tells, stretch by stretch (E28b)."""
+"""Simulated measures in a smooth program: peaks that the exact model gives from outside (E28b)."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ import casadi as ca
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.run_look import run_measures
-from laufruhe.load_models.run_peaks import RunPeaks
+from laufruhe.load_models.simulated import peaks_of, simulated_measures
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import domains_of, vector_of
 from laufruhe.problem.measure import Limit, Measure
@@ -20,8 +19,8 @@ from laufruhe.solvers.smooth.gathered import Gathered
 from laufruhe.solvers.smooth.nonlinear import Told
 
 
-class RunVariables:
-    """Peaks of the measures of run-ups that a problem asks about, as symbols.
+class SimulatedVariables:
+    """Peaks of the simulated measures of a problem, as symbols.
 
     Parameters
     ----------
@@ -33,14 +32,13 @@ class RunVariables:
 
     def __init__(self, problem: Problem, asked: Any, held: Gathered, coarser: int) -> None:
         self._asked, self._held = asked, held
-        measures = run_measures(problem)
-        self._peaks = RunPeaks(problem, measures, coarser) if measures else None
+        measures, self._peaks = simulated_measures(problem), peaks_of(problem, coarser)
         self.symbols, self._own, self._sizes = ca.MX(0, 1), dict[Measure, Any](), dict[Measure, float]()
         if self._peaks is None:
             return
         if not self._peaks.is_known:
-            raise ModelError("a run-up of so many turns is checked, not designed for; make it shorter")
-        self.symbols = ca.MX.sym("run-up", sum(self._peaks.counts))
+            raise ModelError("a simulation of so many turns is checked, not designed for; make it shorter")
+        self.symbols = ca.MX.sym("simulated", sum(self._peaks.counts))
         ends = np.cumsum(self._peaks.counts)
         columns = vector_of(domains_of(problem.unbalances))
         given = self.at([d.start_number for d in problem.mount_decisions], columns)

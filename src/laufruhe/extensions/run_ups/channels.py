@@ -1,0 +1,58 @@
+"""What a run-up and a shut-down through resonance reach (E28)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from laufruhe.extensions.run_ups.linear_run import Response
+from laufruhe.extensions.run_ups.machine import Run
+from laufruhe.extensions.run_ups.runs import RunUp, missed_share, point_of, runs_of
+from laufruhe.machine import Engine
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.asking import Answered, Asked
+from laufruhe.problem.channels.kinds import Need, NumberChannel
+
+RUN = Need(
+    lambda engine: engine.extra(Run),
+    "elastic mounts that an engine is run up on",
+    "add [run_up] and [mounts] of kind elastic",
+)
+
+
+def _missed(engine: Engine) -> float:
+    run = engine.extra(Run)
+    return 0.0 if run is None else missed_share(run)
+
+
+@dataclass(frozen=True, eq=False)
+class RunChannel(NumberChannel):
+    """The most of a number in run-up and shut-down, integrated in time.
+
+    Attributes
+    ----------
+    part
+        What it is the largest length of, shape (times, places, d).
+    """
+
+    needs: Need = RUN
+    of_loads: bool = False
+    simulation: str = "laufruhe.extensions.run_ups.simulation"
+    missed: Callable[[Engine], float] = _missed
+    part: Callable[[Response], Array] = field(kw_only=True)
+
+
+def _most(name: str, unit: str, number: Callable[[RunUp], float], part: Callable[[Response], Array]) -> RunChannel:
+    def values(_: Asked, evaluation: Answered) -> Sequence[float]:
+        run = evaluation.engine.extra(Run)
+        if run is None or not evaluation.loads:
+            return (0.0,)
+        point = point_of(run, [loads.point for loads in evaluation.loads])
+        return (max(map(number, runs_of(evaluation.engine, point, evaluation.fidelity, run))),)
+
+    return RunChannel(name, unit, values=values, part=part)
+
+
+FORCE = _most("run-up force", "N", lambda run: run.worst_force, lambda response: response.force)
+TRAVEL = _most("run-up travel", "m", lambda run: run.worst_travel, lambda response: response.travel)
+TWIST = _most("run-up twist", "rad", lambda run: run.worst_twist, lambda response: response.twist)

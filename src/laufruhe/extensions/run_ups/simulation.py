@@ -1,0 +1,29 @@
+"""What searches and bounds of mounts ask of run-ups: peaks with slopes, and bounds over boxes of stiffness."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+from laufruhe.extensions.run_ups.boxes import RunBoxes, bounds_runs
+from laufruhe.extensions.run_ups.peaks import RunPeaks
+from laufruhe.problem.measure import Measure
+from laufruhe.problem.problem import Problem
+from laufruhe.prove.mounts.box_response import BoxModel
+
+
+def peaks(problem: Problem, measures: Sequence[Measure], coarser: int, roughly: bool) -> RunPeaks:
+    """Return the peaks of measures of run-ups; roughly: without bump stops, which cost most."""
+    if roughly:
+        mounts = (
+            mount.each(lambda spring: replace(spring, stop_stiffness=0.0, stop_gap=math.inf))
+            for mount in problem.engine.mounts
+        )
+        problem = replace(problem, engine=replace(problem.engine, mounts=tuple(mounts)))
+    return RunPeaks(problem, measures, coarser)
+
+
+def boxes(model: BoxModel, measures: Sequence[Measure]) -> RunBoxes | None:
+    """Return the bounds over boxes of stiffness; None where nothing bounds run-ups."""
+    return RunBoxes(model, measures) if bounds_runs(model.problem) else None
