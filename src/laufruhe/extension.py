@@ -41,7 +41,7 @@ class Extension:
         Lines of the table in `laufruhe.problem.dependence`, about these channels and kinds; a channel without one is
         unknown to every bound, and decided locally.
     kinds
-        Objects of `laufruhe.problem.drives.Kind`: kinds of numbers that may be open.
+        Objects of `laufruhe.problem.decision.Kind`: kinds of numbers that may be open.
     layouts
         Objects of `laufruhe.machine.layouts.LayoutKind`.
     drives

@@ -7,8 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from laufruhe.problem.decision import Decision, domains_of
-from laufruhe.problem.drives import RotorDrive
+from laufruhe.problem.decision import Decision, RotorDrive, domains_of
 from laufruhe.problem.sets import Interval, Sector
 from laufruhe.prove.boxes.leads import least_on_arcs
 

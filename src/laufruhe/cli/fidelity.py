@@ -19,6 +19,8 @@ from laufruhe.load_models.batch import prepare
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.workers import count_of, each, executor_for, given
 from laufruhe.physics.fidelity import Fidelity
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.dependence import kinds_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report import explain, files
@@ -65,11 +67,13 @@ def _mount_times(problem: Problem, choice: Choice) -> tuple[float, float]:
 def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[Document, str, Callable[[], str]]:
     """Pages and pictures of every problem, an index of several; what is to be shown, the page of it, and JSON."""
     read = [(path, _with_objective(path)) for path in paths]
-    of_wheels = [(path, problem.name) for path, problem in read if problem.flywheel_decisions]
+    of_wheels = [(path, problem.name) for path, problem in read if Kind.FLYWHEEL in kinds_of(problem)]
     if len(of_wheels) == len(read):
         rule = "is open, and no cheap model is traded for a flywheel that keeps its limits"
         raise refused("flywheel", "", rule, "fix it", of_wheels[0][0])
-    paths, problems = zip(*((path, problem) for path, problem in read if not problem.flywheel_decisions), strict=True)
+    paths, problems = zip(
+        *((path, problem) for path, problem in read if Kind.FLYWHEEL not in kinds_of(problem)), strict=True
+    )
     found: dict[int, Trade] = {}
     for k, one, pages in _measured(paths, problems, say):
         found[k] = one

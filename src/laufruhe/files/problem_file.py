@@ -12,7 +12,6 @@ from pydantic import Field, create_model
 
 from laufruhe.extension import extended
 from laufruhe.files import fields as f
-from laufruhe.files.asked import ConstraintTable, ObjectiveTable
 from laufruhe.files.bearings import MainBearingTable
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fidelity import FidelityTable
@@ -22,6 +21,7 @@ from laufruhe.files.friction import FrictionTable
 from laufruhe.files.gas import GasTable
 from laufruhe.files.geared import GearedInertiaTable
 from laufruhe.files.load_cases import LoadCaseTable
+from laufruhe.files.measures import ConstraintTable, ObjectiveTable
 from laufruhe.files.mounts import BlockTable, MountsTable
 from laufruhe.files.nested import Place
 from laufruhe.files.operating_points import OperatingPointTable

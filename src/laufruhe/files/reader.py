@@ -18,7 +18,6 @@ from pydantic import ValidationError
 from laufruhe.errors import Complaint, InputError, ModelError, printed, refused, wrong_call
 from laufruhe.extension import extended
 from laufruhe.files import edits, open_numbers
-from laufruhe.files.asked import limits_of, objectives_of
 from laufruhe.files.bearings import MainBearingTable, bearings_of, one_by_one
 from laufruhe.files.catalogue import with_catalogue
 from laufruhe.files.complaints import Refused, beside, complaints_of, in_file, key_path
@@ -29,6 +28,7 @@ from laufruhe.files.friction import Brake
 from laufruhe.files.gas import gas_of, needs_bore
 from laufruhe.files.geared import geared_of
 from laufruhe.files.load_cases import load_cases_of
+from laufruhe.files.measures import Scene, limits_of, objectives_of
 from laufruhe.files.mounts import mounts_of
 from laufruhe.files.nested import inside, plain, put
 from laufruhe.files.open_parts import check_factors, leads_of, piston_masses
@@ -38,7 +38,6 @@ from laufruhe.files.problem_file import EXTENSION_KEYS, Given, Note, ProblemFile
 from laufruhe.files.quantities import followed
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.running_gear import size_decisions, weighed
-from laufruhe.files.scene import Scene
 from laufruhe.files.toml_depth import line_deeper_than
 from laufruhe.files.toml_faults import toml_complaint
 from laufruhe.machine import Cycle, Engine, SliderCrank
@@ -46,10 +45,9 @@ from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.machine.running_gear import RunningGear
 from laufruhe.problem.decision import Decision
-from laufruhe.problem.drawing import Drawing
-from laufruhe.problem.drawing import Path as Place
 from laufruhe.problem.phasing import Candidate
-from laufruhe.problem.problem import Problem, Search
+from laufruhe.problem.problem import Drawing, Problem, Search
+from laufruhe.problem.problem import Path as Place
 
 DEEPEST, MOST_ENTRIES, MOST_BYTES = 16, 1000, 1_000_000
 """Of a file: tables within tables, entries of one list or table, and bytes."""

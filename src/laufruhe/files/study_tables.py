@@ -14,9 +14,9 @@ from pydantic import BeforeValidator, Field
 from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files import nested
-from laufruhe.files.asked import SIDES, limit_name
 from laufruhe.files.complaints import Refused, measured, nearest
 from laufruhe.files.fields import Name, Table, refusal
+from laufruhe.files.measures import SIDES, limit_name
 from laufruhe.files.model_walk import number_at
 from laufruhe.files.problem_file import file_model
 

@@ -75,7 +75,7 @@ class FiringModel(StarModel):
 
     def _norm(self, measure: Measure, samples: int, averaged: bool, of_stars: Iterator[StarNorm]) -> StarNorm:
         """Rows of a measure: of its star, and what the slot of every cylinder adds."""
-        if not measure.feels_order:
+        if not measure.is_inside:
             return next(of_stars)
         signals = [signal.over(self.base) for signal in self._fired.signals(measure.load)]
         steps = samples if averaged and measure.norm.averages else None
@@ -132,4 +132,4 @@ def _of_star(problem: Problem) -> Problem:
 
 
 def _adds_up(measure: Measure) -> bool:
-    return not measure.feels_order or measure.load.feels_unbalances
+    return not measure.is_inside or measure.load.feels_unbalances

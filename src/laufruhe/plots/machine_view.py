@@ -33,7 +33,7 @@ from laufruhe.plots.style import AFTER, GREY, ORANGE, PALE, Page, entry_of_dots,
 from laufruhe.plots.words import INK, SMALL, round_ticks, width_of
 from laufruhe.present.measures import changed
 from laufruhe.present.poses import THICKNESS, Pose, bore_of, direction, half_disc
-from laufruhe.problem.drives import Kind
+from laufruhe.problem.decision import Kind
 from laufruhe.solvers.result import Result
 
 # both views side by side, of one page, and between them [inch]

@@ -1,1 +1,1 @@
-"""What is open, wanted and forbidden; and the files that say so. No solver in here."""
+"""Design problems: decisions, measures, limits and their evaluation."""

@@ -1,4 +1,4 @@
-"""What a design does, as labelled arrays: loads over the crank angle and by order, and the modes of its mounting.
+"""Labelled arrays of a design: loads over the crank angle and by order, and the modes of its mounting.
 
 Scripts get them as xarray datasets, files as columns; both from the same fields.
 """
@@ -35,12 +35,12 @@ if TYPE_CHECKING:
 
 MOST_STEPS = 1_000_000
 STEPS = 720
-"""Over the cycle; what is sampled is known at every angle."""
+"""Default number of samples over the cycle."""
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One dimension: its name, labels, and their unit."""
+    """Dimension of an array: its name, labels, and their unit."""
 
     name: str
     labels: tuple[Any, ...]
@@ -49,7 +49,7 @@ class Axis:
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """One quantity along the axes that all fields share, and its own."""
+    """Quantity along the axes that all fields share, and along its own."""
 
     name: str
     words: str
@@ -58,15 +58,16 @@ class Field:
     values: Array
 
     def columns(self) -> Iterator[tuple[str, tuple[int, ...]]]:
-        """A heading for each place on its own axes."""
-        for place in itertools.product(*(range(len(axis.labels)) for axis in self.own)):
-            labels = [_shown(axis, k) for axis, k in zip(self.own, place, strict=True)]
-            yield f"{' '.join([self.words, *labels])} [{self.unit or '-'}]", place
+        """Yield heading and index of every column along its own axes."""
+        for index in itertools.product(*(range(len(axis.labels)) for axis in self.own)):
+            labels = [(axis.name, axis.labels[k]) for axis, k in zip(self.own, index, strict=True)]
+            texts = [f"{name} {label}" if isinstance(label, int | float) else str(label) for name, label in labels]
+            yield f"{' '.join([self.words, *texts])} [{self.unit or '-'}]", index
 
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """Fields on common axes: the designs, and what else stands in rows."""
+    """Fields on common axes: the designs, and the axes of the rows."""
 
     title: str
     designs: Axis
@@ -74,7 +75,7 @@ class Fields:
     fields: tuple[Field, ...]
 
     def dataset(self) -> xr.Dataset:
-        """As xarray has it, with units and words as attributes."""
+        """Return an xarray dataset with units and words as attributes."""
         import xarray as xr
 
         shared = (self.designs, *self.rows)
@@ -92,12 +93,12 @@ class Fields:
         return xr.Dataset(variables, coords, {"title": self.title})
 
     def table(self) -> tuple[list[str], Iterator[list[Any]]]:
-        """Heads and rows: the designs side by side, a row for each place on the other axes."""
+        """Return heads and rows: the designs side by side, a row for each index of the other axes."""
         named = len(self.designs.labels) > 1
         columns = [
-            (f"{design}: {head}" if named else head, field.values[k][..., *place])
+            (f"{design}: {head}" if named else head, field.values[k][..., *index])
             for field in self.fields
-            for head, place in field.columns()
+            for head, index in field.columns()
             for k, design in enumerate(self.designs.labels)
         ]
         heads = [f"{axis.name} [{axis.unit}]" if axis.unit else axis.name for axis in self.rows]
@@ -107,13 +108,8 @@ class Fields:
         return [*heads, *(head for head, _ in columns)], rows
 
 
-def _shown(axis: Axis, k: int) -> str:
-    label = axis.labels[k]
-    return f"{axis.name} {label}" if isinstance(label, int | float) else str(label)
-
-
 def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
-    """Loads on the block, the mounts and the bearings, and how far the mounts move, over the cycle (C7)."""
+    """Return the loads on the block, the mounts and the bearings, and the mount travel, over the cycle (C7)."""
     check_whole("steps", steps, 1, MOST_STEPS)
     first = next(iter(designs.values()))
     whole = first.engine.cycle.angle
@@ -138,11 +134,11 @@ def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
         else:
             fields.append(Field(name, words, channel.unit, (places,), values[..., 0]))
     rows = (Axis("point", tuple(names)), angles)
-    return Fields("Loads over the crank angle", _axis_of(designs), rows, tuple(fields))
+    return Fields("Loads over the crank angle", Axis("design", tuple(designs)), rows, tuple(fields))
 
 
 def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
-    """Amplitudes by order of the loads on block and mounts (C8)."""
+    """Return the amplitudes by order of the loads on block, mounts and bearings (C8)."""
     first = next(iter(designs.values()))
     base = common_base([loads.wrench.base for design in designs.values() for loads in design.loads])
     signals: dict[str, tuple[str, str, tuple[Axis, ...], Callable[[PointLoads], Spectrum]]] = {
@@ -154,22 +150,30 @@ def orders_of(designs: Mapping[str, Evaluation]) -> Fields:
     for name, words, place, channel in _places(first):
         own = (Axis(place, tuple(channel.places(first.engine))),)
         signals[name] = (words, channel.unit, own, channel.signal)
-    found = {
-        name: [[of(loads).rebased(base) for loads in design.loads] for design in designs.values()]
-        for name, (_, _, _, of) in signals.items()
+    spectra = {
+        name: [[signal(loads).rebased(base) for loads in design.loads] for design in designs.values()]
+        for name, (_, _, _, signal) in signals.items()
     }
-    count = max(len(one.coefficients) for rows in found.values() for row in rows for one in row)
+    count = max(len(one.coefficients) for rows in spectra.values() for row in rows for one in row)
+
+    def amplitudes(spectrum: Spectrum) -> Array:
+        # a resonance has no finite amplitude
+        with np.errstate(invalid="ignore"):
+            values = order_amplitude(spectrum.coefficients)
+        values = np.pad(values, [(0, count - len(values))] + [(0, 0)] * (values.ndim - 1))
+        return np.where(np.isfinite(values), values, math.inf)
+
     fields = [
-        Field(name, words, unit, own, np.array([[_amplitudes(one, count) for one in row] for row in found[name]]))
+        Field(name, words, unit, own, np.array([[amplitudes(one) for one in row] for row in spectra[name]]))
         for name, (words, unit, own, _) in signals.items()
     ]
     orders = Axis("order", tuple(float(k * base) for k in range(count)))
     points = Axis("point", tuple(loads.point.name for loads in first.loads))
-    return Fields("Amplitudes by order", _axis_of(designs), (points, orders), tuple(fields))
+    return Fields("Amplitudes by order", Axis("design", tuple(designs)), (points, orders), tuple(fields))
 
 
 def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
-    """Natural frequencies, loss factors and shares of kinetic energy of a block on elastic mounts.
+    """Return natural frequencies, loss factors and shares of kinetic energy of a block on elastic mounts.
 
     Raises
     ------
@@ -185,15 +189,11 @@ def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
         Field("loss_factor", "loss factor", "", (), np.array([one.loss for one in modes])),
         Field("energy", "share of kinetic energy", "", (motion,), np.array([one.energy.T for one in modes])),
     )
-    return Fields("Natural modes", _axis_of(designs), (Axis("mode", tuple(range(1, 7))),), fields)
-
-
-def _axis_of(designs: Mapping[str, Evaluation]) -> Axis:
-    return Axis("design", tuple(designs))
+    return Fields("Natural modes", Axis("design", tuple(designs)), (Axis("mode", tuple(range(1, 7))),), fields)
 
 
 def _places(design: Evaluation) -> Iterator[tuple[str, str, str, LoadChannel]]:
-    """Loads that are felt place by place: name, words, axis, channel."""
+    """Yield loads with several places: name, words, name of the axis, channel."""
     if design.engine.mounts:
         yield "mount_force", "force on", "mount", MOUNT_FORCE
     if design.engine.mounts and design.engine.block is not None:
@@ -203,11 +203,3 @@ def _places(design: Evaluation) -> Iterator[tuple[str, str, str, LoadChannel]]:
         if design.engine.bearings:
             yield "main_bearing_force", "force on", "bearing", MAIN_BEARING_FORCE
             yield "crank_pin_force", "force on pin of", "cylinder", CRANK_PIN_FORCE
-
-
-def _amplitudes(spectrum: Spectrum, count: int) -> Array:
-    # on a resonance there is none
-    with np.errstate(invalid="ignore"):
-        found = order_amplitude(spectrum.coefficients)
-    missing = [(0, count - len(found))] + [(0, 0)] * (found.ndim - 1)
-    return np.where(np.isfinite(found := np.pad(found, missing)), found, math.inf)

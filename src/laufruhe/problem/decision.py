@@ -1,82 +1,324 @@
-"""Decisions: open numbers, the sets they lie in, and what of the engine they drive.
+"""Decisions: open numbers, the sets they lie in, and the numbers of the engine they drive.
 
-A decision knows its set and its drives; which method decides it follows from their kinds. Of a convex
-set a bound needs the least value of a linear function, a method the nearest point (P4).
+Kinds of drives select the method that solves a problem. A bound needs the minimum of a linear function over the set, a
+method the nearest point (P4).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
+from laufruhe.extension import extended
+from laufruhe.machine import Engine, Flywheel, Mount
+from laufruhe.machine.leads import led
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.drives import (
-    DAMPING,
-    KINDS,
-    LAG,
-    LOSS,
-    NUMBERS_OF_MOUNT,
-    POSITION,
-    STIFFNESS,
-    TURNED,
-    AddressDrive,
-    Drive,
-    Kind,
-    MountDrive,
-    NumberDrive,
-    Numbers,
-    PlaceDrive,
-    RotorDrive,
-    mount_of,
-)
+from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.physics.rigid_body import turned_axes
 from laufruhe.problem.sets import Set, Value
 
-__all__ = [
-    "DAMPING",
-    "KINDS",
-    "LAG",
-    "LOSS",
-    "NUMBERS_OF_MOUNT",
-    "POSITION",
-    "STIFFNESS",
-    "TURNED",
-    "AddressDrive",
-    "Decision",
-    "Domain",
-    "Drive",
-    "Kind",
-    "MountDrive",
-    "NumberDrive",
-    "Numbers",
-    "PlaceDrive",
-    "RotorDrive",
-    "columns_of",
-    "domains_of",
-    "mount_of",
-    "moved_numbers",
-    "without_rotors",
-]
+STIFFNESS, LOSS, DAMPING, POSITION, TURNED = slice(0, 3), 3, slice(4, 7), slice(7, 10), slice(10, 13)
+LAG, NUMBERS_OF_MOUNT = 13, 14
+
+
+@dataclass(frozen=True, order=True)
+class Kind:
+    """A kind of open numbers, by the dependence of loads on it.
+
+    Attributes
+    ----------
+    rank
+        The highest rank counts where a decision drives several kinds.
+    name
+        Name in messages; the table of a problem file for a kind of an extension.
+    words
+        Name of such numbers, in the plural.
+    is_alone
+        True if channels of the core depend on it only where a line of dependences says so.
+    """
+
+    rank: float
+    name: str
+    words: str = field(default="", compare=False)
+    is_alone: bool = field(default=False, compare=False)
+
+    UNBALANCE: ClassVar[Kind]
+    """Every load is affine in it (P1)."""
+    PLACE: ClassVar[Kind]
+    """Every load is affine in it while the unbalances are fixed (P8)."""
+    STIFFNESS: ClassVar[Kind]
+    """K is linear in it."""
+    MOUNT: ClassVar[Kind]
+    STAR: ClassVar[Kind]
+    """The phasing, which is no number."""
+    FLYWHEEL: ClassVar[Kind]
+    """Affects the flywheel and the evenness of the crank's speed only."""
+    PISTON: ClassVar[Kind]
+    """Every load is affine in it, but not the turning inertia."""
+    SIZE: ClassVar[Kind]
+    """Size of the running gear: stresses fall with it, masses follow from it (Z2)."""
+    SHARE: ClassVar[Kind]
+    """Inertia on a geared shaft: the roll moment is affine in it while the masses of the pistons are fixed."""
+    LEAD: ClassVar[Kind]
+    """Phase lead of a geared shaft: loads of order h that it carries come earlier by h times the lead (P13)."""
+    NUMBER: ClassVar[Kind]
+    """Any other number of the problem file, on which everything may depend."""
+
+    def __hash__(self) -> int:
+        # the same in every process, and so is the order of sets
+        return hash(self.rank)
+
+    def __reduce__(self) -> tuple[Callable[[str], Kind], tuple[str]]:
+        # a kind is one and the same in every process
+        return _kind_named, (self.name,)
+
+
+Kind.UNBALANCE = Kind(1, "unbalance", "unbalances")
+Kind.PLACE = Kind(2, "place", "places of shafts")
+Kind.STIFFNESS = Kind(3, "stiffness", "stiffness")
+Kind.MOUNT = Kind(4, "mount", "other numbers of mounts")
+Kind.STAR = Kind(5, "star", "stars, firing orders, shafts")
+Kind.FLYWHEEL = Kind(6, "flywheel", "flywheel", is_alone=True)
+Kind.PISTON = Kind(7, "piston", "masses of pistons")
+Kind.SIZE = Kind(9, "size", "sizes")
+Kind.SHARE = Kind(10, "share", "shares of geared inertia")
+Kind.LEAD = Kind(11, "lead", "leads")
+Kind.NUMBER = Kind(12, "number", "other numbers of the file")
+
+KINDS: Mapping[str, Kind] = extended("kinds", Kind, (
+    Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT, Kind.STAR, Kind.FLYWHEEL, Kind.PISTON, Kind.SIZE,
+    Kind.SHARE, Kind.LEAD, Kind.NUMBER,
+))  # fmt: skip
+"""Kinds by their names, with those of extensions."""
+
+
+def _kind_named(name: str) -> Kind:
+    return KINDS[name]
+
+
+@dataclass
+class Numbers:
+    """Numbers of an engine that decisions may move; symbols of a smooth program are allowed too.
+
+    Attributes
+    ----------
+    unbalances
+        By the names of the rotors [kg m] (C4).
+    places
+        By the names of the rotors: x, and y and z of their shafts [m] (C2).
+    mounts
+        Fourteen numbers a spring: stiffness, loss factor, damping, position, turned angles, lag (E13).
+    changes
+        Changes of all other numbers, by their kind and key (`NumberDrive`).
+    """
+
+    unbalances: dict[str, Any] = field(default_factory=dict)
+    places: dict[str, list[Any]] = field(default_factory=dict)
+    mounts: list[list[Any]] = field(default_factory=list)
+    changes: dict[tuple[Kind, Any], float] = field(default_factory=dict)
+
+    @classmethod
+    def from_engine(cls, engine: Engine, mounts: Sequence[Sequence[float]] = ()) -> Numbers:
+        """Return the numbers of an engine, and those of its mounts where these may move."""
+        unbalances = {rotor.name: rotor.unbalance for rotor in engine.rotors}
+        places: dict[str, list[Any]] = {rotor.name: list(rotor.place) for rotor in engine.rotors}
+        return cls(unbalances, places, [list(row) for row in mounts])
+
+    def engine(self, given: Engine) -> Engine:
+        """Return an engine with these numbers."""
+        rotors = []
+        for rotor in given.rotors:
+            unbalance, place = self.unbalances[rotor.name], tuple(self.places[rotor.name])
+            moved = rotor if unbalance == rotor.unbalance else replace(rotor, unbalance=unbalance)
+            rotors.append(moved if place == rotor.place else moved.placed(*place))
+        mounts = given.mounts
+        if self.mounts:
+            rows = iter(self.mounts)
+            mounts = tuple(mount.each(lambda spring: mount_of(spring, next(rows))) for mount in given.mounts)
+        shares = self._of_kind(Kind.SHARE, {geared.name: geared.share for geared in given.geared})
+        # a sum of changes may leave a bound by a rounding
+        geared = tuple(replace(g, share=min(max(shares[g.name], 0.0), 1.0)) for g in given.geared)
+        parts = list(given.slider_cranks)
+        # the inertia that a rod lacks may be negative
+        lower = {"rod_inertia_deficit": -math.inf}
+        for k, part in enumerate(parts):
+            pistons = {key: change for (kind, key), change in self.changes.items() if kind is Kind.PISTON}
+            moves = {mass: change for (name, mass), change in pistons.items() if name == part.name}
+            masses = {mass: max(getattr(part, mass) + change, lower.get(mass, 0.0)) for mass, change in moves.items()}
+            parts[k] = replace(part, **masses) if masses else part
+        flywheel = given.flywheel and self.flywheel(given.flywheel)
+        engine = replace(
+            given, slider_cranks=tuple(parts), rotors=tuple(rotors), mounts=mounts, flywheel=flywheel, geared=geared
+        )
+        if any(kind is Kind.SIZE for kind, _ in self.changes):
+            engine = engine.resized(self._of_kind(Kind.SIZE, given.moving.sizes))
+        for extra in given.extras:
+            changes = {key: change for (kind, key), change in self.changes.items() if kind.name == extra.name}
+            engine = engine.with_extra(extra.moved(changes, given.slider_cranks, engine.slider_cranks))
+        leads = {shaft: change for (kind, shaft), change in self.changes.items() if kind is Kind.LEAD}
+        return led(engine, leads) if leads else engine
+
+    def flywheel(self, given: Flywheel) -> Flywheel:
+        """Return a flywheel with these numbers."""
+        return given.moved(self._of_kind(Kind.FLYWHEEL, dict(enumerate(given.numbers))).values())
+
+    def _of_kind(self, kind: Kind, given: Mapping[Any, Any]) -> dict[Any, Any]:
+        # a number that no change moves may be None
+        changes = {key: change for (other, key), change in self.changes.items() if other is kind}
+        return {key: value + changes[key] if key in changes else value for key, value in given.items()}
+
+
+class Drive(Protocol):
+    """Effect of a decision on one number of the engine."""
+
+    @property
+    def kind(self) -> Kind:
+        """Kind of the number."""
+
+    @property
+    def acts(self) -> bool:
+        """True if a part of the engine follows."""
+
+    def move(self, numbers: Numbers, change: Any, /) -> None:
+        """Move the number by a change of the decision."""
+
+
+@dataclass(frozen=True)
+class RotorDrive:
+    """U += gain u of one rotor, or gain conj(u) when mirrored."""
+
+    rotor: str
+    gain: complex
+    mirrored: bool = False
+    kind: ClassVar[Kind] = Kind.UNBALANCE
+
+    @property
+    def acts(self) -> bool:
+        """True unless the gain is zero."""
+        return self.gain != 0.0
+
+    def of(self, change: Value) -> Value:
+        """Return the change of the unbalance [kg m] that follows from a change of the decision."""
+        return self.gain * (change.conjugate() if self.mirrored else change)
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Move the unbalance."""
+        numbers.unbalances[self.rotor] += self.of(change)
+
+
+@dataclass(frozen=True)
+class PlaceDrive:
+    """Place of one rotor += change, along x, or by the y or z of its shaft (C2)."""
+
+    rotor: str
+    axis: int
+    kind: ClassVar[Kind] = Kind.PLACE
+    acts: ClassVar[bool] = True
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Move the rotor."""
+        numbers.places[self.rotor][self.axis] += change
+
+
+@dataclass(frozen=True)
+class MountDrive:
+    """Number += gain x change, for one number of one mount (E13)."""
+
+    mount: int
+    number: int
+    gain: float
+    acts: ClassVar[bool] = True
+
+    @property
+    def kind(self) -> Kind:
+        """Kind of the number: K is linear in stiffness alone."""
+        return Kind.STIFFNESS if self.number < STIFFNESS.stop else Kind.MOUNT
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Move the number of the mount."""
+        numbers.mounts[self.mount][self.number] += self.gain * change
+
+
+@dataclass(frozen=True)
+class NumberDrive:
+    """Number of the engine += change.
+
+    Attributes
+    ----------
+    key
+        Distinguishes numbers of one kind: index in the flywheel's numbers, names of a slider-crank and its mass, size
+        of the running gear, shaft of a phase lead, geared inertia of a share.
+    """
+
+    kind: Kind
+    key: Any
+    acts: ClassVar[bool] = True
+
+    def move(self, numbers: Numbers, change: Any) -> None:
+        """Add up the change of the number."""
+        key = self.kind, self.key
+        numbers.changes[key] = numbers.changes.get(key, 0.0) + float(change.real)
+
+
+@dataclass(frozen=True)
+class AddressDrive:
+    """A number of the problem file: the engine is built again with the value at its address.
+
+    Attributes
+    ----------
+    path
+        Keys, and indices in lists from zero.
+    unit
+        SI unit in which the value is written; empty for a plain number.
+    """
+
+    path: tuple[str | int, ...]
+    unit: str
+    kind: ClassVar[Kind] = Kind.NUMBER
+    acts: ClassVar[bool] = True
+
+    def written(self, value: Value) -> str | float:
+        """Return the value as a file has it."""
+        number = float(value.real)
+        return f"{number!r} {self.unit}" if self.unit else number
+
+    def move(self, _numbers: Numbers, _change: Any) -> None:
+        """Refuse: the engine is built again instead (`Problem.held`)."""
+        raise TypeError(f"{self.path} is a number of the file; the engine is put together anew with it")
+
+
+def mount_of(mount: Mount, numbers: Sequence[float]) -> Mount:
+    """Return a mount with these fourteen numbers (E13)."""
+    rows = turned_axes(NUMBERS, numbers[TURNED]).tolist()
+    # a sum of changes may leave a bound of zero by a rounding
+    (a, b, c), (p, q, r) = (tuple(max(float(v), 0.0) for v in numbers[s]) for s in (STIFFNESS, DAMPING))
+    x, y, z = (float(v) for v in numbers[POSITION])
+    return replace(
+        mount, stiffness=(a, b, c), loss_factor=max(float(numbers[LOSS]), 0.0), damping=(p, q, r), position=(x, y, z),
+        orientation=(tuple(rows[0]), tuple(rows[1]), tuple(rows[2])), lag=max(float(numbers[LAG]), 0.0),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Decision:
-    """An open number, and what follows it.
+    """An open number.
 
     Attributes
     ----------
     name
-        As in the problem file.
+        Name in the problem file.
     unit
         SI unit; "" for a balance factor.
     set
-        Where it lies.
+        Set of allowed values.
     start
-        Its value in the design as given: a complex u = size e^{i angle} of an unbalance.
+        Value in the design as given: a complex u = size e^{i angle} for an unbalance.
     drives
-        What of the engine follows.
+        Numbers of the engine that follow.
     """
 
     name: str
@@ -87,42 +329,38 @@ class Decision:
 
     @property
     def lower(self) -> float:
-        """Least size."""
+        """Lower bound of the size."""
         return self.set.lower
 
     @property
     def upper(self) -> float:
-        """Largest size."""
+        """Upper bound of the size."""
         return self.set.upper
 
     @property
     def start_number(self) -> float:
-        """The start of a real number."""
+        """Start of a real number."""
         return self.start.real
 
     @property
     def kind(self) -> Kind:
-        """Of what follows."""
+        """Kind of the highest rank among the drives."""
         return max(drive.kind for drive in self.drives)
 
     @property
     def is_affine(self) -> bool:
-        """Whether every load is affine in it."""
+        """True if every load is affine in it."""
         return self.kind in (Kind.UNBALANCE, Kind.PISTON, Kind.SHARE)
+
+    @property
+    def is_stiffness(self) -> bool:
+        """True if it drives stiffness of mounts alone."""
+        return self.kind is Kind.STIFFNESS
 
     @property
     def rotor_drives(self) -> tuple[RotorDrive, ...]:
         """Unbalances that follow."""
         return tuple(drive for drive in self.drives if isinstance(drive, RotorDrive))
-
-    def keys(self, kind: Kind) -> tuple[Any, ...]:
-        """Of the numbers of a kind that follow."""
-        return tuple(drive.key for drive in self.drives if isinstance(drive, NumberDrive) and drive.kind is kind)
-
-    @property
-    def address_drives(self) -> tuple[AddressDrive, ...]:
-        """Numbers of the file that follow."""
-        return tuple(drive for drive in self.drives if isinstance(drive, AddressDrive))
 
     @property
     def place_drives(self) -> tuple[PlaceDrive, ...]:
@@ -130,28 +368,33 @@ class Decision:
         return tuple(drive for drive in self.drives if isinstance(drive, PlaceDrive))
 
     @property
-    def is_stiffness(self) -> bool:
-        """Whether nothing but stiffness of mounts follows."""
-        return self.kind is Kind.STIFFNESS
-
-    @property
     def mount_drives(self) -> tuple[MountDrive, ...]:
         """Numbers of mounts that follow."""
         return tuple(drive for drive in self.drives if isinstance(drive, MountDrive))
 
+    @property
+    def address_drives(self) -> tuple[AddressDrive, ...]:
+        """Numbers of the file that follow."""
+        return tuple(drive for drive in self.drives if isinstance(drive, AddressDrive))
 
-def without_rotors(decisions: Sequence[Decision], gone: Collection[str]) -> tuple[Decision, ...]:
-    """Decisions as they are once some rotors are left out; those that drive nothing else go with them."""
-    fewer = (replace(d, drives=tuple(v for v in d.drives if getattr(v, "rotor", None) not in gone)) for d in decisions)
-    return tuple(decision for decision in fewer if decision.drives)
+    def keys(self, kind: Kind) -> tuple[Any, ...]:
+        """Return the keys of the numbers of a kind that follow."""
+        return tuple(drive.key for drive in self.drives if isinstance(drive, NumberDrive) and drive.kind is kind)
+
+
+def without_rotors(decisions: Sequence[Decision], names: Collection[str]) -> tuple[Decision, ...]:
+    """Return decisions without their drives of some rotors, and without decisions that drive nothing else."""
+    others = (
+        replace(d, drives=tuple(v for v in d.drives if getattr(v, "rotor", None) not in names)) for d in decisions
+    )
+    return tuple(decision for decision in others if decision.drives)
 
 
 def moved_numbers(numbers: Numbers, decisions: Sequence[Decision], values: Sequence[Any]) -> Numbers:
-    """The numbers with decisions at these values, changed in place."""
+    """Move the numbers in place to decisions at these values, and return them."""
     for decision, value in zip(decisions, values, strict=True):
-        change = value - decision.start
         for drive in decision.drives:
-            drive.move(numbers, change)
+            drive.move(numbers, value - decision.start)
     return numbers
 
 
@@ -164,17 +407,17 @@ class Domain:
 
     @property
     def set(self) -> Set:
-        """Where they lie."""
+        """Set of allowed values."""
         return self.decision.set
 
     @property
     def width(self) -> int:
-        """One real number, or two for a complex one."""
+        """Number of columns: one for a real number, two for a complex one."""
         return self.decision.set.width
 
     @property
     def columns(self) -> slice:
-        """In the decision vector."""
+        """Place of its columns in the decision vector."""
         return slice(self.start, self.start + self.width)
 
     @property
@@ -184,63 +427,61 @@ class Domain:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Least and largest that each of its columns is within the bounds."""
+        """Lower and upper bound of each of its columns."""
         return (self.set.lower, self.set.upper) if self.width == 1 else (-self.scale, self.scale)
 
     def complex_value(self, x: Array) -> complex:
-        """The decision u from the decision vector."""
+        """Return the decision u from the decision vector."""
         return complex(sum(part * d for part, d in zip(x[self.columns], self.set.directions, strict=True)))
 
     def columns_of(self, u: Value) -> Array:
-        """The columns of a complex decision."""
+        """Return the columns of a complex decision, shape (width,)."""
         if self.width == 1:
             return np.array([(u * self.set.directions[0].conjugate()).real])
         return np.array([u.real, u.imag])
 
     def least(self, gradient: Array) -> float:
-        """min g . x over the set (P4)."""
+        """Return min g . x over the set (P4)."""
         return self.set.least(gradient[self.columns])
 
     def project(self, x: Array) -> Array:
-        """The nearest point of the set to the columns of x."""
+        """Return the point of the set nearest to the columns of x."""
         return self.set.project(x[self.columns])
 
 
 def domains_of(decisions: Sequence[Decision]) -> tuple[Domain, ...]:
-    """Domains in the order of the decisions, their columns side by side."""
-    out: list[Domain] = []
-    start = 0
+    """Return domains in the order of the decisions, their columns side by side."""
+    domains: list[Domain] = []
     for decision in decisions:
-        out.append(Domain(decision, start))
-        start += out[-1].width
-    return tuple(out)
+        domains.append(Domain(decision, domains[-1].columns.stop if domains else 0))
+    return tuple(domains)
 
 
 def ends_of(domains: Sequence[Domain]) -> tuple[Array, Array]:
-    """Least and most of every column of a decision vector within the bounds."""
+    """Return lower and upper bounds of every column of a decision vector."""
     low, high = (np.array([d.ends[k] for d in domains for _ in range(d.width)], dtype=float) for k in (0, 1))
     return low, high
 
 
 def sides_of(decisions: Sequence[Decision]) -> tuple[Array, Array]:
-    """Bounds of decisions that are one number each."""
+    """Return lower and upper bounds of real decisions."""
     lower, upper = (np.array([getattr(d, side) for d in decisions], dtype=float) for side in ("lower", "upper"))
     return lower, upper
 
 
 def scales_of(domains: Sequence[Domain]) -> Array:
-    """Largest size of every column of a decision vector."""
-    return np.concatenate([np.zeros(0), *(np.full(d.width, d.scale) for d in domains)])
+    """Return the largest size of every column of a decision vector."""
+    return np.array([d.scale for d in domains for _ in range(d.width)], dtype=float)
 
 
 def vector_of(domains: Sequence[Domain], values: Sequence[Value] | Array | None = None) -> Array:
-    """Decision vector of complex unbalances, of those of the design as given unless told."""
+    """Return the decision vector of complex values; by default those of the design as given."""
     own = [domain.decision.start for domain in domains] if values is None else values
     return np.concatenate([np.zeros(0), *(d.columns_of(value) for d, value in zip(domains, own, strict=True))])
 
 
 def columns_of(domains: Sequence[Domain], values: Sequence[Value]) -> Array:
-    """Decision vector of complex unbalances, each brought into its set."""
+    """Return the decision vector of complex values, each projected onto its set."""
     out = vector_of(domains, values)
     for domain in domains:
         out[domain.columns] = domain.project(out)

@@ -1,7 +1,7 @@
-"""How every channel depends on every kind of decision, and on what of a problem that depends.
+"""Dependence of every channel on every kind of decision.
 
-The table is a list of what is known. A channel that is not in it is UNKNOWN for every kind: no bound counts it as
-affine or as constant, and what asks for it is decided locally. Sampling (`tests/problem/test_dependence.py`) can refute
+The table lists known dependences. A channel that is not in it is UNKNOWN for every kind: no bound counts it as affine
+or as constant, and a problem with it is decided locally. Sampling (`tests/problem/test_dependence.py`) can refute
 an entry and never prove it.
 """
 
@@ -18,19 +18,19 @@ from laufruhe.problem.problem import Problem
 
 
 class Dependence(StrEnum):
-    """How the signal or number of a channel follows open numbers of one kind while all others are held."""
+    """Dependence of a channel on open numbers of one kind while all others are fixed."""
 
     NONE = "none"
     """Constant."""
     AFFINE = "affine"
-    """Of masses in a plane, whose lengths are added up: these are affine."""
+    """For masses: sums of lengths of vectors that are affine."""
     BIAFFINE = "affine while unbalances are held"
     BENT = "affine between bearings while unbalances are held"
-    """Bent where a place passes a bearing of its shaft (B4)."""
+    """Has a kink where a place passes a bearing of its shaft (B4)."""
     MASSES = "affine in masses that follow, times a factor that goes one way"
-    """Masses follow from sizes; the factor of each place goes one way with each of them (Z2)."""
+    """Masses follow from sizes; the factor of each place is monotone in each size (Z2)."""
     SHIFT = "a sum of parts, each earlier by its own angle"
-    """Parts are throws of a star, or what each geared shaft carries (P13)."""
+    """Parts are throws of a star, or the loads of each geared shaft (P13)."""
     SWING = "a number of a signal that is SHIFT"
     CONVEX = "convex"
     MONOTONE_UP = "never falls"
@@ -58,7 +58,7 @@ _COLUMNS = (
     Kind.UNBALANCE, Kind.SHARE, Kind.PISTON, Kind.PLACE, Kind.SIZE, Kind.LEAD, Kind.STAR, Kind.STIFFNESS, Kind.MOUNT,
     Kind.FLYWHEEL,
 )  # fmt: skip
-# of an engine on elastic mounts at an even speed; `dependence` says what is different elsewhere
+# for an engine on elastic mounts at an even speed; `dependence` treats other engines
 _TABLE = """
                                     U S P  x Z L  *  k M  F
 shaking force                       a a a  b m >  >  0 0  0
@@ -126,9 +126,9 @@ def _row(line: str) -> tuple[str, dict[Kind, Dependence]]:
 
 
 def _with_added(own: Mapping[str, dict[Kind, Dependence]]) -> dict[str, Mapping[Kind, Dependence]]:
-    """Return the table with the lines of extensions, of their own channels or of their own kinds."""
-    found, without = dict[str, Mapping[Kind, Dependence]](), set(CHANNELS).difference(own)
-    found |= {
+    """Return the table with the lines of extensions about their own channels or kinds."""
+    without = set(CHANNELS).difference(own)
+    table: dict[str, Mapping[Kind, Dependence]] = {
         name: row | {kind: Dependence.NONE for kind in KINDS.values() if kind.is_alone and kind not in row}
         for name, row in own.items()
     }
@@ -144,23 +144,23 @@ def _with_added(own: Mapping[str, dict[Kind, Dependence]]) -> dict[str, Mapping[
             elif name not in own or not row.keys() <= {kind for _, kind in objects(extension, "kinds")}:
                 rule = f"'{name}' is no channel without dependences; leave its line out"
                 raise ModelError(f"extension '{extension.name}': {rule}")
-            found[name] = {**found.get(name, {}), **row}
-    return found
+            table[name] = {**table.get(name, {}), **row}
+    return table
 
 
 TABLE: Mapping[str, Mapping[Kind, Dependence]] = _with_added(dict(map(_row, _TABLE.strip().splitlines()[1:])))
-"""By the name of the channel and the kind of decision."""
-# loads of bearings feel the places of rotors on the shafts that these carry
+"""Dependences by the name of the channel and the kind of decision."""
+# loads of bearings depend on the places of rotors on the shafts that they carry
 _OF_BEARINGS = frozenset(
     name for name, row in TABLE.items()
     if CHANNELS[name].is_load and row[Kind.PLACE] in (Dependence.SMOOTH, Dependence.BENT)
 )  # fmt: skip
-# what an uneven speed leaves of these is not additive
+# not additive at an uneven speed
 _OF_EVEN_SPEED = (Dependence.MASSES, Dependence.SHIFT, Dependence.SWING)
 
 
 def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
-    """Return how a channel depends on one kind of decision of a problem; UNKNOWN where nobody has said."""
+    """Return the dependence of a channel on one kind of decision of a problem; UNKNOWN by default."""
     if CHANNELS.get(channel.name) is not channel:
         return Dependence.UNKNOWN
     found = TABLE.get(channel.name, {}).get(kind, Dependence.UNKNOWN)
@@ -183,27 +183,27 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
 
 
 def kinds_of(problem: Problem) -> frozenset[Kind]:
-    """Return the kinds of what is open."""
+    """Return the kinds of open numbers and choices."""
     stars = [Kind.STAR] if problem.phasing is not None else []
     return frozenset([*stars, *(decision.kind for decision in problem.decisions)])
 
 
 def depends(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool:
-    """Return whether a channel may change with decisions of these kinds; what is UNKNOWN may."""
+    """Return True if a channel may change with decisions of these kinds; UNKNOWN counts."""
     return any(dependence(channel, kind, problem) is not Dependence.NONE for kind in kinds)
 
 
 def is_affine(channel: Channel, kinds: Collection[Kind], problem: Problem) -> bool:
-    """Return whether a channel is affine in decisions of these kinds together, or constant."""
+    """Return True if a channel is affine in decisions of these kinds together, or constant."""
     if {Kind.SHARE, Kind.PISTON} <= set(kinds):
-        # what is reckoned on a geared shaft is a share of what the pistons make
+        # the inertia on a geared shaft is a fraction of that of the pistons
         return not depends(channel, kinds, problem)
     allowed = (Dependence.NONE, Dependence.AFFINE)
     return all(dependence(channel, kind, problem) in allowed for kind in kinds)
 
 
 def shares_gas(problem: Problem) -> bool:
-    """Return whether gas that is felt works between two pistons, of which one may lead."""
+    """Return True if gas between two pistons affects a measure, and one of the pistons has an open lead."""
     names = {shaft for decision in problem.decisions for shaft in decision.keys(Kind.LEAD)}
     parts = problem.engine.slider_cranks
     led = (part for part in parts if part.shaft.name in names)
@@ -211,7 +211,7 @@ def shares_gas(problem: Problem) -> bool:
 
 
 def _moves_carried(problem: Problem) -> bool:
-    """Tell if a bearing carries a shaft whose rotors have open places."""
+    # a bearing carries a shaft whose rotors have open places
     carried = {bearing.shaft.name for bearing in problem.engine.bearings}
     moved = {drive.rotor for decision in problem.decisions for drive in decision.place_drives}
     return any(rotor.shaft.name in carried for rotor in problem.engine.rotors if rotor.name in moved)

@@ -1,7 +1,9 @@
-"""Loads of one design at one operating point: what every channel takes its signal from."""
+"""Loads of a design, and the keys by which measures narrow them."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from laufruhe.machine import Engine, OperatingPoint
@@ -16,16 +18,16 @@ class PointLoads:
     Attributes
     ----------
     wrench
-        On the block, shape (n, 6) (C7).
+        Wrench on the block, shape (n, 6) (C7).
     mount_forces
-        Of the engine on its mounts, shape (n, mounts, 3); None without mounts.
+        Forces of the engine on its mounts, shape (n, mounts, 3); None without mounts.
     mount_travel
-        Displacement of the engine at them, shape (n, mounts, 3) [m]; None where rigid.
+        Displacement of the engine at its mounts, shape (n, mounts, 3) [m]; None for rigid mounts.
     moving
-        The slider-cranks and rotors that make all this, for loads inside the crankcase; None where
-        the wrench alone is known.
+        Engine whose slider-cranks and rotors make these loads, for loads inside the crankcase; None if the wrench alone
+        is known.
     fidelity
-        What of the physics was kept.
+        Fidelity of the model.
     """
 
     point: OperatingPoint
@@ -34,3 +36,55 @@ class PointLoads:
     mount_travel: Spectrum | None = None
     moving: Engine | None = None
     fidelity: Fidelity = EXACT
+
+
+@dataclass(frozen=True, eq=False)
+class EvaluatedDesign:
+    """A design with its loads at every operating point."""
+
+    engine: Engine
+    fidelity: Fidelity
+    loads: tuple[PointLoads, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasureQuery:
+    """Keys that narrow a channel.
+
+    Attributes
+    ----------
+    at, points, rotors, cases
+        Names of the places, operating points, rotors and load cases that count; all when None. Places are mounts,
+        bearings, cylinders or sections of the crankshaft, depending on the channel.
+    orders
+        Orders of crank speed that count; all when None.
+    direction_weights
+        Factors on the components of a force before its length is taken.
+    motions
+        Motions that should each have a mode of their own; all when None.
+    frequency
+        Lower and upper bound of the wanted natural frequency about the torque-roll axis [Hz].
+    wanted
+        Energy share of a motion in its own mode that suffices.
+    alternating
+        True if the mean of a load over the cycle is left out (M7).
+    """
+
+    at: tuple[str, ...] | None = None
+    points: tuple[str, ...] | None = None
+    rotors: tuple[str, ...] | None = None
+    cases: tuple[str, ...] | None = None
+    orders: tuple[float, ...] | None = None
+    direction_weights: tuple[float, float, float] | None = None
+    motions: tuple[str, ...] | None = None
+    frequency: tuple[float, float] = (0.0, math.inf)
+    wanted: float = 1.0
+    alternating: bool = False
+
+    def counts_point(self, point: OperatingPoint) -> bool:
+        """Return True if an operating point counts."""
+        return self.points is None or point.name in self.points
+
+    def places(self, names: Sequence[str]) -> list[int]:
+        """Return the indices of the names that count as places."""
+        return [k for k, name in enumerate(names) if self.at is None or name in self.at]

@@ -1,8 +1,7 @@
-"""Measures: what a problem minimises and limits, a norm of a channel (P1).
+"""Measures: norms of channels that a problem minimises and limits (P1).
 
-Objective and limits are the same thing. A measure of loads or masses is a norm of rows
-that are affine in the unbalances, so the same few lines evaluate it, optimise it and
-prove it.
+A measure of loads or masses is a norm of rows that are affine in the unbalances, so the same few lines evaluate it,
+optimise it and prove it.
 """
 
 from __future__ import annotations
@@ -21,68 +20,33 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import MEAN, NORMS, Grid, Norm
 from laufruhe.numerics.spectrum import BEHIND, Spectrum, orders_equal
 from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Channel, LoadChannel, MassChannel, is_at_mounts
-from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.loads import MeasureQuery, PointLoads
 
 
 @dataclass(frozen=True)
-class Measure:
-    """One number of a design.
+class Measure(MeasureQuery):
+    """A number of a design: a norm of a channel, narrowed by keys.
 
     Attributes
     ----------
     channel
-        What is measured.
+        Quantity that is measured.
     norm
-        How a load is put together over angle, places and operating points: the mean
-        over all, the largest, or the root mean square over all.
-    at, points, rotors
-        Names of the places, operating points and rotors that count; all when None. Places are
-        mounts, bearings, cylinders or sections of the crankshaft, as the channel has them.
-    orders
-        Orders of crank speed that count; all when None.
-    direction_weights
-        Factors on the components of a force before its length is taken.
-    motions
-        That are to have a mode of their own; all when None.
-    frequency
-        Least and largest natural frequency about the torque-roll axis that is wanted [Hz].
-    cases
-        Names of the load cases that count; all when None.
-    wanted
-        Share of a motion in a mode of its own that is enough.
-    alternating
-        Whether the mean of a load over the cycle is left out (M7).
+        Norm of a load over angles, places and operating points.
     """
 
     channel: Channel
     norm: Norm = MEAN
-    at: tuple[str, ...] | None = None
-    points: tuple[str, ...] | None = None
-    rotors: tuple[str, ...] | None = None
-    orders: tuple[float, ...] | None = None
-    direction_weights: tuple[float, float, float] | None = None
-    motions: tuple[str, ...] | None = None
-    frequency: tuple[float, float] = (0.0, math.inf)
-    wanted: float = 1.0
-    cases: tuple[str, ...] | None = None
-    alternating: bool = False
 
     @property
     def name(self) -> str:
-        """As a report prints it."""
+        """Name in reports."""
         part = "alternating " if self.alternating else ""
         text = f"{self.norm.name} {part}{self.channel}" if self.is_load else str(self.channel)
         if self.orders is not None:
             text += " of order " + ", ".join(f"{order:g}" for order in self.orders)
-        if self.motions is not None:
-            text += " of " + ", ".join(self.motions)
-        if self.at is not None:
-            text += " on " + ", ".join(self.at)
-        if self.points is not None:
-            text += " at " + ", ".join(self.points)
-        if self.cases is not None:
-            text += " under " + ", ".join(self.cases)
-        return text
+        narrowed = {" of ": self.motions, " on ": self.at, " at ": self.points, " under ": self.cases}
+        return text + "".join(word + ", ".join(names) for word, names in narrowed.items() if names is not None)
 
     @property
     def unit(self) -> str:
@@ -91,95 +55,82 @@ class Measure:
 
     @property
     def is_load(self) -> bool:
-        """Whether it is of a signal over the cycle."""
+        """True for a norm of a signal over the cycle."""
         return self.channel.is_load
 
     @property
     def is_mass(self) -> bool:
-        """Whether it adds up masses."""
+        """True for a sum of masses."""
         return self.channel.is_mass
 
     @property
     def is_mounting(self) -> bool:
-        """Whether it is a number of a block on its mounts and no norm."""
+        """True for a number of a block on its mounts."""
         return self.channel.is_mounting
 
     @property
     def load(self) -> LoadChannel:
-        """The channel of a load."""
+        """Channel of a load."""
         if not isinstance(self.channel, LoadChannel):
             raise TypeError(f"{self.name} is no load")
         return self.channel
 
     @property
     def on_mounts(self) -> bool:
-        """Tell if it is of the force or the travel of each mount."""
+        """True for the force or the travel of each mount."""
         return is_at_mounts(self.channel)
 
     @property
     def is_inside(self) -> bool:
-        """Tell if it is of a load inside the crankcase."""
+        """True for a load inside the crankcase."""
         return self.is_load and not self.load.of_wrench
 
     @property
     def feels_gas(self) -> bool:
-        """Whether gas loads it, or what it is a number of."""
+        """True if gas contributes to it."""
         if self.is_load:
             return self.load.feels_gas
         channel = self.channel
         return channel.is_flywheel or bool(channel.simulation) or (channel.is_number and channel.of_loads)
 
     @property
-    def feels_order(self) -> bool:
-        """Whether it changes with the firing order of one star."""
-        return self.is_load and self.load.feels_order
-
-    @property
     def is_told_apart(self) -> bool:
-        """Whether it is a number of what drives the crankshaft's twist, that no sum over the cylinders gives."""
+        """True for a number of the crankshaft's twist, which no sum over the cylinders gives."""
         return self.channel.of_loads and self.channel.is_number and not self.is_mounting
 
     @property
     def lever(self) -> int | None:
-        """Power of a throw's place that its loads grow with; None where they do not add up by places alone."""
+        """Power of a throw's position that its loads grow with; None if loads do not add up by positions alone."""
         return self.load.lever if self.is_load else None
 
-    def counts_point(self, point: OperatingPoint) -> bool:
-        """Whether an operating point counts."""
-        return self.points is None or point.name in self.points
-
     def shares(self, points: Sequence[OperatingPoint]) -> Array:
-        """Weight of every operating point, shape (points,); zero where it does not count, one in all."""
+        """Return the weight of every operating point, shape (points,); they add up to one, zero does not count."""
         weights = [p.weight if self.counts_point(p) else 0.0 for p in points]
         return np.array(weights) / (sum(weights) or math.nan)
 
     def counted(self, orders: Sequence[float] | Array) -> NDArray[np.bool_]:
-        """Which orders of crank speed count, shape of `orders`."""
+        """Return the mask of orders of crank speed that count, shape of `orders`."""
         counts = np.ones(np.shape(orders), dtype=bool) if self.orders is None else orders_equal(orders, self.orders)
         return counts & ~orders_equal(orders, 0.0) if self.alternating else counts
 
     @property
     def counts_mean(self) -> bool:
-        """Tell if the mean of a load over the cycle is a part of it."""
+        """True if the mean of a load over the cycle is a part of it."""
         return self.is_load and bool(self.counted([0.0])[0])
 
     @property
     def of_all_orders(self) -> Measure:
-        """The measure of the whole load, its mean included."""
+        """Measure of the whole load, its mean included."""
         return replace(self, orders=None, alternating=False)
 
     def signal(self, loads: PointLoads, engine: Engine) -> Spectrum:
-        """What counts of a load at an operating point, shape (n, places, d)."""
+        """Return the part of a load that counts at an operating point, shape (n, places, d)."""
         return selected(self, self.load.signal(loads), engine)
-
-    def places(self, names: Sequence[str]) -> list[int]:
-        """Of the places that count among all of these names."""
-        return [k for k, name in enumerate(names) if self.at is None or name in self.at]
 
 
 @dataclass(frozen=True)
 class Term:
-    """One weighted part of the objective."""
+    """A weighted term of the objective."""
 
     measure: Measure
     weight: float = 1.0
@@ -187,12 +138,12 @@ class Term:
 
 @dataclass(frozen=True)
 class Rank:
-    """One of several objectives in order: it is least among the designs that are best by those before it.
+    """An objective in order of priority, minimised among the optima of those before it.
 
     Attributes
     ----------
     within
-        Share by which those after it may exceed its least value.
+        Relative excess over its minimum that later objectives may cause.
     """
 
     terms: tuple[Term, ...]
@@ -210,7 +161,7 @@ class Limit:
     outside: tuple[float, float] | None = None
 
     def room(self, value: float) -> tuple[float, float, str]:
-        """Relative distance inside the nearest side, negative outside; that side, and its sense (E15)."""
+        """Return the relative slack to the nearest side, negative outside; that side [SI], and its sense (E15)."""
         sides = []
         if self.minimum > -math.inf:
             sides.append((value - self.minimum, self.minimum, "at least"))
@@ -223,7 +174,7 @@ class Limit:
 
 
 Side: TypeAlias = tuple[Limit, str]
-"""A limit, and which of its sides: "at most" or "at least"."""
+"""A limit and one of its sides: "at most" or "at least"."""
 
 MEAN_MOUNT_FORCE = Measure(MOUNT_FORCE)
 
@@ -231,12 +182,12 @@ MEASURES: Mapping[str, tuple[Channel, Norm]] = {
     **{f"{norm} {c}": (c, NORMS[norm]) for c in CHANNELS.values() for norm in c.norms},
     **{name: (channel, MEAN) for name, channel in CHANNELS.items() if not channel.is_load},
 }
-"""Every measure by the name that files and reports call it."""
+"""Measures by their names in files and reports."""
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """The vectors whose norm a measure is (P1), shape (k, d), and where they stand."""
+    """Vectors whose norm is a measure (P1), shape (k, d), and the grid they lie on."""
 
     norm: Norm
     vectors: Array
@@ -244,7 +195,7 @@ class Rows:
 
     @property
     def value(self) -> float:
-        """The measure [SI]."""
+        """Value of the measure [SI]."""
         return self.norm.value(self.grid, self.vectors)
 
 
@@ -252,22 +203,22 @@ def load_rows(
     measure: Measure, points: Sequence[OperatingPoint], signals: Sequence[Spectrum], engine: Engine, samples: int,
     bends: Sequence[Array] | None = None,
 ) -> Rows:  # fmt: skip
-    """Rows of a load at equal steps of its period, and of a peak where it bends.
+    """Return the rows of a load at equal steps of its period, and of a peak at its kinks.
 
     Parameters
     ----------
     signals
-        Per point what the channel measures, shape (n, places, d), all of one base.
+        Signal of the channel at every point, shape (n, places, d), all with one base order.
     engine
-        Whose mounts, bearings or cylinders stand along the second axis.
+        Engine whose mounts, bearings or cylinders lie along the second axis.
     samples
-        Steps over the period of the signals.
+        Number of samples over the period of the signals.
     bends
-        Per point as many angles [rad]; those of `bends_of` when left out.
+        Angles of kinks at every point [rad], as many at each; by default those of `bends_of`.
 
     Returns
     -------
-    Rows of (points, places, samples and bends) in that order; weights add up to one.
+    Rows of (points, places, samples and kinks) in that order; weights add up to one.
     """
     blocks, weights = [], []
     bends = bends_of(measure, signals, engine) if bends is None else bends
@@ -279,7 +230,7 @@ def load_rows(
             values = counted.series.sample(samples)
         else:
             values = np.concatenate([counted.sample(samples, BEHIND), counted.values(own)])
-        # an engine may lack what is named: then it has no load there
+        # an engine without the named places has no load there
         if not values.shape[1]:
             continue
         rows = values.swapaxes(0, 1).reshape(-1, values.shape[-1])
@@ -288,24 +239,24 @@ def load_rows(
     if not blocks:
         return Rows(measure.norm, np.zeros((1, 1)), Grid(np.ones(1), 1))
     count = len(bends[0])
-    # of one block no copy is needed
+    # one block needs no copy
     rows, shares = (blocks[0], weights[0]) if len(blocks) == 1 else (np.concatenate(blocks), np.concatenate(weights))
     return Rows(measure.norm, rows, Grid(shares, samples + count, count, len(blocks)))
 
 
 def bends_of(measure: Measure, signals: Sequence[Spectrum], engine: Engine) -> list[Array]:
-    """Angles at which a peak may stand between any steps, as many for every operating point (L5a)."""
+    """Return the angles of kinks [rad] where a peak may stand, as many for every operating point (L5a)."""
     if measure.norm.refinement == 1:
         return [np.zeros(0)] * len(signals)
-    found = [selected(measure, signal, engine).bends for signal in signals]
-    most = max(map(len, found))
-    return [np.resize(own, most) if len(own) else np.zeros(most) for own in found]
+    kinks = [selected(measure, signal, engine).bends for signal in signals]
+    count = max(map(len, kinks))
+    return [np.resize(own, count) if len(own) else np.zeros(count) for own in kinks]
 
 
 def selected(measure: Measure, signal: Spectrum, engine: Engine) -> Spectrum:
-    """The places and orders of a signal (n, places, d) that count, its directions weighted.
+    """Return the places and orders of a signal (n, places, d) that count, its directions weighted.
 
-    Where places are added up, so many times what each has: a mean over them is then their sum.
+    Signals of places that add up are multiplied by their number: the mean over them is then their sum.
     """
     if measure.at is not None:
         signal = signal.each(lambda values: values[:, measure.places(measure.load.places(engine)), :])
@@ -325,19 +276,19 @@ def _roles(measure: Measure) -> tuple[Role, ...]:
 
 
 def counted_rotors(measure: Measure, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
-    """The rotors whose masses a measure adds up."""
+    """Return the rotors whose masses a measure adds up."""
     roles = _roles(measure)
     return tuple(r for r in rotors if (r.role in roles if measure.rotors is None else r.name in measure.rotors))
 
 
 def counted_parts(measure: Measure, parts: Sequence[SliderCrank]) -> list[float]:
-    """The weights of mechanisms that a measure adds up: of all, or none where rotors are named [kg]."""
+    """Return the counterweights of mechanisms that a measure adds up [kg]; none if it names rotors."""
     counts = Role.COUNTERWEIGHT in _roles(measure) and measure.rotors is None
     return [mass for part in parts if counts and (mass := part.counterweight_mass) is not None]
 
 
 def mass_rows(measure: Measure, rotors: Sequence[Rotor], parts: Sequence[SliderCrank] = ()) -> Rows:
-    """Rows U / radius of the counted rotors, and those of mechanisms, shape (rows, 2) [kg]; of none one of nothing."""
+    """Return rows U / radius of the counted rotors and counterweights, shape (rows, 2) [kg]; a zero row for none."""
     counted = counted_rotors(measure, rotors)
     vectors = [[r.unbalance.real / radius_of(r), r.unbalance.imag / radius_of(r)] for r in counted]
     vectors += [[mass, 0.0] for mass in counted_parts(measure, parts)]
@@ -345,7 +296,7 @@ def mass_rows(measure: Measure, rotors: Sequence[Rotor], parts: Sequence[SliderC
 
 
 def radius_of(rotor: Rotor) -> float:
-    """Radius of a rotor whose mass is limited."""
+    """Return the radius of a rotor whose mass is limited [m]."""
     if rotor.radius is None:
         raise ModelError(f"the mass of '{rotor.name}' counts, so it needs a radius")
     return rotor.radius

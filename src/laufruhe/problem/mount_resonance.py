@@ -1,4 +1,4 @@
-"""A design as given on a resonance that nothing damps, with mounts open: it has no finite loads, others have."""
+"""Designs as given on an undamped resonance, with open mounts: other mounts have finite loads."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.problem import Problem
 
-# of the way between the bounds of what is open: places that no two resonances share
+# fractions of the way between bounds: irregular, so that not all lie on resonances
 _PLACES = (0.5, 0.38, 0.71, 0.17, 0.93)
 
 
 def evaluate_start(problem: Problem) -> Evaluation:
-    """The design that a search of mounts starts from; it alone may stand on a resonance that nothing damps.
+    """Evaluate the start of a search of mounts, which may have an undamped resonance.
 
     Raises
     ------
     ModelError
-        As `evaluate`; where no mount is open on a resonance as well, for there is no way off it.
+        As `evaluate`, and on a resonance without open mounts.
     """
     try:
         return evaluate(problem)
@@ -47,12 +47,12 @@ def evaluate_start(problem: Problem) -> Evaluation:
 
 
 def off_resonance(problem: Problem) -> Problem:
-    """The problem with its mounts as given, or elsewhere within their bounds where these stand on a resonance.
+    """Return the problem with its mounts as given, or elsewhere within their bounds if these are in resonance.
 
     Raises
     ------
     ResonanceError
-        If every place tried stands on one: what is open does not move it.
+        If all tried mounts are in resonance.
     """
     if not evaluate_start(problem).resonance:
         return problem

@@ -1,38 +1,37 @@
-"""What of an objective is nothing: a rounding of loads that cancel (P6)."""
+"""Numerical zero of an objective: the rounding error of loads that cancel (P6)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Engine, Mount
+from laufruhe.machine import Engine
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
 ROUNDING = 1e-9
-"""Share of what cancels that a sum of loads is taken for zero below."""
+"""Fraction of cancelling loads below which their sum counts as zero."""
 OF_ORDERS = 1e-12
-"""Share of all orders of a part that one of them is taken for zero below: they are told from one signal."""
+"""Fraction of all orders of a part below which one order counts as zero: they come from one signal."""
 SAMPLES = 96
-"""Steps over the cycle at which a size is taken."""
+"""Number of samples over the cycle for these sizes."""
 
 
 def nothing_of(problem: Problem, engine: Engine | None = None) -> float:
-    """Objective that counts as zero [SI]: a rounding of the parts of an engine, each alone, added up.
+    """Return the objective that counts as zero [SI]: the rounding error of the sum over an engine's parts.
 
-    A balanced engine has an objective of its own size no more; its parts still have theirs. A part that has nothing of
-    an order has its other orders, which cancel there over the cycle.
+    The objective of a balanced engine gives no scale, so that of each part alone is taken. A part without a load of
+    some order still has its other orders, which cancel in that order over the cycle.
 
     Parameters
     ----------
     problem
-        What is minimised.
+        Objective, operating points and fidelity.
     engine
-        On the mounts that are meant; that of the problem as given when left out.
+        Engine on its mounts; by default that of the problem as given.
     """
     engine = problem.engine if engine is None else engine
     return _nothing(Problem("", "", engine, problem.points, objective=problem.objective, fidelity=problem.fidelity))
@@ -40,50 +39,42 @@ def nothing_of(problem: Problem, engine: Engine | None = None) -> float:
 
 @lru_cache(maxsize=32)
 def _nothing(problem: Problem) -> float:
-    """Return the objective of the problem's own engine that counts as zero; many ask for that of one design."""
-    # on mounts that damp all modes: a resonance would make a size of its own
-    mounts = tuple(mount.each(_lossy) for mount in problem.engine.mounts)
-    engine = replace(problem.engine, mounts=mounts)
-    # the crank turns evenly: what one part alone does to its speed is not asked
+    # mounts that damp all modes: a resonance would make a size of its own
+    springs = [
+        mount.each(lambda spring: replace(spring, loss_factor=max(spring.loss_factor, 1.0)))
+        for mount in problem.engine.mounts
+    ]
+    engine = replace(problem.engine, mounts=tuple(springs))
+    # at an even speed: the effect of one part on the speed does not count
     even = replace(problem, engine=engine, fidelity=replace(problem.fidelity, crank_inertia=math.inf))
+    total = _sum_of_parts(even)
     whole = replace(
-        even, objective=tuple(replace(term, measure=_of_all_orders(term.measure)) for term in even.objective)
+        even,
+        objective=tuple(
+            replace(term, measure=term.measure.of_all_orders if term.measure.is_load else term.measure)
+            for term in even.objective
+        ),
     )
-    total = sum(_alone(even, part) for part in _parts(engine))
     if whole.objective != even.objective:
-        total += OF_ORDERS / ROUNDING * sum(_alone(whole, part) for part in _parts(engine))
-    total += sum(term.weight * _own(term.measure, engine) for term in problem.objective)
+        total += OF_ORDERS / ROUNDING * _sum_of_parts(whole)
+    for term in problem.objective:
+        if term.measure.is_mass:
+            moving = sum(part.reciprocating_mass + part.rotating_mass for part in engine.slider_cranks)
+            total += term.weight * moving
+        else:
+            total += term.weight * term.measure.channel.size(engine)
     return ROUNDING * total
 
 
-def _of_all_orders(measure: Measure) -> Measure:
-    return measure if not measure.is_load else measure.of_all_orders
-
-
-def _lossy(spring: Mount) -> Mount:
-    return replace(spring, loss_factor=max(spring.loss_factor, 1.0))
-
-
-def _parts(engine: Engine) -> Iterator[Engine]:
-    """Engines of one slider-crank or one rotor each."""
-    for part in engine.slider_cranks:
-        yield replace(engine, slider_cranks=(part,), rotors=())
-    for rotor in engine.rotors:
-        if rotor.unbalance != 0.0:
-            yield replace(engine, slider_cranks=(), rotors=(rotor,))
-
-
-def _alone(problem: Problem, part: Engine) -> float:
-    try:
-        found = evaluate(problem, part, min(problem.fidelity.samples, SAMPLES))
-        return sum(term.weight * found.value(term.measure) for term in problem.load_terms if not term.measure.is_mass)
-    except ModelError:
-        # alone it drives what no mount carries
-        return 0.0
-
-
-def _own(measure: Measure, engine: Engine) -> float:
-    """Size of what is minimised that is no load: masses beside those that move, and what a channel says of itself."""
-    if measure.is_mass:
-        return sum(part.reciprocating_mass + part.rotating_mass for part in engine.slider_cranks)
-    return measure.channel.size(engine)
+def _sum_of_parts(problem: Problem) -> float:
+    """Return the sum of the objectives of every slider-crank and every rotor alone [SI]."""
+    engine, total = problem.engine, 0.0
+    parts = [replace(engine, slider_cranks=(part,), rotors=()) for part in engine.slider_cranks]
+    parts += [replace(engine, slider_cranks=(), rotors=(r,)) for r in engine.rotors if r.unbalance != 0.0]
+    for part in parts:
+        # a part alone may drive a direction that no mount carries
+        with suppress(ModelError):
+            alone = evaluate(problem, part, min(problem.fidelity.samples, SAMPLES))
+            terms = (term for term in problem.load_terms if not term.measure.is_mass)
+            total += sum(term.weight * alone.value(term.measure) for term in terms)
+    return total

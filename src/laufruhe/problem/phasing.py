@@ -1,4 +1,4 @@
-"""What of throws, firing order, banks and shafts is open (S6-S10). No solver in here."""
+"""Open throws, firing orders, banks and shafts (S6-S10)."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from laufruhe.machine.layouts import Layout, even_throws
 P = TypeVar("P")
 
 SOONEST = 1e-8
-"""What fires sooner after another fires with it [rad]."""
+"""Firing interval below which two cylinders count as firing together [rad]."""
 _MOST_PERMUTED = 7
 _EVEN_STARS = 3
 
 
 class Method(StrEnum):
-    """How the discrete part is decided."""
+    """Method of deciding the discrete part."""
 
     AUTO = "auto"
     SEARCH = "search"
@@ -31,7 +31,7 @@ class Method(StrEnum):
 
 
 class OrderCriterion(StrEnum):
-    """What firing orders of one star are ranked by."""
+    """Criterion that ranks firing orders of one star."""
 
     ROLL_MOMENT = "roll moment"
     NEIGHBOURS = "neighbours"
@@ -46,36 +46,36 @@ class Intervals:
     most: float
 
     def holds(self, intervals: Sequence[float], slack: float = 1e-7) -> bool:
-        """Whether all of them lie within the bounds."""
+        """Return True if all intervals lie within the bounds."""
         return min(intervals) >= self.least - slack and max(intervals) <= self.most + slack
 
     @property
     def shown(self) -> str:
-        """In words."""
+        """Text of the bounds."""
         return f"{math.degrees(self.least):g} to {math.degrees(self.most):g} deg"
 
     @property
     def forbid_unevenness(self) -> bool:
-        """Whether only equal intervals are left."""
+        """True if the bounds allow equal intervals only."""
         return self.most - self.least <= 1e-9
 
 
 @dataclass(frozen=True)
 class Candidate:
-    """Throws, firing order, banks and shafts of one design, everything else open as before.
+    """Throws, firing order, banks and shafts of one design; all other open numbers stay open.
 
     Attributes
     ----------
     throws
-        [rad] (C3).
+        Angles [rad] (C3).
     firing_order
-        Cylinder numbers; None leaves the firing to the first dead centres.
+        Cylinder numbers; None lets each cylinder fire at its first dead centre.
     bank_angle, split_pin
-        [rad]; None where the layout has none.
+        Angles [rad]; None if the layout has none.
     left_out
         Names of the optional shafts that are not built.
     without_gas
-        Whether gas is left out, for parts of an engine that could not run.
+        True if gas is left out, for parts of an engine that could not run.
     """
 
     throws: tuple[float, ...]
@@ -88,20 +88,20 @@ class Candidate:
 
 @dataclass(frozen=True)
 class ShaftChoice:
-    """Which optional shafts may be built together (S10).
+    """Sets of optional shafts that may be built together (S10).
 
     Attributes
     ----------
     optional
-        Sets of shafts that are built together or not at all: their unbalances are coupled.
+        Sets of shafts with coupled unbalances, built together or not at all.
     masses
-        Of each set, its unbalances not included [kg].
+        Mass of each set without its unbalances [kg].
     most
-        Shafts that may be built; infinite when not limited.
+        Largest number of shafts; infinite without a limit.
     most_mass
-        [kg].
+        Largest mass of the shafts [kg].
     clashes
-        Sets, one or several, that may not be built together for where they stand.
+        Groups of sets that collide if built together.
     """
 
     optional: tuple[tuple[str, ...], ...] = ()
@@ -112,18 +112,18 @@ class ShaftChoice:
 
     @property
     def allowed(self) -> tuple[tuple[int, ...], ...]:
-        """Every choice of the sets that keeps the limits."""
+        """Choices of sets that satisfy the limits."""
         count = len(self.optional)
         every = (tuple(k for k in range(count) if code >> k & 1) for code in range(1 << count))
         return tuple(built for built in every if self.allows(built))
 
     @property
     def largest(self) -> tuple[tuple[int, ...], ...]:
-        """Those of the allowed choices that nothing can be added to: a shaft that is built may carry nothing."""
+        """Maximal allowed choices; a shaft that is built may carry no unbalance."""
         return tuple(b for b in self.allowed if not any(set(b) < set(other) for other in self.allowed))
 
     def allows(self, built: Sequence[int]) -> bool:
-        """Whether these sets keep the limits on number and mass, and have room beside each other."""
+        """Return True if these sets satisfy the limits of number and mass, and do not collide."""
         number = sum(len(self.optional[k]) for k in built)
         if any(set(clash) <= set(built) for clash in self.clashes):
             return False
@@ -139,35 +139,35 @@ class PhasingOf(Generic[P]):
     cycle
         Two- or four-stroke.
     layout
-        Of bank angle [rad] and split pin [rad].
+        Function that returns the layout of a bank angle [rad] and a split pin angle [rad].
     cylinders
         Number of cylinders.
     throws
-        Given throws [rad]; None when the star is open.
+        Given throws [rad]; None if the star is open.
     throw_bounds
-        Bounds of every throw [rad] where they are open one by one, else None.
+        Bounds of every throw [rad] if these are open one by one, else None.
     firing_order
-        Given order; None when it is open.
+        Given order; None if it is open.
     bank, split
-        Bounds [rad]; equal when given, None where the layout has none.
+        Bounds [rad], equal for a given angle; None if the layout has none.
     intervals
         Bounds of the firing intervals.
     steps
-        Steps of a turn that the user wants throws to stand on; None for those of even firing.
+        Number of steps of a turn for throws; None for those of even firing.
     shafts
-        The choice of shafts.
+        Optional shafts.
     best
-        How many stars are ranked.
+        Number of stars in the ranking.
     criteria
-        What firing orders are ranked by, the first counting most.
+        Criteria that rank firing orders, the most important first.
     time_limit
-        Of the search [s].
+        Time limit of the search [s].
     method
-        Of the search.
+        Method of the search.
     thorough
-        Whether throws are sought by boxes too, and with less unevenness than is allowed for what it is worth.
+        True if throws are also searched by boxes, and with less unevenness than allowed to show its worth.
     realise
-        The problem with a candidate's numbers in it.
+        Function that returns the problem of a candidate.
     """
 
     cycle: Cycle
@@ -189,68 +189,65 @@ class PhasingOf(Generic[P]):
     thorough: bool = True
 
     def layout_of(self, candidate: Candidate) -> Layout:
-        """The layout of a design."""
+        """Return the layout of a design."""
         return self.layout(candidate.bank_angle, candidate.split_pin)
 
     def without(self, built: Sequence[int]) -> tuple[str, ...]:
-        """Optional shafts of the sets that are not built."""
+        """Return the optional shafts of the sets that are not built."""
         return tuple(name for k, names in enumerate(self.shafts.optional) if k not in built for name in names)
 
     def built(self, candidate: Candidate) -> tuple[str, ...]:
-        """Optional shafts that a design has."""
+        """Return the optional shafts of a design."""
         return tuple(name for names in self.shafts.optional for name in names if name not in candidate.left_out)
 
     @property
     def shares_throws(self) -> bool:
-        """Whether several cylinders work on one throw."""
+        """True if several cylinders share a throw."""
         return len(self.layout(*self.least_geometry).throw_positions) < self.cylinders
 
     @property
     def least_geometry(self) -> tuple[float | None, float | None]:
-        """Bank angle and split pin at their lower bounds [rad]: as given where they are not open."""
+        """Lower bounds of bank angle and split pin [rad]; None if the layout has none."""
         return (None if self.bank is None else self.bank[0]), (None if self.split is None else self.split[0])
 
     @property
     def even_interval(self) -> float:
-        """Crank angle between firings when all are equal [rad]."""
+        """Crank angle between firings at even firing [rad]."""
         return self.cycle.angle / self.cylinders
 
     @property
     def continuous(self) -> bool:
-        """Whether throws may leave the even steps."""
+        """True if throws may leave the even steps."""
         return self.throw_bounds is not None or (self.throws is None and not self.intervals.forbid_unevenness)
 
     @property
     def opened(self) -> tuple[bool, bool]:
-        """Whether the bank angle and split pins are open."""
+        """True for an open bank angle, and for open split pins."""
         bank, split = (pair is not None and pair[0] < pair[1] for pair in (self.bank, self.split))
         return bank, split
 
     @property
     def open_names(self) -> tuple[str, ...]:
-        """What is open, for the screen."""
-        found = (
+        """Names of the open parts."""
+        names = (
             ("throws", self.throws is None),
             ("firing order", self.firing_order is None),
             ("bank angle", self.opened[0]),
             ("split pin angle", self.opened[1]),
             (f"which of {counted(sum(map(len, self.shafts.optional)), 'shaft')} are built", bool(self.shafts.optional)),
         )
-        return tuple(name for name, is_open in found if is_open)
+        return tuple(name for name, is_open in names if is_open)
 
     def star(
-        self,
-        steps: Sequence[int],
-        phases: int,
-        geometry: tuple[float | None, float | None],
+        self, steps: Sequence[int], phases: int, geometry: tuple[float | None, float | None],
         left_out: tuple[str, ...] = (),
-    ) -> Candidate:
-        """The design of an even star, with the first of its firing orders.
+    ) -> Candidate:  # fmt: skip
+        """Return the design of an even star, with the first of its firing orders.
 
         Parameters
         ----------
         steps
-            Of the throws, of `phases` to a turn.
+            Steps of the throws, `phases` to a turn.
         geometry
             Bank angle and split pin [rad].
         left_out
@@ -263,17 +260,14 @@ class PhasingOf(Generic[P]):
     def fired(
         self, slots: Sequence[int], geometry: tuple[float | None, float | None], left_out: tuple[str, ...] = ()
     ) -> Candidate:
-        """The design whose cylinders, each on a throw of its own, fire in these slots of the cycle (S6, V9)."""
+        """Return the design whose cylinders, each on its own throw, fire in these slots of the cycle (S6, V9)."""
         steps = slot_steps(self.cycle, slots)
         throws = star_throws(self.layout(*geometry), steps, firing_lattice(self.cycle, self.cylinders).steps)
         return Candidate(throws, slot_order(slots), *geometry, left_out)
 
     @property
     def geometries(self) -> tuple[tuple[float | None, float | None], ...]:
-        """Bank angles and split pins between their bounds that let the firing be even (S6).
-
-        With one of the two open there is a finite number; with neither, the given pair.
-        """
+        """Bank angles and split pins between their bounds with even firing (S6): finitely many if one is open."""
         if self.bank is None:
             return ((None, None),)
         split = self.split or (0.0, 0.0)
@@ -290,16 +284,16 @@ class PhasingOf(Generic[P]):
 
 
 def _multiples(step: float, bounds: tuple[float, float], other: float) -> list[float]:
-    """Values between bounds that make a multiple of `step` together with `other`."""
+    # values between bounds whose sums with `other` are multiples of a step
     low = math.ceil((bounds[0] + other) / step - 1e-9)
     high = math.floor((bounds[1] + other) / step + 1e-9)
     return [m * step - other for m in range(low, high + 1)]
 
 
 def bounded_stars(phasing: PhasingOf[Any], layout: Layout) -> list[tuple[float, ...]]:
-    """Throws within their own bounds [rad]: the middle, then the even stars that need to move least to lie there.
+    """Return throws within their bounds [rad]: the middle, then the even stars closest to the bounds.
 
-    Of many cylinders without a firing order the middle alone: they have too many even stars.
+    Many cylinders without a firing order have too many even stars, so the middle is returned alone.
     """
     bounds = phasing.throw_bounds or ()
     if phasing.firing_order is not None:
@@ -314,12 +308,10 @@ def bounded_stars(phasing: PhasingOf[Any], layout: Layout) -> list[tuple[float, 
             even = even_throws(phasing.cycle, layout, order)
         except ModelError:
             continue
-        inside = tuple(_nearest(angle, *pair) for angle, pair in zip(even, bounds, strict=True))
+        inside = tuple(
+            min(max(angle + math.tau * round((0.5 * (low + high) - angle) / math.tau), low), high)
+            for angle, (low, high) in zip(even, bounds, strict=True)
+        )
         moves[inside] = sum(1.0 - math.cos(a - b) for a, b in zip(inside, even, strict=True))
     middle = tuple(0.5 * (low + high) for low, high in bounds)
     return [middle, *sorted(moves, key=lambda star: round(moves[star], 12))[:_EVEN_STARS]]
-
-
-def _nearest(angle: float, low: float, high: float) -> float:
-    turned = angle + math.tau * round((0.5 * (low + high) - angle) / math.tau)
-    return min(max(turned, low), high)

@@ -1,4 +1,4 @@
-"""Numbers that no usual engine has: a decimal point or a unit may be wrong. Asked, and never refused."""
+"""Plausibility warnings about numbers that no usual engine has: a decimal point or a unit may be wrong."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ MOST_SAG, LEAST_SAG = 0.1, 1e-6
 
 
 def doubts(engine: Engine, points: Sequence[OperatingPoint], fires_together: bool = False) -> tuple[Complaint, ...]:
-    """What of an engine is so unusual that its author is asked.
+    """Return warnings about unusual numbers, one for each place.
 
     Parameters
     ----------
     fires_together
-        Whether cylinders are meant to fire at once.
+        True if cylinders are meant to fire at once.
     """
-    found = [*_of_speed(engine, points), *_of_pistons(engine), *_of_rotors(engine), *_of_mounts(engine)]
-    found += [] if fires_together else _fired_together(engine)
-    once: dict[str, Complaint] = {}
-    for one in found:
-        once.setdefault(one.where, one)
-    return tuple(once.values())
+    warnings = [*_of_speed(engine, points), *_of_pistons(engine), *_of_rotors(engine), *_of_mounts(engine)]
+    warnings += [] if fires_together else _of_firing(engine)
+    first: dict[str, Complaint] = {}
+    for warning in warnings:
+        first.setdefault(warning.where, warning)
+    return tuple(first.values())
 
 
 def together(engine: Engine) -> list[list[str]]:
-    """Names of cylinders that fire at one crank angle, group by group."""
+    """Return groups of names of cylinders that fire at one crank angle."""
     fires: dict[float, list[str]] = defaultdict(list)
     for part in engine.cylinders:
         fires[round(float(within(as_turn(part.firing_angle), engine.cycle.turns)), 9)].append(part.name)
@@ -102,7 +102,7 @@ def _of_mounts(engine: Engine) -> Iterator[Complaint]:
         yield Complaint("stiffness of the mounts", "", rule, "check stiffness and mass, N/mm and N/m")
 
 
-def _fired_together(engine: Engine) -> Iterator[Complaint]:
+def _of_firing(engine: Engine) -> Iterator[Complaint]:
     groups = [f"{', '.join(names[:-1])} and {names[-1]}" for names in together(engine)]
     remedy = "give a firing order, or write fires_together = true in [engine] if that is meant"
     if groups:

@@ -1,12 +1,13 @@
-"""A design problem: an engine, what may be decided, what is wanted, what is forbidden."""
+"""A design problem: an engine, open numbers, objective and limits."""
 
 from __future__ import annotations
 
 import html
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import Any, Protocol, TypeAlias, TypeVar
+from functools import partial
+from pathlib import Path as FilePath
+from typing import Any, ClassVar, Protocol, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,29 +16,77 @@ from laufruhe.errors import Complaint, ModelError, counted, wrong_call
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.willans import FrictionTest
-from laufruhe.problem.decision import Decision, Kind, Numbers, moved_numbers
-from laufruhe.problem.drawing import Beside, Rebuild, no_file
-from laufruhe.problem.extra import Extra
+from laufruhe.problem.decision import Decision, Numbers, moved_numbers
 from laufruhe.problem.measure import Limit, Measure, Rank, Term
 from laufruhe.problem.phasing import PhasingOf
 from laufruhe.problem.plausibility import doubts
 from laufruhe.problem.sets import Value
+
+Path: TypeAlias = tuple[str | int, ...]
+"""Address of a number in a problem file: keys, and indices in lists from zero."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """Parts of a problem that follow from numbers of its file."""
+
+    engine: Engine
+    points: tuple[OperatingPoint, ...]
+    decisions: tuple[Decision, ...]
+    mount_numbers: tuple[tuple[float, ...], ...]
+
+
+Rebuild: TypeAlias = Callable[[Mapping[Path, str | float]], Drawing]
+"""Return the drawing of a problem file with other numbers at some addresses."""
+
+
+def no_file(changes: Mapping[Path, str | float]) -> Drawing:
+    """Refuse to draw a problem that was not read from a file."""
+    raise ModelError(f"{', '.join(map(str, changes))} is a number of a problem file, and there is none")
+
+
+def _with_changes(
+    rebuild: Rebuild, earlier: Mapping[Path, str | float], changes: Mapping[Path, str | float]
+) -> Drawing:
+    return rebuild({**earlier, **changes})
+
+
+class Extra:
+    """Request of an extension beyond the drawing: the core evaluates the drawing, a reduction decides the rest.
+
+    Attributes
+    ----------
+    words
+        Name of the request, as a plural or a noun with its article.
+    """
+
+    words: ClassVar[str]
+
+    @property
+    def open_names(self) -> tuple[str, ...]:
+        """Names of the numbers that it decides."""
+        return ()
+
+    def objective_name(self, name: str) -> str:
+        """Return the name of the objective, given that of the drawing."""
+        return name
+
 
 E = TypeVar("E", bound=Extra)
 
 
 @dataclass(frozen=True)
 class Search:
-    """How searches go about what is not convex.
+    """Settings of searches where a problem is not convex.
 
     Attributes
     ----------
     starts, seed
-        The most points that a search starts from, and the seed of those drawn at random.
+        Largest number of start points, and seed of random ones.
     boxes
-        That what is open may be divided into for a proof; as is worth it when None.
+        Largest number of boxes of a proof; None lets the method choose.
     proves
-        Whether what is found is to be proven.
+        True if the result is to be proven.
     """
 
     starts: int = 16
@@ -46,30 +95,30 @@ class Search:
     proves: bool = True
 
     def boxes_or(self, usual: int) -> int:
-        """Return how many boxes are asked for, or the usual number."""
+        """Return the requested number of boxes, or the usual one."""
         return usual if self.boxes is None else self.boxes
 
 
 class Origin(Protocol):
-    """The file of a problem, in which numbers may be changed by name."""
+    """File of a problem, in which numbers may be changed by name."""
 
     @property
-    def file(self) -> tuple[Mapping[str, Any], Path]:
-        """Tables as they were read, and where they stand."""
+    def file(self) -> tuple[Mapping[str, Any], FilePath]:
+        """Tables as they were read, and the path of the file."""
 
     def with_values(self, values: Mapping[str, Any]) -> Problem:
-        """Numbers at other values."""
+        """Return the problem with numbers at other values."""
 
     def opened(self, name: str, low: Any, high: Any, start: Any) -> Problem:
-        """A number left open."""
+        """Return the problem with a number left open."""
 
     def fixed(self, name: str, value: Any) -> Problem:
-        """A number fixed."""
+        """Return the problem with a number fixed."""
 
 
 @dataclass(frozen=True, eq=False)
 class KnownRows:
-    """Rows of a measure that is the largest length of constant + slope x, x the columns of what loads are affine in.
+    """Rows of a measure that is the largest length of constant + slope x, with x the columns that loads are affine in.
 
     Attributes
     ----------
@@ -83,50 +132,50 @@ class KnownRows:
 
 @dataclass(frozen=True, repr=False)
 class Problem:
-    """Everything that a solver and a report need to know.
+    """A design problem as solvers and reports need it.
 
     Attributes
     ----------
     name
-        Of the file, for results.
+        Name of the file, for results.
     title, source, assumptions
-        For the reader of a report.
+        Texts for the reader of a report.
     engine
-        The design as given; open numbers stand at their start.
+        Design as given; open numbers have their start values.
     points
         Operating points.
     decisions
         Open numbers, unbalances before those of the mounts.
     objective
-        Weighted sum of measures to be least.
+        Terms of the weighted sum that is minimised.
     limits
-        What is forbidden.
+        Limits of measures.
     fidelity
-        What of the physics is kept.
-    sharply
-        Whether a gap within the tolerance is closed further where that is cheap beside a command (P10).
+        Fidelity of the model.
     tolerance
         Relative gap at which an optimum counts as proven.
     mount_numbers
-        Of elastic mounts as given: stiffness, loss factor, damping, position, turned angles (E13).
+        Numbers of elastic mounts as given: stiffness, loss factor, damping, position, turned angles (E13).
     search
-        How searches go about what is not convex.
+        Settings of searches.
     phasing
-        What of throws, firing order and the choice of shafts is open; None if nothing is.
+        Open throws, firing order and shafts; None if these are fixed.
     extras
-        What extensions ask beyond the drawing, one of a class.
-    ranks
-        All objectives in order where there are several, `objective` the first of them; else none.
+        Requests of extensions, at most one of a class.
     origin
-        The file that it was read from; None where it was made or changed in code.
+        File of the problem; None if it was made or changed in code.
+    sharply
+        True if a gap within the tolerance is closed further at little cost (P10).
+    ranks
+        Objectives in order of priority, the first equal to `objective`; empty for a single objective.
     fires_together
-        Whether cylinders are meant to fire at once.
+        True if cylinders are meant to fire at once.
     friction
-        Measurements that loads at the brake are made indicated ones by.
+        Friction measurements that turn loads at the brake into indicated loads.
     known_rows
-        Of measures in time, whose largest length is convex in what loads are affine in.
+        Rows of measures in time whose largest length is convex in the unbalances.
     rebuild
-        What gives the drawing of its file with other numbers.
+        Function that draws the file with other numbers.
     """
 
     name: str
@@ -160,7 +209,7 @@ class Problem:
 
     @property
     def summary(self) -> str:
-        """What the problem is about and what of it is open, in one line."""
+        """Description of the problem and its open numbers in one line."""
         engine = self.engine
         numbers = {"mount": engine.mounts, "operating point": self.points, "limit": self.limits}
         parts = [self.name, counted(len(engine.cylinders), "cylinder"), str(engine.cycle)]
@@ -169,23 +218,23 @@ class Problem:
 
     @property
     def open_names(self) -> tuple[str, ...]:
-        """Names of what is open."""
+        """Names of the open numbers and choices."""
         names = self.phasing.open_names if self.phasing is not None else ()
         numbers = (decision.name + (" and angle" if decision.set.width > 1 else "") for decision in self.decisions)
         return (*names, *numbers, *(name for extra in self.extras for name in extra.open_names))
 
     def extra(self, kind: type[E]) -> E | None:
-        """Return what an extension asks of a class; None where it asks nothing."""
+        """Return the request of a class, or None."""
         return next((one for one in self.extras if isinstance(one, kind)), None)
 
     @property
     def drawing(self) -> Problem:
-        """The problem without what extensions ask beyond it."""
+        """Problem without the requests of extensions."""
         return self.changed(extras=()) if self.extras else self
 
     @property
     def doubts(self) -> tuple[Complaint, ...]:
-        """What is so unusual that its author is asked whether it is meant; nothing stops for it."""
+        """Plausibility warnings about unusual numbers, which stop nothing."""
         return doubts(self.engine, self.points, self.fires_together or self.phasing is not None)
 
     @property
@@ -200,12 +249,12 @@ class Problem:
 
     @property
     def start(self) -> tuple[Value, ...]:
-        """Decisions of the design as given."""
+        """Values of the decisions in the design as given."""
         return tuple(decision.start for decision in self.decisions)
 
     @property
     def measures(self) -> tuple[Measure, ...]:
-        """All that is minimised or limited."""
+        """Measures that are minimised or limited."""
         later = (term.measure for rank in self.ranks[1:] for term in rank.terms)
         return (*(term.measure for term in self.objective), *later, *(limit.measure for limit in self.limits))
 
@@ -233,42 +282,37 @@ class Problem:
 
     @property
     def asks_mounts(self) -> bool:
-        """Whether anything of elastic mounts is open or asked."""
+        """True if numbers of elastic mounts are open, minimised or limited."""
         return bool(self.mount_decisions) or any(measure.is_mounting for measure in self.measures)
 
     @property
     def balance(self) -> Problem:
-        """The problem on its mounts as they stand: what is open, wanted and forbidden of loads and masses alone."""
+        """Problem of the unbalances on fixed mounts: objective and limits of loads and masses alone."""
         return replace(
             self, decisions=self.unbalances, objective=self.load_terms, limits=self.load_limits, mount_numbers=()
         )
 
     @property
     def has_gas(self) -> bool:
-        """Whether gas acts at any operating point."""
+        """True if gas acts at any operating point."""
         return any(self.fidelity.gas_of(point) is not None for point in self.points)
 
     @property
     def feels_gas(self) -> bool:
-        """Whether gas loads what is minimised or limited: its roll moment alone, and all where it drives the speed."""
+        """True if gas affects a measure; gas gives a roll moment only, but everything at an uneven speed."""
         return self.has_gas and (any(measure.feels_gas for measure in self.measures) or self.fidelity.is_uneven)
 
     @property
     def feels_order(self) -> bool:
-        """Whether anything asked changes with the firing order of one star: twist, and all inside with gas."""
-        felt = [measure.load for measure in self.measures if measure.feels_order]
+        """True if a measure depends on the firing order of one star: twist, and loads inside the crankcase with gas."""
         if any(measure.is_told_apart for measure in self.measures):
             return True
-        return (self.has_gas and bool(felt)) or not all(load.feels_unbalances for load in felt)
-
-    @property
-    def flywheel_decisions(self) -> tuple[Decision, ...]:
-        """Decisions about the flywheel."""
-        return tuple(decision for decision in self.decisions if decision.kind is Kind.FLYWHEEL)
+        loads = [measure.load for measure in self.measures if measure.is_inside]
+        return (self.has_gas and bool(loads)) or not all(load.feels_unbalances for load in loads)
 
     @property
     def objective_name(self) -> str:
-        """What is minimised, in words; empty where nothing is."""
+        """Name of the objective; empty without one."""
         terms = self.objective
         name = " + ".join(f"{term.weight:g} x {term.measure.name}" for term in terms)
         if len(terms) == 1 and terms[0].weight == 1.0:
@@ -279,26 +323,26 @@ class Problem:
 
     @property
     def objective_unit(self) -> str | None:
-        """SI unit of what is minimised, empty where its terms have several; None where nothing is."""
+        """SI unit of the objective, empty if its terms have several; None without an objective."""
         units = {term.measure.unit for term in self.objective}
         if not units:
             return None
         return units.pop() if len(units) == 1 else ""
 
     def with_values(self, values: Mapping[str, Any]) -> Problem:
-        """The problem with other numbers, by the names that results show, or by paths as studies have them.
+        """Return the problem with other numbers, named as in results or by paths as in studies.
 
-        A number that is open starts there and stays open.
+        An open number starts at its new value and stays open.
 
         Parameters
         ----------
         values
-            As a file has them: `{"front web.mass": "1.2 kg", "engine.rod_ratio": 0.28}`.
+            Names and values as in a file: `{"front web.mass": "1.2 kg", "engine.rod_ratio": 0.28}`.
 
         Raises
         ------
         laufruhe.errors.InputError
-            In the words of a file with that number.
+            If a file with these numbers would be refused.
         """
         if not isinstance(values, Mapping):
             raise wrong_call("values", values, "is no table of names and values", 'write {"engine.rod_ratio": 0.28}')
@@ -307,12 +351,12 @@ class Problem:
         return self._origin.with_values(values)
 
     def open(self, name: str, low: Any, high: Any, start: Any = None) -> Problem:
-        """The problem with one more number open between two bounds; it starts where it stands unless told."""
+        """Return the problem with one more open number; it starts at its present value unless `start` is given."""
         _check_name(name)
         return self._origin.opened(name, low, high, start)
 
     def fix(self, name: str, value: Any = None) -> Problem:
-        """The problem with one number fixed, at a value or where it starts."""
+        """Return the problem with one number fixed, at `value` or at its start."""
         _check_name(name)
         return self._origin.fixed(name, value)
 
@@ -323,7 +367,7 @@ class Problem:
         return self.origin
 
     def changed(self, **changes: Any) -> Problem:
-        """The same problem with other attributes, every design of an open star included."""
+        """Return the problem with other attributes, for every design of an open star too."""
         changes = {"origin": None, **changes}
         if self.phasing is not None:
             realise = self.phasing.realise
@@ -332,13 +376,13 @@ class Problem:
         return replace(self, **changes)
 
     def at(self, fidelity: Fidelity) -> Problem:
-        """The same problem at another fidelity."""
+        """Return the problem at another fidelity."""
         return self.changed(fidelity=fidelity)
 
     def held(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Problem:
-        """Return the problem with decisions, all of them unless some are named, held at these values.
+        """Return the problem with decisions fixed at these values; by default all decisions.
 
-        A number of the file puts the engine, its operating points and what follows of other decisions together anew.
+        For a number of the file, the engine, its operating points and the drives of other decisions are built again.
 
         Raises
         ------
@@ -359,37 +403,37 @@ class Problem:
             decisions=tuple(decision for decision in drawn.decisions if decision.name not in value_of),
         )  # fmt: skip
 
-    def _drawn(self, changes: Mapping[tuple[str | int, ...], str | float]) -> Problem:
-        """The problem as its file draws it with numbers changed; decisions keep their sets, and follow as there."""
+    def _drawn(self, changes: Mapping[Path, str | float]) -> Problem:
+        """Return the problem drawn from its file with other numbers; decisions keep their sets."""
         if not changes:
             return self
-        found = self.rebuild(changes)
-        known = {decision.name: decision for decision in found.decisions}
+        drawing = self.rebuild(changes)
+        known = {decision.name: decision for decision in drawing.decisions}
         for decision in self.decisions:
             if not decision.address_drives and decision.name not in known:
                 raise ModelError(f"{decision.name} is open, and nothing of this engine follows it")
-        if len(found.points) != len(self.points):
+        if len(drawing.points) != len(self.points):
             raise ModelError("another number of operating points follows from an open number; fix it")
         # measures know operating points by name, and a name may be the speed that is open
-        points = tuple(replace(new, name=own.name) for new, own in zip(found.points, self.points, strict=True))
+        points = tuple(replace(new, name=own.name) for new, own in zip(drawing.points, self.points, strict=True))
         decisions = tuple(d if d.address_drives else replace(known[d.name], set=d.set) for d in self.decisions)
         return replace(
-            self, engine=found.engine, points=points, mount_numbers=found.mount_numbers, decisions=decisions,
-            rebuild=Beside(self.rebuild, changes),
+            self, engine=drawing.engine, points=points, mount_numbers=drawing.mount_numbers, decisions=decisions,
+            rebuild=partial(_with_changes, self.rebuild, changes),
         )  # fmt: skip
 
     def design(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Engine:
-        """The engine with decisions, all of them unless some are named, in place of those it was given with."""
+        """Return the engine with decisions at these values; by default all decisions."""
         moved = self.decisions if decisions is None else decisions
         if any(decision.address_drives for decision in moved):
             return self.held(values, moved).engine
         return self.numbers(values, moved).engine(self.engine)
 
     def numbers(self, values: Sequence[Any], decisions: Sequence[Decision] | None = None) -> Numbers:
-        """The numbers of the engine with decisions at these values; symbols do as well."""
+        """Return the numbers of the engine with decisions at these values, which may be symbols."""
         moved = self.decisions if decisions is None else decisions
         on_mounts = any(decision.mount_drives for decision in moved)
-        given = Numbers.of(self.engine, self.mount_numbers if on_mounts else ())
+        given = Numbers.from_engine(self.engine, self.mount_numbers if on_mounts else ())
         return moved_numbers(given, moved, values)
 
 
@@ -399,4 +443,4 @@ def _check_name(name: object) -> None:
 
 
 Phasing: TypeAlias = PhasingOf[Problem]
-"""Of a problem; `realise` gives problems."""
+"""Phasing of a problem; `realise` returns problems."""

@@ -1,4 +1,4 @@
-"""The static part of an objective: the steady reaction to mean loads, which no unbalance can balance (M7)."""
+"""Static part of an objective: the steady reaction to mean loads, which no unbalance can balance (M7)."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from laufruhe.problem.evaluation import Evaluation, objective_value
 from laufruhe.problem.problem import Problem
 
 NEGLIGIBLE = 1e-3
-"""Share of an objective under which its static part is not worth a sentence."""
+"""Fraction of an objective below which its static part is not mentioned."""
 
 
 @dataclass(frozen=True)
 class StaticPart:
-    """An objective of whole loads, of their means alone, and without these.
+    """Objectives of whole loads, of their means alone, and of the loads without their means.
 
     Attributes
     ----------
     whole
-        The objective of the loads as they are [SI].
+        Objective of the whole loads [SI].
     static
-        The objective if only the means over the cycle acted; no share of a sum, since lengths do not add up.
+        Objective of the means over the cycle [SI]; no part of a sum, since lengths do not add up.
     alternating
-        The objective if all but the means acted.
+        Objective of the loads without their means [SI].
     """
 
     whole: float
@@ -31,7 +31,7 @@ class StaticPart:
 
     @property
     def is_floor(self) -> bool:
-        """Tell if the whole is as small as its static part lets it be: a norm is never under that of the mean."""
+        """True if the objective equals its lower bound, the static part: a norm is at least that of the mean."""
         return self.whole <= self.static * (1.0 + NEGLIGIBLE)
 
 

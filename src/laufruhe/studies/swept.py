@@ -15,7 +15,7 @@ from pydantic import Field
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.files import fields as f
-from laufruhe.files.asked import QuantityName
+from laufruhe.files.measures import QuantityName
 from laufruhe.files.study_tables import Axis, CaseTable, SweepTable, axis_of, changed, keys_of
 from laufruhe.present.measures import limits_of, main_load, mount_orders, shaking_orders
 from laufruhe.problem import channels

@@ -17,9 +17,12 @@ import numpy as np
 
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.channels import motion_indices
+from laufruhe.problem.channels import DECOUPLING, motion_indices
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.ranges import SLACK
+
+OF_SHARES = frozenset({DECOUPLING})
+"""Channels of the energy shares of motions in modes."""
 
 # share of a middle that the square of the radius of a ball is at least
 NO_SIZE = 1e-8
@@ -59,7 +62,7 @@ def modes_of(problem: Problem, mounts: OpenMounts) -> tuple[Mode, ...]:
     """By the limits of decoupling, the largest share of every motion; none where places of mounts are open."""
     found: dict[int, float] = {}
     for limit in problem.mount_limits:
-        if limit.measure.channel.of_shares and limit.minimum > 0.0:
+        if limit.measure.channel in OF_SHARES and limit.minimum > 0.0:
             for motion in motion_indices(limit.measure):
                 found[motion] = max(found.get(motion, 0.0), limit.minimum * (1.0 - SLACK))
     return () if mounts.places else tuple(mode_of(mounts.root, *each) for each in found.items())

@@ -11,7 +11,7 @@ import numpy as np
 
 from laufruhe.extensions.replication.expressions import check_among
 from laufruhe.files import fields as f
-from laufruhe.files.scene import QuantityTable, Scene
+from laufruhe.files.measures import QuantityTable, Scene
 from laufruhe.numerics.spectrum import order_amplitude
 from laufruhe.physics.metrics import turning_parts
 from laufruhe.physics.modes import MOTIONS

@@ -12,7 +12,7 @@ import numpy as np
 from laufruhe.extensions.robust.tolerance import AddedDrive
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.extra import Extra
+from laufruhe.problem.problem import Extra
 
 Chosen = tuple[tuple[int, ...], ...]
 """Of every lot the part in each cylinder."""

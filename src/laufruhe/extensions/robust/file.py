@@ -35,8 +35,7 @@ from laufruhe.files.rotors import name_of_unbalance
 from laufruhe.machine import Engine, Rotor
 from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
 from laufruhe.machine.slider_crank import SliderCrank
-from laufruhe.problem.drawing import Path
-from laufruhe.problem.problem import Problem
+from laufruhe.problem.problem import Path, Problem
 
 SIGNS = ("±", "+-", "+/-")
 _TOLERANCE = re.compile(

@@ -29,10 +29,9 @@ from laufruhe.physics.modes import GRAVITY
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.present import picture as p
 from laufruhe.present.numbers import percent
-from laufruhe.problem.drawing import Drawing
 from laufruhe.problem.evaluation import evaluate, over
 from laufruhe.problem.measure import MEAN_MOUNT_FORCE
-from laufruhe.problem.problem import Problem
+from laufruhe.problem.problem import Drawing, Problem
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import NEGLIGIBLE, Text, Verdict, marked_table, number, said

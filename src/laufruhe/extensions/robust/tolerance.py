@@ -18,9 +18,7 @@ import numpy as np
 from laufruhe.machine import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import RotorDrive
-from laufruhe.problem.drawing import Drawing, Path, Rebuild, no_file
-from laufruhe.problem.extra import Extra
-from laufruhe.problem.problem import Problem
+from laufruhe.problem.problem import Drawing, Extra, Path, Problem, Rebuild, no_file
 
 SIGMAS = 3.0
 """Standard deviations of a normal law that the tolerance is; what lies beyond is not built in."""

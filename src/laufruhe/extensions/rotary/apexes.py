@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from laufruhe.extensions.rotary.unit import RotaryUnit
-from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.kinds import Need, NumberChannel
+from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery
 
 ROTORS = Need(
     lambda engine: any(not part.has_rod for part in engine.slider_cranks),
@@ -27,7 +27,7 @@ class ApexChannel(NumberChannel):
 
 
 def _most(name: str, unit: str, power: int, number: Callable[[RotaryUnit], float]) -> ApexChannel:
-    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
+    def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         speeds = [
             at.point.speed for at in evaluation.loads if measure.points is None or at.point.name in measure.points
         ]

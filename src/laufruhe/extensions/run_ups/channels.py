@@ -10,8 +10,8 @@ from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.extensions.run_ups.runs import RunUp, missed_share, point_of, runs_of
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.kinds import Need, NumberChannel
+from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery
 
 RUN = Need(
     lambda engine: engine.extra(Run),
@@ -43,7 +43,7 @@ class RunChannel(NumberChannel):
 
 
 def _most(name: str, unit: str, number: Callable[[RunUp], float], part: Callable[[Response], Array]) -> RunChannel:
-    def values(_: Asked, evaluation: Answered) -> Sequence[float]:
+    def values(_: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         run = evaluation.engine.extra(Run)
         if run is None or not evaluation.loads:
             return (0.0,)

@@ -10,8 +10,8 @@ from typing import Any
 from laufruhe import units
 from laufruhe.extensions.served_page.asked import CRANK, OBJECTIVE, STAR
 from laufruhe.files import edits
-from laufruhe.files.asked import SIDES, limit_name
 from laufruhe.files.complaints import Refused
+from laufruhe.files.measures import SIDES, limit_name
 from laufruhe.problem.problem import Problem
 
 _OF_ENGINE = {

@@ -10,7 +10,7 @@ from dataclasses import replace
 from laufruhe.errors import ModelError
 from laufruhe.extensions.served_page.following import Followed, Follower, can_follow
 from laufruhe.files.complaints import Refused
-from laufruhe.files.scene import QuantityTable, Scene
+from laufruhe.files.measures import QuantityTable, Scene
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
 

@@ -14,7 +14,7 @@ from laufruhe.extensions.served_page.claims import Simpler, listed
 from laufruhe.extensions.served_page.drawing import drawing_of
 from laufruhe.extensions.served_page.following import Followed, Follower, can_follow
 from laufruhe.extensions.served_page.front import partners
-from laufruhe.files.asked import EDGES
+from laufruhe.files.measures import EDGES
 from laufruhe.live import live_model
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import depends, kinds_of

@@ -10,11 +10,10 @@ from laufruhe.extensions.torsion.machine import Torsion
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.kinds import ON_BLOCK, Channel, LoadChannel, Need, NumberChannel, of_what_moves
-from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
-Resonances: TypeAlias = Callable[[Asked, Answered], Sequence[physics.Resonance]]
+Resonances: TypeAlias = Callable[[MeasureQuery, EvaluatedDesign], Sequence[physics.Resonance]]
 CHAIN = Need(lambda e: e.extra(Torsion), "the discs and shafts of the crankshaft", "add [torsion]")
 DIAMETERS = Need(
     lambda e: (chain := e.extra(Torsion)) and any(section.diameter is not None for section in chain.sections),
@@ -46,17 +45,17 @@ def _of_shafts(
     )
 
 
-def _points(measure: Asked, evaluation: Answered) -> list[PointLoads]:
+def _points(measure: MeasureQuery, evaluation: EvaluatedDesign) -> list[PointLoads]:
     return [at for at in evaluation.loads if measure.points is None or at.point.name in measure.points]
 
 
-def _at_speeds(measure: Asked, evaluation: Answered) -> Sequence[physics.Resonance]:
+def _at_speeds(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[physics.Resonance]:
     """List the speeds that count: a pendulum has another spring at each."""
     speeds = dict.fromkeys(at.point.speed for at in _points(measure, evaluation))
     return [physics.AtSpeed(speed) for speed in speeds]
 
 
-def _in_orders(measure: Asked, evaluation: Answered) -> Sequence[physics.Resonance]:
+def _in_orders(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[physics.Resonance]:
     """List the orders that count: a pendulum has another inertia in each."""
     orders = measure.orders or physics.main_orders(evaluation.engine, HIGHEST)
     return [physics.InOrder(order) for order in orders if order > 0.0]
@@ -65,7 +64,7 @@ def _in_orders(measure: Asked, evaluation: Answered) -> Sequence[physics.Resonan
 def _of_modes(name: str, unit: str, keys: tuple[str, ...], resonances: Resonances) -> NumberChannel:
     """Return the channel of numbers that natural modes have."""
 
-    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
+    def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         chain = physics.chain_of(evaluation.engine)
         return [float(x) for own in resonances(measure, evaluation) for x in own.numbers(chain)]
 
@@ -73,7 +72,7 @@ def _of_modes(name: str, unit: str, keys: tuple[str, ...], resonances: Resonance
     return NumberChannel(name, unit, keys, CHAIN, sides, minimised=False, values=values, of_loads=False)
 
 
-def _heat(measure: Asked, evaluation: Answered) -> Sequence[float]:
+def _heat(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
     """Return the most that any absorber has to give off at any point that counts."""
     found = [physics.absorber_heat(evaluation.engine, at.point, at.fidelity) for at in _points(measure, evaluation)]
     return (max((float(heat) for each in found for heat in each), default=0.0),)

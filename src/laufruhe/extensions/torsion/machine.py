@@ -13,7 +13,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import SliderCrank
 from laufruhe.machine.extra import Extra
 from laufruhe.physics.reduced_inertia import reduced_inertia
-from laufruhe.problem.drives import Kind
+from laufruhe.problem.decision import Kind
 
 TORSION = Kind(8, "torsion", "discs and shafts of the crankshaft", is_alone=True)
 """Numbers that nothing but the twist of the crankshaft and the inertia of all that turns depends on."""

@@ -26,7 +26,6 @@ from laufruhe.physics.bearing_loads import (
 )
 from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.flywheel import FLYWHEEL_INERTIA, IRREGULARITY, OF_FLYWHEEL
 from laufruhe.problem.channels.kinds import (
     AT_MOUNTS,
@@ -67,7 +66,7 @@ from laufruhe.problem.channels.sizes import (
     Where,
     inside,
 )
-from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
 __all__ = [
     "AT_EACH_MOUNT",
@@ -140,8 +139,10 @@ def _names_of_mounts(engine: Engine) -> Sequence[str]:
     return [mount.name for mount in engine.mounts]
 
 
-def _of_places(name: str, sides: tuple[str, ...], span: Callable[[Asked, Engine, Engine], Sequence[Span]]) -> Channel:
-    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
+def _of_places(
+    name: str, sides: tuple[str, ...], span: Callable[[MeasureQuery, Engine, Engine], Sequence[Span]]
+) -> Channel:
+    def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         return [least for least, _ in span(measure, evaluation.engine, evaluation.engine)]
 
     return PlaceChannel(name, "m", sides=sides, values=values, span=span)

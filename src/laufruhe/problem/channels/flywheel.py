@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from laufruhe.machine import Flywheel
 from laufruhe.physics.irregularity import Swing, swing_of
 from laufruhe.physics.reduced_inertia import turning_inertia
-from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.kinds import Need, Needs, NumberChannel, OfWheel
+from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,12 +25,12 @@ def _found(
 ) -> FlywheelChannel:  # fmt: skip
     """The largest of a number of the flywheel over the operating points that count."""
 
-    def of_wheel(measure: Asked, evaluation: Answered) -> OfWheel:
+    def of_wheel(measure: MeasureQuery, evaluation: EvaluatedDesign) -> OfWheel:
         counted = [at.point for at in evaluation.loads if measure.points is None or at.point.name in measure.points]
         swings = [swing_of(evaluation.engine, point, evaluation.fidelity) for point in counted]
         return lambda wheel: max((number(wheel, swing) for swing in swings), default=0.0)
 
-    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
+    def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         inertia, wheel = turning_inertia(evaluation.engine, evaluation.fidelity), evaluation.engine.flywheel
         # an uneven speed is reckoned with an inertia alone
         return () if inertia is None else (of_wheel(measure, evaluation)(wheel or Flywheel(inertia)),)

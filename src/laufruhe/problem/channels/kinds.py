@@ -16,9 +16,8 @@ from laufruhe.numerics.norms import MEAN, NORMS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.mount_numbers import AxisResidual, Band
 from laufruhe.physics.strength import Factor
-from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
 OfWheel: TypeAlias = Callable[[Flywheel], float]
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
@@ -107,7 +106,7 @@ class Channel:
     of_loads
         Whether a number may depend on what excites the block, as it does where nobody says that it does not.
     size
-        Of an engine, of what cancels in it where it is zero; else zero.
+        Size of the parts of an engine that cancel if it is zero [SI]; zero if there are none.
     rises
         Whether it never falls where a number of the flywheel grows; else it never rises.
     of_wheel
@@ -116,8 +115,6 @@ class Channel:
         Whether the torque of the crank is in it, which other decisions than the flywheel move too.
     of_engine
         The value as a function of an engine, if it is of its sizes alone and goes one way with each of them.
-    of_constant_stiffness, of_shares
-        Whether it has no meaning where stiffness depends on frequency, and is of the shares of motions in modes.
     of_cases
         Of a block under a held load what it is the largest length of, shape (mounts, 3), if it is of that.
     simulation
@@ -126,8 +123,6 @@ class Channel:
         Share of its value that may stand between the steps of a simulation.
     of_axis
         What turning about the torque-roll axis lacks to be a mode, if it is of that.
-    open_frequency
-        Whether the frequency wanted may lie anywhere in a band.
     places
         Names of the places that it is measured at, by which a file may narrow it; none where that is the block.
     title, place
@@ -146,20 +141,17 @@ class Channel:
     size: Callable[[Engine], float] = lambda _: 0.0
     of_loads: bool = True
     rises: bool = True
-    of_wheel: Callable[[Asked, Answered], OfWheel] | None = None
+    of_wheel: Callable[[MeasureQuery, EvaluatedDesign], OfWheel] | None = None
     of_engine: Callable[[Engine], float] | None = None
     of_torque: bool = False
-    of_constant_stiffness: bool = False
-    of_shares: bool = False
     of_cases: Callable[[Any], Any] | None = None
     of_axis: Callable[[Block, Band], AxisResidual] | None = None
     simulation: str = ""
     missed: Callable[[Engine], float] = lambda _: 0.0
-    open_frequency: bool = False
     places: Callable[[Engine], Sequence[str]] = lambda _: ()
     title: str = ""
     place: str = ""
-    span: Callable[[Asked, Engine, Engine], Sequence[Span]] = lambda *_: ()
+    span: Callable[[MeasureQuery, Engine, Engine], Sequence[Span]] = lambda *_: ()
     is_load: ClassVar[bool] = False
     is_mass: ClassVar[bool] = False
     is_number: ClassVar[bool] = False
@@ -188,7 +180,7 @@ class Channel:
 
     @property
     def of_inertia(self) -> bool:
-        """Whether it goes one way with the inertia of all that turns, whatever that is made of."""
+        """True if it is monotone in the inertia of all that turns."""
         return self.is_flywheel and self.needs is Needs.FLYWHEEL
 
     def check_sizes(self, engine: Engine, _: OperatingPoint) -> None:
@@ -250,11 +242,6 @@ class LoadChannel(Channel):
         self.factors_of(engine, point)
 
     @property
-    def feels_order(self) -> bool:
-        """Tell if it changes with the firing order of one star, where gas acts: cylinders are felt one by one."""
-        return not self.of_wrench
-
-    @property
     def norms(self) -> Collection[str]:
         """All, or the mean where places are added up."""
         return (MEAN.name,) if self.adds_up else tuple(NORMS)
@@ -279,7 +266,7 @@ class NumberChannel(Channel):
         The first is the one that is shown, all of them keep a limit.
     """
 
-    values: Callable[[Asked, Answered], Sequence[float]] = field(kw_only=True)
+    values: Callable[[MeasureQuery, EvaluatedDesign], Sequence[float]] = field(kw_only=True)
     is_number: ClassVar[bool] = True
 
 

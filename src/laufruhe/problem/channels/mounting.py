@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,8 +14,8 @@ from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
 from laufruhe.physics.static_cases import settled
-from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.kinds import MountChannel, Needs
+from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery
 
 
 def mounting_in(engine: Engine) -> ElasticMounting:
@@ -26,17 +25,17 @@ def mounting_in(engine: Engine) -> ElasticMounting:
     return elastic_mounting(engine.block, engine.mounts)
 
 
-def _of_mounting(number: Callable[[ElasticMounting, Asked], float | Sequence[float]]) -> Callable[
-    [Asked, Answered], Sequence[float]
+def _of_mounting(number: Callable[[ElasticMounting, MeasureQuery], float | Sequence[float]]) -> Callable[
+    [MeasureQuery, EvaluatedDesign], Sequence[float]
 ]:  # fmt: skip
-    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
+    def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         found = number(mounting_in(evaluation.engine), measure)
         return (found,) if isinstance(found, float) else found
 
     return values
 
 
-def _transmissibility(measure: Asked, evaluation: Answered) -> Sequence[float]:
+def _transmissibility(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
     firm = rigid_mounting(evaluation.engine.mounts)
     ratios = [
         mount_numbers.transmitted(loads.mount_forces, firm.forces(loads.wrench), measure.orders)
@@ -46,7 +45,7 @@ def _transmissibility(measure: Asked, evaluation: Answered) -> Sequence[float]:
     return (max(ratios, default=0.0),)
 
 
-def motion_indices(measure: Asked) -> tuple[int, ...]:
+def motion_indices(measure: MeasureQuery) -> tuple[int, ...]:
     """Of the motions that are to have a mode of their own."""
     return tuple(MOTIONS.index(name) for name in measure.motions or MOTIONS)
 
@@ -57,22 +56,15 @@ def _of_axis(
 ) -> MountChannel:  # fmt: skip
     """What is least where turning about the torque-roll axis is a mode."""
 
-    def value(mounting: ElasticMounting, measure: Asked) -> float:
+    def value(mounting: ElasticMounting, measure: MeasureQuery) -> float:
         return mount_numbers.residual_of(mounting, residual(mounting.block, measure.frequency))
 
     return MountChannel(
-        name,
-        unit,
-        ("frequency",),
-        values=_of_mounting(value),
-        size=size,
-        of_axis=residual,
-        of_constant_stiffness=True,
-        of_loads=False,
+        name, unit, ("frequency",), values=_of_mounting(value), size=size, of_axis=residual, of_loads=False
     )
 
 
-def counted_cases(measure: Asked, engine: Engine) -> list[LoadCase]:
+def counted_cases(measure: MeasureQuery, engine: Engine) -> list[LoadCase]:
     """Load cases that count."""
     return [case for case in engine.load_cases if measure.cases is None or case.name in measure.cases]
 
@@ -80,7 +72,7 @@ def counted_cases(measure: Asked, engine: Engine) -> list[LoadCase]:
 def _of_cases(name: str, unit: str, part: Callable[[Any], Any]) -> MountChannel:
     """The largest at any mount that counts, under any load case that counts."""
 
-    def values(measure: Asked, evaluation: Answered) -> Sequence[float]:
+    def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         mounting = mounting_in(evaluation.engine)
         chosen = measure.places([mount.name for mount in mounting.mounts])
         weights = np.array(measure.direction_weights or (1.0, 1.0, 1.0))
@@ -105,27 +97,23 @@ SAG = MountChannel(
     values=_of_mounting(lambda mounting, _: mount_numbers.sag(mounting)),
 )
 FREQUENCIES = MountChannel(
-    "natural frequencies", "Hz", sides=("min", "max", "outside"), minimised=False, of_constant_stiffness=True,
-    of_loads=False, values=_of_mounting(lambda mounting, _: [float(f) for f in mounting.modes.frequencies]),
+    "natural frequencies", "Hz", sides=("min", "max", "outside"), minimised=False, of_loads=False,
+    values=_of_mounting(lambda mounting, _: [float(f) for f in mounting.modes.frequencies]),
 )  # fmt: skip
 DECOUPLING = MountChannel(
-    "kinetic-energy decoupling", "", ("motions",), sides=("min",), minimised=False, of_constant_stiffness=True,
-    of_shares=True, of_loads=False,
+    "kinetic-energy decoupling", "", ("motions",), sides=("min",), minimised=False, of_loads=False,
     values=_of_mounting(lambda mounting, m: mount_numbers.decoupling(mounting.modes.energy, motion_indices(m))),
 )  # fmt: skip
 DECOUPLING_SHORTFALL = MountChannel(
-    "decoupling shortfall", "", ("motions", "wanted"), size=lambda _: 1.0, of_constant_stiffness=True,
-    of_loads=False, values=_of_mounting(
+    "decoupling shortfall", "", ("motions", "wanted"), size=lambda _: 1.0, of_loads=False,
+    values=_of_mounting(
         lambda mounting, m: mount_numbers.decoupling_shortfall(mounting.modes.energy, motion_indices(m), m.wanted)
     ),
 )  # fmt: skip
 TORQUE_ROLL = _of_axis("torque-roll residual", "", mount_numbers.relative_residual, lambda _: 1.0)
-RAW_TORQUE_ROLL = replace(
-    _of_axis(
-        "raw torque-roll residual", "N m/rad", mount_numbers.raw_residual,
-        lambda engine: mount_numbers.torque_roll_answer(mounting_in(engine)),
-    ),
-    open_frequency=True,
+RAW_TORQUE_ROLL = _of_axis(
+    "raw torque-roll residual", "N m/rad", mount_numbers.raw_residual,
+    lambda engine: mount_numbers.torque_roll_answer(mounting_in(engine)),
 )  # fmt: skip
 TOTAL_STIFFNESS = MountChannel(
     "total stiffness", "N/m", sides=("min", "max"), of_loads=False,

@@ -10,7 +10,6 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics import strength
 from laufruhe.physics.bearing_loads import main_bearing_forces, piston_pin_forces
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.asking import Answered, Asked
 from laufruhe.problem.channels.kinds import (
     AT_BEARINGS,
     AT_CYLINDERS,
@@ -23,7 +22,7 @@ from laufruhe.problem.channels.kinds import (
     SizeChannel,
     of_what_moves,
 )
-from laufruhe.problem.loads import PointLoads
+from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
 
 def _names_of_bearings(engine: Engine) -> Sequence[str]:
@@ -72,7 +71,7 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spect
 def _number(
     name: str, unit: str, needs: Need, sides: tuple[str, ...], of_engine: Callable[[Engine], float]
 ) -> SizeChannel:
-    def values(_: Asked, evaluation: Answered) -> Sequence[float]:
+    def values(_: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         return (of_engine(evaluation.engine),)
 
     minimised = sides == ("max",)

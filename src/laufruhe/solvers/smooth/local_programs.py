@@ -83,7 +83,7 @@ class LocalProgram:
     def edges(self, shares: Array) -> list[float]:
         """Relative rooms inside the sets that are no intervals."""
         own = self.columns(shares)
-        return [room for domain in self.domains for room in domain.set.rooms(own[domain.columns])]
+        return [room for domain in self.domains for room in domain.set.margins(own[domain.columns])]
 
     def place(self, values: Array) -> Array:
         """Shares to seek a design from where boxes are least."""

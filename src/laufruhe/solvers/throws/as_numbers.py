@@ -13,9 +13,8 @@ from laufruhe.errors import ModelError, counted
 from laufruhe.numerics.budget import in_time
 from laufruhe.numerics.progress import telling, within
 from laufruhe.problem.decision import AddressDrive, Decision
-from laufruhe.problem.drawing import Drawing, Path
 from laufruhe.problem.phasing import Candidate
-from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.problem.problem import Drawing, Path, Phasing, Problem
 from laufruhe.problem.sets import Interval
 from laufruhe.solvers.conclusion import quoted
 from laufruhe.solvers.result import Result, Status

@@ -13,8 +13,7 @@ from pydantic import Field
 
 from laufruhe.errors import InputError, ModelError
 from laufruhe.files import fields as f
-from laufruhe.files.asked import QuantityName
-from laufruhe.files.scene import QuantityTable, Scene
+from laufruhe.files.measures import QuantityName, QuantityTable, Scene
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.physics.irregularity import swing_of
 from laufruhe.present.picture import Picture

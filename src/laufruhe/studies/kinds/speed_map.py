@@ -12,9 +12,8 @@ import xarray as xr
 from pydantic import Field, model_validator
 
 from laufruhe.files import fields as f
-from laufruhe.files.asked import QuantityName
 from laufruhe.files.complaints import measured, nearest
-from laufruhe.files.scene import QuantityTable, Scene
+from laufruhe.files.measures import QuantityName, QuantityTable, Scene
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array

@@ -1,0 +1,356 @@
+"""[objective] and [[constraints]] of a problem file, and the measures of an engine that they name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, TypeVar
+
+from pydantic import Field, ValidationError
+
+from laufruhe import units
+from laufruhe.errors import ModelError
+from laufruhe.files import fields as f
+from laufruhe.files.complaints import Refused, blamed_on, measured, nearest, one_of
+from laufruhe.files.fields import Name, Open, Table
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.machine.clearances import shafts_of
+from laufruhe.problem import channels
+from laufruhe.problem.channels import Channel
+from laufruhe.problem.measure import (
+    MEAN_MOUNT_FORCE,
+    MEASURES,
+    Limit,
+    Measure,
+    Rank,
+    Term,
+    counted_parts,
+    counted_rotors,
+    radius_of,
+)
+
+T = TypeVar("T")
+QuantityName: TypeAlias = Annotated[str, Field(json_schema_extra={"enum": list(MEASURES)})]
+Motion = Literal["fore-aft", "lateral", "bounce", "roll", "pitch", "yaw"]
+PLACES = {
+    "mounts": "mount",
+    "bearings": "main bearing",
+    "cylinders": "cylinder",
+    "sections": "shaft section",
+    "webs": "web",
+}
+SIDES = {"max": "at most", "min": "at least"}
+EDGES = (*SIDES, "outside")
+"""Keys of the bounds of a limit."""
+# these mean nothing where stiffness depends on frequency
+_OF_CONSTANT_STIFFNESS = frozenset({
+    channels.FREQUENCIES, channels.DECOUPLING, channels.DECOUPLING_SHORTFALL, channels.TORQUE_ROLL,
+    channels.RAW_TORQUE_ROLL,
+})  # fmt: skip
+_OF_OPEN_FREQUENCY = frozenset({channels.RAW_TORQUE_ROLL})
+_ROUNDING = 1e-9
+
+
+class QuantityTable(Table):
+    """What part of a quantity counts."""
+
+    closed: ClassVar[str] = "says what is asked of a design, and a search would ask for what is easiest"
+
+    mounts: list[str] | None = None
+    bearings: list[str] | None = None
+    cylinders: list[str] | None = None
+    sections: list[str] | None = f.told(
+        "Sections of the crankshaft that count, named after the discs that they join; all by default."
+    )
+    webs: list[str] | None = f.told(
+        "Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ..."
+    )
+    operating_points: list[str] | None = None
+    orders: list[f.NonNegative] | None = None
+    alternating: bool | None = f.told(
+        "Whether the mean of a load over the cycle is left out: the steady reaction to the mean torque is then no part."
+    )
+    direction_weights: f.Three[f.NonNegative] | None = None
+    load_cases: list[str] | None = f.told("Load cases that count, by name; all by default.")
+    motions: list[Motion] | None = f.told("Motions that should have a mode of their own; all by default.")
+    wanted: f.Part | None = f.told("Share of a motion in a mode of its own that is enough; 1 by default.")
+    frequency: f.OpenFrequency | None = f.told(
+        "Wanted natural frequency about the torque-roll axis; of a raw residual it may be open, or left out."
+    )
+
+
+class TermTable(QuantityTable):
+    """One part of a weighted objective."""
+
+    quantity: QuantityName
+    weight: f.Positive = 1.0
+
+
+class ObjectiveTable(QuantityTable):
+    """What is minimised: one quantity, or a weighted sum of terms."""
+
+    minimise: QuantityName | None = None
+    terms: list[TermTable] = Field(default_factory=list)
+    within: f.NonNegative | None = f.told("Share by which objectives after it may exceed its least value.")
+
+
+class ConstraintTable(QuantityTable):
+    """A limit on a quantity."""
+
+    limit: QuantityName
+    max: f.Side | None = Field(
+        default=None, description="Largest value allowed, in the unit of the quantity.", examples=["6 kg"]
+    )
+    min: f.Side | None = f.told("Smallest value allowed, of natural frequencies, decoupling, sag or distance.")
+    outside: f.Pair[f.Side] | None = Field(
+        default=None,
+        description="Band in which no natural frequency or critical speed may lie.",
+        examples=[["12 Hz", "20 Hz"]],
+    )
+    name: Name | None = None
+    of: list[str] | None = f.told("Names of the counterweights or balancers whose mass counts, or of shafts.")
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Engine and operating points that measures refer to."""
+
+    engine: Engine
+    points: tuple[OperatingPoint, ...]
+
+    def measure(self, name: str, table: QuantityTable, where: str) -> Measure:
+        """Return the measure of a name and its keys for this engine."""
+        if name not in MEASURES:
+            raise Refused(where, name, "is no quantity", nearest(name, list(MEASURES)))
+        channel, norm = MEASURES[name]
+        key, of, weights = where.rsplit(".", 1)[0], getattr(table, "of", None), table.direction_weights
+        if not channel.needs.of(self.engine):
+            raise Refused(where, name, f"needs {channel.needs.what}", channel.needs.remedy)
+        with blamed_on(where):
+            channel.check_sizes(self.engine, self.points[0])
+        for mount in self.engine.mounts if channel in _OF_CONSTANT_STIFFNESS else ():
+            if mount.depends_on_frequency:
+                rule = f"is of one stiffness, and that of mount '{mount.name}' depends on frequency"
+                raise Refused(where, name, rule, "ask for transmissibility, mount force or mount travel")
+        self._check_keys(channel, table, key)
+        places = next((place for place in PLACES if place in channel.keys), None)
+        at = getattr(table, places) if places else None
+        if places:
+            _check_known(at, channel.places(self.engine), f"{key}.{places}", PLACES[places])
+        measure = Measure(
+            channel, norm, at=as_tuple(at), points=as_tuple(table.operating_points), rotors=as_tuple(of),
+            cases=as_tuple(table.load_cases), orders=as_tuple(table.orders),
+            direction_weights=None if weights is None else (weights[0], weights[1], weights[2]),
+            motions=as_tuple(table.motions),
+            frequency=(0.0, math.inf) if table.frequency is None else Open.of(table.frequency).bounds,
+            wanted=1.0 if table.wanted is None else table.wanted, alternating=bool(table.alternating),
+        )  # fmt: skip
+        if measure.is_mass:
+            self._check_masses(measure, of, key)
+        if channel.is_placing:
+            shafts = shafts_of(self.engine)
+            _check_known(of, shafts, f"{key}.of", "shaft")
+            if not shafts:
+                raise Refused(key, name, "counts balancer shafts, and there are none", "add one, or leave it out")
+        return measure
+
+    def _check_keys(self, channel: Channel, table: QuantityTable, where: str) -> None:
+        """Refuse keys that mean nothing for a channel, and unknown names."""
+        for key in (*QuantityTable.model_fields, "of"):
+            value = getattr(table, key, None)
+            if value == []:
+                raise Refused(f"{where}.{key}", [], "is empty", "leave it out to count all")
+            if value is not None and key not in channel.keys:
+                shown = value if key == "of" else None
+                raise Refused(f"{where}.{key}", shown, _why_stray(key, channel), "leave it out")
+        points, cases = ([one.name for one in some] for some in (self.points, self.engine.load_cases))
+        _check_known(table.operating_points, points, f"{where}.operating_points", "operating point")
+        _check_known(table.load_cases, cases, f"{where}.load_cases", "load case")
+        if "frequency" in channel.keys and channel not in _OF_OPEN_FREQUENCY:
+            remedy = "say which natural frequency about the axis is wanted"
+            if table.frequency is None:
+                raise Refused(f"{where}.frequency", None, "is missing", remedy)
+            if isinstance(table.frequency, Open):
+                rule = f"is open, and {channel} is of one frequency"
+                raise Refused(f"{where}.frequency", None, rule, f"{remedy}, or ask for the raw torque-roll residual")
+        base = self.engine.cycle.base_order
+        for order in table.orders or ():
+            # all that turns returns within the cycle (C6)
+            multiple = float(round(order / base) * base)
+            if abs(order - multiple) > _ROUNDING:
+                rule = f"holds {order:.10g}, and the orders of its cycle are multiples of {base}"
+                raise Refused(f"{where}.orders", table.orders, rule, f"did you mean {multiple:g}?")
+        if table.alternating and 0.0 in (table.orders or ()):
+            rule = "holds 0, which alternating leaves out"
+            raise Refused(f"{where}.orders", table.orders, rule, "take 0 out, or alternating")
+
+    def _check_masses(self, measure: Measure, of: list[str] | None, where: str) -> None:
+        """Refuse an empty sum of masses, and masses without a radius."""
+        rotors = self.engine.rotors
+        _check_known(of, [rotor.name for rotor in rotors], f"{where}.of", "counterweight or balancer")
+        counted = counted_rotors(measure, rotors)
+        if not counted and not counted_parts(measure, self.engine.slider_cranks):
+            raise Refused(where, measure.name, "counts nothing in this engine", "add what it counts, or leave it out")
+        for rotor in counted:
+            try:
+                radius_of(rotor)
+            except ModelError:
+                rule = f"counts the mass of '{rotor.name}', which has no radius"
+                raise Refused(where, measure.name, rule, "give it one") from None
+
+
+def _why_stray(key: str, channel: Channel) -> str:
+    """Return the reason why a key means nothing for a channel."""
+    if key == "of":
+        return "is for masses and places of shafts only"
+    if channel.is_mass:
+        return "means nothing for a mass"
+    if channel.is_load and key == "alternating":
+        return f"means nothing for {channel}: its steady part rubs as well"
+    if channel.is_load and key in PLACES:
+        return f"means nothing for a {channel}, which has no {PLACES[key]} of its own"
+    if channel.is_load and key == "direction_weights":
+        return f"is for forces and travels at places, not for a {channel}"
+    return f"means nothing for {channel}" if channel.is_mounting else f"means nothing for a {channel}"
+
+
+def _check_known(names: list[str] | None, known: Sequence[str], where: str, what: str) -> None:
+    for name in names or ():
+        if name not in known:
+            raise Refused(where, name, f"is no {what} here", nearest(name, list(known)) if known else "add it")
+
+
+def as_tuple(entries: Sequence[T] | None) -> tuple[T, ...] | None:
+    """Return the entries of a list, or None."""
+    return None if entries is None else tuple(entries)
+
+
+def objectives_of(tables: Sequence[ObjectiveTable] | None, scene: Scene, single: Sequence[str]) -> tuple[Rank, ...]:
+    """Return the objectives in order of priority; by default the mean mount force.
+
+    Parameters
+    ----------
+    single
+        Keys of the file that require a single objective.
+    """
+    if tables is None:
+        return (Rank((Term(MEAN_MOUNT_FORCE),)),) if scene.engine.mounts else ()
+    if not tables:
+        raise Refused("objective", [], "is empty", "leave it out, or say what is to be minimised")
+    if len(tables) > 1 and single:
+        rule = f"needs a single objective, and there are {len(tables)} in order"
+        raise Refused(single[0], None, rule, "leave it out, or keep the first of them")
+    ranks = []
+    for k, table in enumerate(tables, 1):
+        where, is_last = f"objective[{k}]" if len(tables) > 1 else "objective", k == len(tables)
+        terms = _terms(table, scene, where)
+        if is_last and table.within is not None:
+            raise Refused(f"{where}.within", table.within, "is for an objective that others follow", "leave it out")
+        if not is_last and len(terms) > 1:
+            rule = "is a weighted sum before other objectives, and no limit is one"
+            raise Refused(f"{where}.terms", None, rule, "put it last, or rank its parts")
+        if not is_last and "max" not in terms[0].measure.channel.sides:
+            rule = "stands before other objectives, and has no largest value to limit"
+            raise Refused(f"{where}.minimise", terms[0].measure.name, rule, "put it last")
+        ranks.append(Rank(terms, table.within or 0.0))
+    return tuple(ranks)
+
+
+def _terms(table: ObjectiveTable, scene: Scene, where: str) -> tuple[Term, ...]:
+    """Return the weighted measures of an objective, norms of loads before numbers of the mounts."""
+    one_of(table, where, "minimise", "terms", shown=table.minimise, named=f"[[{where.split('[')[0]}.terms]]")
+    if table.minimise is not None:
+        return (Term(_minimised(table.minimise, table, f"{where}.minimise", scene)),)
+    terms = [
+        Term(_minimised(term.quantity, term, f"{where}.terms[{k}].quantity", scene), term.weight)
+        for k, term in enumerate(table.terms, 1)
+    ]
+    return tuple(sorted(terms, key=lambda term: term.measure.channel.is_number))
+
+
+def _minimised(name: str, table: QuantityTable, where: str, scene: Scene) -> Measure:
+    measure = scene.measure(name, table, where)
+    if not measure.channel.minimised:
+        remedy = f"limit it ([[constraints]], limit = '{name}'), and minimise a force, a moment or a mass"
+        raise Refused(where, name, "is not minimised but limited", remedy)
+    return measure
+
+
+def limits_of(tables: Sequence[ConstraintTable], scene: Scene) -> tuple[Limit, ...]:
+    """Return the limits, those of loads and masses before those of numbers."""
+    limits = [_limit(table, f"constraints[{k}]", scene) for k, table in enumerate(tables, 1)]
+    _check_unique(limits)
+    limits.sort(key=lambda limit: limit.measure.channel.is_number)
+    numbers = [limit for limit in limits if limit.measure.channel.is_number]
+    for low in numbers:
+        for high in numbers:
+            if low.measure == high.measure and low.minimum > high.maximum:
+                least, most = (units.shown(value, low.measure.unit) for value in (low.minimum, high.maximum))
+                both = f"'{low.name}' and '{high.name}' contradict each other"
+                said = both if low is not high else f"'{low.name}' contradicts itself"
+                rule = f"{said}: at least {least} and at most {most}"
+                raise Refused("constraints", None, rule, "let the limits leave room")
+    return tuple(limits)
+
+
+def _limit(table: ConstraintTable, where: str, scene: Scene) -> Limit:
+    measure = scene.measure(table.limit, table, f"{where}.limit")
+    sides, channel = measure.channel.sides, measure.channel
+    norm, remedy = not channel.is_number, "give " + " or ".join(sides)
+    for key in EDGES:
+        if getattr(table, key) is not None and key not in sides:
+            rule = f"{channel}, which has a largest value only" if norm else table.limit
+            raise Refused(f"{where}.{key}", None, f"cannot stand beside {rule}", remedy)
+    if all(getattr(table, key) is None for key in sides):
+        raise Refused(f"{where}.{sides[0]}", None, "is missing", "add it" if norm else remedy)
+    low, high = (
+        None if getattr(table, key) is None else _bound(getattr(table, key), measure, f"{where}.{key}")
+        for key in ("min", "max")
+    )
+    if not norm and "max" not in sides and low is not None and low > 1.0:
+        raise Refused(f"{where}.min", table.min, "is more than the whole energy", "give a share under 1")
+    band = None
+    if table.outside is not None:
+        first, last = (_bound(text, measure, f"{where}.outside") for text in table.outside)
+        if not first < last:
+            raise Refused(f"{where}.outside", table.outside, "is no band", "write the smaller one first")
+        band = first, last
+    largest, least = math.inf if high is None else high, -math.inf if low is None else low
+    return Limit(table.name or measure.name, measure, largest, least, band)
+
+
+def _bound(text: str | float, measure: Measure, where: str) -> float:
+    value = measured(text, measure.unit, where)
+    if value < 0.0:
+        rule = "is negative" if measure.channel.is_number else "is negative, and no norm is"
+        raise Refused(where, text, rule, "give a value of zero or more")
+    return value
+
+
+def _check_unique(limits: Sequence[Limit]) -> None:
+    """Refuse two limits on one side of one measure, unless their names differ; several bands are allowed."""
+    first: dict[tuple[Any, ...], int] = {}
+    for k, limit in enumerate(limits):
+        sides = (("max", limit.maximum < math.inf), ("min", limit.minimum > -math.inf), ("outside", limit.outside))
+        for side in (side for side, is_given in sides if is_given):
+            other = first.setdefault((limit.measure, limit.name, side, limit.outside if side == "outside" else None), k)
+            if other != k:
+                beside = f"beside constraints[{other + 1}] ('{limits[other].name}')"
+                rule, remedy = f"limits '{limit.name}' once more, {beside}", "keep the tighter one, or give each a name"
+                raise Refused(f"constraints[{k + 1}].{side}", None, rule, remedy)
+
+
+def limit_name(entry: Mapping[str, Any]) -> str | None:
+    """Return the name by which results show a limit of a file; None if the table is no limit."""
+    try:
+        table = ConstraintTable.model_validate(entry)
+    except ValidationError:
+        return None
+    if table.name or table.limit not in MEASURES:
+        return table.name
+    at = next((getattr(table, key) for key in PLACES if getattr(table, key)), None)
+    return Measure(
+        *MEASURES[table.limit], at=as_tuple(at), points=as_tuple(table.operating_points),
+        orders=as_tuple(table.orders), motions=as_tuple(table.motions), alternating=bool(table.alternating),
+    ).name  # fmt: skip
