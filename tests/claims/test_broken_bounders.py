@@ -20,7 +20,7 @@ from laufruhe.numerics.witness import STRICT, check_bound, collected
 from laufruhe.numerics.workers import each
 from laufruhe.prove import certificate
 from laufruhe.prove.boxes.leads import LeadBoxes
-from laufruhe.prove.boxes.monotone import OneWayProblem
+from laufruhe.prove.boxes.monotone import MonotoneProblem
 from laufruhe.prove.boxes.shared_gas import SharedGasBoxes
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes
@@ -77,9 +77,9 @@ BROKEN = {
     "stars one by one": ("vee-twenty-open", scaled(answers, "enumerate_stars", least_times(1.02))),
     "windows of throws": ("inline-nine-uneven", scaled(uneven, "uneven_bound", lambda found: found + 1e3)),
     "throws": ("steam-two-crank", scaled(ThrowPrograms, "_under", first_times(1.02))),
-    "the flywheel": ("scotch-yoke-steam-pump", scaled(OneWayProblem, "least", times(1.02))),
+    "the flywheel": ("scotch-yoke-steam-pump", scaled(MonotoneProblem, "minimum_over", times(1.02))),
     "leads": ("geared-three-leads", scaled(LeadBoxes, "bound", value_times(1.01))),
-    "places": ("tractor-four-shaft-heights", scaled(places._Search, "box", bound_times(1.01))),
+    "places": ("tractor-four-shaft-heights", scaled(places.PlaceSearch, "box", bound_times(1.01))),
     "matrix inequalities": ("powertrain-torque-roll", scaled(convex, "dual_bound", first_times(1.001))),
 }
 """A ready problem of a family, and what breaks its bounder."""

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.prove.boxes.lead_swing import _most
+from laufruhe.prove.boxes.lead_swing import largest_torque
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -23,4 +23,4 @@ def test_the_largest_alternating_torque_is_bounded_closely(seed: int, sign: floa
     angle = np.linspace(0.0, torque.period, 40_001)
     alternating = (torque.coefficients[1:] * np.exp(0.5j * np.outer(angle, orders[1:]))).real.sum(axis=1)
     largest = float(np.abs(alternating).max())
-    assert largest * (1.0 - 1e-12) <= _most(torque) <= 1.05 * largest
+    assert largest * (1.0 - 1e-12) <= largest_torque(torque) <= 1.05 * largest

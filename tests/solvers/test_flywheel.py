@@ -126,28 +126,28 @@ def test_boxes_of_a_rim_are_of_its_mass_in_place_of_its_width(tmp_path: Path) ->
     least = changed(LEAST, "flywheel inertia", "flywheel mass")
     problem = loaded(tmp_path, changed(SINGLE, "samples = 360", "samples = 72") + RIM + least + limits)
     initial = evaluate(problem)
-    boxes, whole = (_Coordinates.of(problem, weighs) for weighs in (True, False))
-    by_mass, by_width = (each.asked(initial, problem.limits) for each in (boxes, whole))
+    boxes, whole = (_Coordinates.from_problem(problem, by_mass) for by_mass in (True, False))
+    with_mass, with_width = (each.monotone_problem(initial, problem.limits) for each in (boxes, whole))
     assert problem.engine.flywheel is not None
     rho = problem.engine.flywheel.ring.density
     names = [decision.name.removeprefix("flywheel.") for decision in problem.decisions]
     lower, upper = boxes.bounds
     ends = [np.pi * rho * np.prod(sides) for sides in (lower, upper)]
-    assert (by_mass.lower[-1], by_mass.upper[-1]) == pytest.approx(ends)
+    assert (with_mass.lower[-1], with_mass.upper[-1]) == pytest.approx(ends)
     # both sides of the width are limits then
-    assert len(by_mass.limits) == len(by_width.limits) + 2
+    assert len(with_mass.limits) == len(with_width.limits) + 2
     for share in np.random.default_rng(2).random((3, 3)):
         values = lower + share * (upper - lower)
         point = boxes.place(values.tolist())
         assert point[-1] == pytest.approx(np.pi * rho * np.prod(values), rel=1e-12)
         assert point[:-1] == pytest.approx([x for x, name in zip(values, names, strict=True) if name != "width"])
-        assert boxes.decided(point) == pytest.approx(values, rel=1e-12)
-        assert by_mass.value(point) == pytest.approx(by_width.value(values), rel=1e-12)
+        assert boxes.decisions(point) == pytest.approx(values, rel=1e-12)
+        assert with_mass.value(point) == pytest.approx(with_width.value(values), rel=1e-12)
         (width,) = (x for x, name in zip(values, names, strict=True) if name == "width")
-        told = [number.value(point) for _, number in by_mass.limits]
-        assert told == pytest.approx([*(number.value(values) for _, number in by_width.limits), width, -width])
+        told = [number.value(point) for _, number in with_mass.limits]
+        assert told == pytest.approx([*(number.value(values) for _, number in with_width.limits), width, -width])
     alone = loaded(tmp_path, SINGLE + INERTIA + LEAST)
-    assert _Coordinates.of(alone, True).width is None
+    assert _Coordinates.from_problem(alone, True).width is None
 
 
 @pytest.mark.slow

@@ -14,7 +14,7 @@ from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.boxes.leads import _Box, _Search
+from laufruhe.solvers.boxes.leads import LeadSearch, _Box
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.result import Status
 from problem_files import PROBLEMS, changed, loaded
@@ -215,7 +215,7 @@ def test_weights_and_the_angle_are_proven_together(tmp_path: Path) -> None:
 def test_a_box_near_the_best_design_is_bounded_at_all_angles(tmp_path: Path) -> None:
     """A quarter of the angles is enough far from it; near it a peak between them counts, and no design is under it."""
     text = changed(COUPLED.split("[[constraints]]")[0], '"rms mount force"', '"maximum mount force"')
-    search = _Search(loaded(tmp_path, text + "[fidelity]\nsamples = 96\n"))
+    search = LeadSearch(loaded(tmp_path, text + "[fidelity]\nsamples = 96\n"))
     for low, high in np.radians([[176.0, 177.0], [150.0, 150.1]]):
         ends = np.array([low]), np.array([high])
         far = search.box(*ends)

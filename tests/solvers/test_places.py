@@ -19,7 +19,7 @@ from laufruhe.numerics.workers import HERE, working_on
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
-from laufruhe.solvers.boxes.places import _Box, _Search
+from laufruhe.solvers.boxes.places import PlaceSearch, _Box
 from laufruhe.solvers.conclusion import judged
 from laufruhe.studies.trade import trade
 from problem_files import READY
@@ -289,7 +289,7 @@ def test_limits_on_distances_hold_and_are_proven(case: str, tmp_path: Path) -> N
 def test_a_box_is_cut_where_its_program_leaves_most_out(side: int, tmp_path: Path) -> None:
     """Its halves cover it, each with the best design in its middle, where one may be better than what is known."""
     problem = _problem(tmp_path, _enveloped("", 1) + "[fidelity]\nsamples = 72\n")
-    search = _Search(problem)
+    search = PlaceSearch(problem)
     lower, upper = search.bounds
     middle = np.array([0.03, -0.02])
     box = _Box(lower, upper, 0.0, middle, np.where(np.arange(2) == side, 0.02, 0.01))
@@ -326,7 +326,7 @@ def test_a_limit_on_a_distance_costs_what_its_shaft_would_gain(limit: str, low: 
     slope = {z: (value(z + 1e-5) - value(z - 1e-5)) / 2e-5 for z in (0.06, -0.06)}
     z = min(slope, key=lambda z: slope[z] * z)
     assert slope[z] * z < 0.0
-    prices = _Search(problem).prices(judged(problem, [z]))
+    prices = PlaceSearch(problem).prices(judged(problem, [z]))
     assert list(prices) == [(problem.limits[0], "at most")]
     (price,) = prices.values()
     assert price.relaxed == pytest.approx(abs(slope[z]), rel=1e-3)

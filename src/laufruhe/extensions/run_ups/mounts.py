@@ -10,18 +10,15 @@ from dataclasses import replace
 from laufruhe.extensions.run_ups.boxes import bounds_runs
 from laufruhe.load_models.simulated import COARSER
 from laufruhe.machine.mount import every_spring
-from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach
-from laufruhe.prove.mounts.provers import EARLY
 from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, none_within
-from laufruhe.solvers.mounts.bounds import divided_by
-from laufruhe.solvers.mounts.limits_kept import LimitsKept, ruled_out
+from laufruhe.solvers.mounts.bounds import conflict_of, divided_by
 from laufruhe.solvers.mounts.search import NEAR, Found, MountSearch
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
@@ -49,20 +46,15 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     first = None if relaxed is None or alone else place_of(problem, relaxed)
     search = MountSearch(few, initial, first=first, beside=True, coarser=1 if alone else COARSER)
     bounded = divides(problem) and bounds_runs(problem)
-    met, conflict = _looked(problem, search) if bounded else (None, ())
-    if conflict:
-        return none_within(problem, initial, conflict, {"solve": time.perf_counter() - started})
     search.run()
     searched = bool(search.optima) and not stopped and not alone
     if searched and search.best is not None and search.best.design.excess <= NEAR:
         search.refined()
-    if met is not None and (search.best is None or search.best.design.excess > KEPT):
-        search.again([(met.tolist(), None)])
     divided = divided_by(problem, search, False) if bounded else Divided(0.0, 0)
     timing = {"solve": time.perf_counter() - started}
     found = search.chosen
     if found is None or found.design.excess > KEPT:
-        conflict = ruled_out(problem) if divided.bound == math.inf else ()
+        conflict = conflict_of(problem) if divided.bound == math.inf else ()
         result = none_within(problem, initial, conflict, timing)
         return result if conflict else _none(problem, search, found, result)
     return _concluded(problem, search, found, initial, relaxed, divided, timing)
@@ -85,15 +77,6 @@ def _concluded(
     )
     design = replace(found.design, problem=problem)
     return concluded(design, initial, shown, timing)
-
-
-def _looked(problem: Problem, search: MountSearch) -> tuple[Array | None, tuple[str, ...]]:
-    """A design that keeps all limits, where no start does; or a conflict, for what boxes exclude none need search."""
-    if not problem.limits or not problem.search.proves or search.starts_kept:
-        return None, ()
-    kept = LimitsKept(problem)
-    told = kept.together(problem.limits, EARLY)
-    return told.design, kept.conflict() if told.is_proven else ()
 
 
 def _method(optima: Sequence[LocalOptimum], scale: float, bare: float, divided: Divided) -> str:

@@ -20,7 +20,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Multipliers, Reach
-from laufruhe.solvers.boxes.held_designs import best_with
+from laufruhe.solvers.boxes.box_designs import rebalance
 from laufruhe.solvers.conclusion import Design, concluded, known_of, none_within
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.conflicts import smallest_conflict
@@ -73,7 +73,7 @@ class SizeProgram(LocalProgram):
         given = [float(x) for x in sizes]
         held = replace(problem, engine=problem.design(given, named), decisions=problem.unbalances)
         where: dict[str, Value] = dict(zip((d.name for d in named), given, strict=True))
-        return self.shares(best_with(problem, held, where).design.values)
+        return self.shares(rebalance(problem, held, where).design.values)
 
 
 def solve_sizes(problem: Problem, known: float = math.inf) -> Result:

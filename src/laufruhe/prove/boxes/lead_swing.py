@@ -1,8 +1,8 @@
-"""What no degree of irregularity goes under while leads lie in a box (P14).
+"""Lower bounds of the degree of irregularity over boxes of leads (P14).
 
-At two angles a and b the squares u = w^2 of the speed differ by (E + W_a) / m_a - (E + W_b) / m_b, twice, with E the
-energy at the start (F2-F4). Work and inertia of what a shaft carries change by no more than a lead times the largest
-torque and slope of it; E falls with W and rises with m, so that it lies between two numbers found as it is itself:
+At two angles a and b the squares u = w^2 of the speed differ by twice (E + W_a) / m_a - (E + W_b) / m_b, with E the
+energy at the start (F2-F4). Work and inertia on a shaft change by no more than a lead times the largest torque and
+slope of the inertia. E falls with W and rises with m, so the same equation with changed W and m bounds it:
 
     delta >= (u_a - u_b) / (w_a + w_b) / w_0,   numerator from below, denominator from above.
 """
@@ -29,7 +29,7 @@ from laufruhe.problem.problem import Problem
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """What one shaft brings, or what stands: work and inertia, and how fast they change at most by the angle."""
+    """Work and inertia on one shaft, or of the fixed parts, and upper bounds of their slopes by the angle."""
 
     work: Spectrum
     inertia: Spectrum
@@ -38,7 +38,7 @@ class _Part:
 
 
 class LeadSwing:
-    """The degree of irregularity over leads."""
+    """Bounds of the degree of irregularity over boxes of leads."""
 
     def __init__(self, problem: Problem, model: LedModel, measure: Measure) -> None:
         fidelity, inertia = problem.fidelity, turning_inertia(problem.engine, problem.fidelity)
@@ -59,14 +59,14 @@ class LeadSwing:
                     torque = gas_torque(engine, point, fidelity)
                     own = spectrum_of(moving_inertia(engine, fidelity, angles)[0], engine.cycle.base_order)
                     mass = float(np.abs(own.coefficients[1:] * own.orders[1:]).sum())
-                    parts.append(_Part(torque.integral, own, _most(torque), mass))
+                    parts.append(_Part(torque.integral, own, largest_torque(torque), mass))
                 self._points.append((point.speed, parts))
 
-    def least(self, middle: Array, half: Array) -> float:
-        """What it is not under on a box, the most of all operating points."""
-        return max(self._of_point(speed, parts, middle, half) for speed, parts in self._points)
+    def minimum_over(self, middle: Array, half: Array) -> float:
+        """Return a lower bound on a box [rad], the largest of all operating points."""
+        return max(self._minimum_at_point(speed, parts, middle, half) for speed, parts in self._points)
 
-    def _of_point(self, speed: float, parts: Sequence[_Part], middle: Array, half: Array) -> float:
+    def _minimum_at_point(self, speed: float, parts: Sequence[_Part], middle: Array, half: Array) -> float:
         by = [0.0, *(middle - self._start)]
         work: Array = np.sum(
             [_earlier(part.work, d).sample(self._steps) for part, d in zip(parts, by, strict=True)], axis=0
@@ -81,26 +81,27 @@ class LeadSwing:
             low = start_energy(work, inertia - heavier, speed) - more
             high = start_energy(work, inertia + heavier, speed) + more
         except ModelError:
-            # the crank may stop: nothing is known
+            # the crank may stop
             return 0.0
         squares = (0.5 * (low + high) + work) / inertia
         a, b = int(np.argmax(squares)), int(np.argmin(squares))
-        least_a, most_b = inertia[a] + heavier, inertia[b] - heavier
+        light, heavy = inertia[a] + heavier, inertia[b] - heavier
         # linear in the energy, so least at an end
-        apart = min(
-            2.0 * ((energy + work[a] - more) / least_a - (energy + work[b] + more) / most_b) for energy in (low, high)
+        difference = min(
+            2.0 * ((energy + work[a] - more) / light - (energy + work[b] + more) / heavy) for energy in (low, high)
         )
         fastest = [math.sqrt(2.0 * max(high + work[k] + more, 0.0) / (inertia[k] - heavier)) for k in (a, b)]
-        return max(float(apart), 0.0) / sum(fastest) / speed
+        return max(float(difference), 0.0) / sum(fastest) / speed
 
 
 def _earlier(signal: Spectrum, lead: float) -> Spectrum:
     return signal.later(-lead / signal.period, -lead) if lead else signal
 
 
-def _most(torque: Spectrum) -> float:
-    own = torque.holding(np.concatenate([[0.0], torque.coefficients[1:]]))
-    steps = max(8 * len(own.coefficients), 64)
-    values = np.concatenate([own.sample(steps), own.values(own.bends)])
-    bent = curvature(own.each(lambda each: each[:, None, None]))[0]
-    return float(np.abs(values).max() + (own.period / steps) ** 2 / 8.0 * bent.max(initial=0.0))
+def largest_torque(torque: Spectrum) -> float:
+    """Return an upper bound of |torque - mean torque| [N m]."""
+    swing = torque.holding(np.concatenate([[0.0], torque.coefficients[1:]]))
+    steps = max(8 * len(swing.coefficients), 64)
+    values = np.concatenate([swing.sample(steps), swing.values(swing.bends)])
+    bent = curvature(swing.each(lambda each: each[:, None, None]))[0]
+    return float(np.abs(values).max() + (swing.period / steps) ** 2 / 8.0 * bent.max(initial=0.0))

@@ -1,8 +1,8 @@
-"""Least sum of numbers that go one way with each open number, some of them limited (T9).
+"""Least weighted sum of functions that are monotone in each open number, under limits on such functions (T9).
 
-On a box such a number is least at one corner. Boxes whose least sum is not under that of a design known, or on which
-a limit is broken everywhere, are dropped; the sides of the others are cut where that shows, and they are halved: the
-least sum on what is left bounds every design allowed.
+On a box such a function is least at one corner. Boxes are dropped if their least sum is not under that of a known
+design, or if a limit is violated everywhere. Slices at the sides of other boxes are cut off by the same rule, and
+the rest is halved. The least sum over the remaining boxes bounds every feasible design.
 """
 
 from __future__ import annotations
@@ -20,143 +20,156 @@ from laufruhe.prove.best_first import Box, Divided, Halving, Over, halves, wides
 from laufruhe.prove.witness import Known, check_around, thin
 
 MOST_BOXES = 4000
-# halvings of a side that is cut
+# bisections of a side that is cut
 CUTS = 10
 
 
 @dataclass(frozen=True, eq=False)
-class OneWay:
-    """A number, and for each open number whether it never falls (1) or never rises (-1) where that grows."""
+class Monotone:
+    """A function of the open numbers, and the sign of its slope along each of them, shape (n,)."""
 
     value: Callable[[Array], float]
-    ways: Array
+    signs: Array
 
-    def least_at(self, lower: Array, upper: Array) -> Array:
-        """The corner of a box where it is least."""
-        return np.where(self.ways > 0.0, lower, upper)
+    def lowest_corner(self, lower: Array, upper: Array) -> Array:
+        """Return the corner of a box at which the function is least, shape (n,)."""
+        return np.where(self.signs > 0.0, lower, upper)
 
-    def least(self, lower: Array, upper: Array) -> float:
-        """On a box."""
-        return self.value(self.least_at(lower, upper))
+    def minimum_over(self, lower: Array, upper: Array) -> float:
+        """Return the least value on a box."""
+        return self.value(self.lowest_corner(lower, upper))
 
 
 @dataclass(frozen=True, eq=False)
-class OneWayProblem:
-    """Least weighted sum of numbers, others kept under their maxima.
+class MonotoneProblem:
+    """Minimise a weighted sum of monotone functions under limits on others.
 
     Attributes
     ----------
     terms, limits
-        (weight, number), (maximum, number) pairs.
+        Pairs (weight, function) and (maximum, function).
     lower, upper
-        Bounds of what is open, shape (n,).
+        Bounds of the open numbers, shape (n,).
     """
 
-    terms: tuple[tuple[float, OneWay], ...]
-    limits: tuple[tuple[float, OneWay], ...]
+    terms: tuple[tuple[float, Monotone], ...]
+    limits: tuple[tuple[float, Monotone], ...]
     lower: Array
     upper: Array
 
     def value(self, x: Array) -> float:
-        """The sum."""
+        """Return the weighted sum."""
         return sum(weight * term.value(x) for weight, term in self.terms)
 
-    def least(self, lower: Array, upper: Array) -> float:
-        """That the sum is not under on a box."""
-        return sum(weight * term.least(lower, upper) for weight, term in self.terms)
+    def minimum_over(self, lower: Array, upper: Array) -> float:
+        """Return a lower bound of the sum on a box."""
+        return sum(weight * term.minimum_over(lower, upper) for weight, term in self.terms)
 
     @property
-    def goes_one_way(self) -> bool:
-        """Whether the whole sum does."""
-        return all(np.array_equal(term.ways, self.terms[0][1].ways) for _, term in self.terms)
+    def is_monotone(self) -> bool:
+        """Return whether the sum is monotone in each number."""
+        return all(np.array_equal(term.signs, self.terms[0][1].signs) for _, term in self.terms)
 
-    def under(self, best: float) -> OneWayProblem:
-        """With what is as good as a design for a further limit, where the whole sum goes one way."""
-        if not self.terms or not self.goes_one_way or not math.isfinite(best):
+    def with_cutoff(self, cutoff: float) -> MonotoneProblem:
+        """Return the problem with the cutoff as a limit on a monotone sum."""
+        if not self.terms or not self.is_monotone or not math.isfinite(cutoff):
             return self
-        return replace(self, limits=(*self.limits, (best, OneWay(self.value, self.terms[0][1].ways))))
+        return replace(self, limits=(*self.limits, (cutoff, Monotone(self.value, self.terms[0][1].signs))))
 
 
-class _OneWayBoxes(Halving):
-    """Boxes of what is open, each cut."""
+class _MonotoneBoxes(Halving):
+    """Branch and bound over boxes without slices that violate a limit."""
 
     what = "boxes"
 
-    def __init__(self, problem: OneWayProblem, value: float, room: float, known: Known | None = None) -> None:
+    def __init__(self, problem: MonotoneProblem, value: float, room: float, known: Known | None = None) -> None:
         super().__init__(value, room, known)
-        self._given, self._problem = problem, problem.under(self.enough)
+        self._uncut, self._problem = problem, problem.with_cutoff(self.enough)
 
     @property
     def level(self) -> float:
-        """Boxes are cut as far as no design in what is cut off is better than enough."""
-        return self.enough if self._problem is not self._given else math.inf
+        """Least objective of designs that cuts remove; infinite if cuts use limits alone."""
+        return self.enough if self._problem is not self._uncut else math.inf
 
     def bounded(self, lower: Array, upper: Array) -> tuple[float, Box] | Over:
-        """A box without what breaks limits, and its least sum."""
-        kept = _cut(self._problem, lower, upper)
-        if kept is None:
+        """Return a box without slices that violate limits, and its least sum."""
+        rest = _cut(self._problem, lower, upper)
+        if rest is None:
             return Over(self.level)
-        return self._problem.least(*kept), Box(*kept, widest(*kept, self._problem.upper - self._problem.lower))
+        return self._problem.minimum_over(*rest), Box(*rest, widest(*rest, self._problem.upper - self._problem.lower))
 
     def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | Over]:
-        """Halves by the middle of the side that is longest beside its bounds."""
+        """Return the halves of boxes across their relatively longest side."""
         return [self.bounded(*half) for box in boxes for half in halves(box)]
 
 
 @dataclass(frozen=True, eq=False)
 class _Around:
-    """Bounder of thin boxes, cut by designs that are no better than the known one."""
+    """Thin boxes, to check bounds around a known design."""
 
-    problem: OneWayProblem
+    problem: MonotoneProblem
     known: Known
-    what: str = _OneWayBoxes.what
+    what: str = _MonotoneBoxes.what
 
     def around(self, place: Array) -> tuple[Array, Array]:
         """Return a thin box around a place."""
         return thin(place, self.problem.lower, self.problem.upper)
 
     def bound(self, box: tuple[Array, Array]) -> float:
-        """Return the least sum of a box, infinite where limits cut off all of it."""
-        found = _OneWayBoxes(self.problem, self.known.value * (1.0 + EXCESS), 0.0).bounded(*box)
-        return math.inf if isinstance(found, Over) else found[0]
+        """Return the least sum of a box; infinite if limits cut off all of it."""
+        result = _MonotoneBoxes(self.problem, self.known.value * (1.0 + EXCESS), 0.0).bounded(*box)
+        return math.inf if isinstance(result, Over) else result[0]
 
 
 def divided(
-    problem: OneWayProblem, value: float, room: float, most: int = MOST_BOXES, known: Known | None = None
+    problem: MonotoneProblem, value: float, room: float, most: int = MOST_BOXES, known: Known | None = None
 ) -> Divided:  # fmt: skip
-    """Halve boxes, the least first, until none may hold a design that is `room` better than `value` (T9)."""
-    boxes = _OneWayBoxes(problem, value, room, known)
+    """Halve boxes until none may hold a design that is `room` better than `value` (T9).
+
+    Parameters
+    ----------
+    value
+        Objective of the incumbent [SI]; infinite if there is none.
+    room
+        Absolute gap tolerance [SI].
+    most
+        Largest number of boxes.
+    known
+        The incumbent, to check bounds.
+    """
+    boxes = _MonotoneBoxes(problem, value, room, known)
     if known is not None:
         check_around(_Around(problem, known), known.place, known)
     return boxes.run(boxes.bounded(problem.lower, problem.upper), most)
 
 
-def _with(x: Array, k: int, value: float) -> Array:
-    out = x.copy()
-    out[k] = value
-    return out
-
-
-def _cut(problem: OneWayProblem, lower: Array, upper: Array) -> tuple[Array, Array] | None:
-    """A box without ends of its sides where a limit is broken all over; None where it is so everywhere."""
-    if any(number.least(lower, upper) > maximum for maximum, number in problem.limits):
+def _cut(problem: MonotoneProblem, lower: Array, upper: Array) -> tuple[Array, Array] | None:
+    """Return a box without slices at its sides that violate a limit, or None if nothing is left."""
+    if any(function.minimum_over(lower, upper) > maximum for maximum, function in problem.limits):
         return None
+    lower, upper = lower.copy(), upper.copy()
     for k in range(len(lower)):
-        # a number that falls is large at the lower end, even with all others where it is least
-        low = _last(_broken(problem, lower, upper, k, -1.0), lower[k], upper[k])
-        high = _last(_broken(problem, lower, upper, k, 1.0), upper[k], low)
-        lower, upper = _with(lower, k, low), _with(upper, k, high)
+        # a falling function is large at the lower end, even with all other numbers where it is least
+        lower[k] = _cut_side(_violates(problem, lower, upper, k, -1.0), lower[k], upper[k])
+        upper[k] = _cut_side(_violates(problem, lower, upper, k, 1.0), upper[k], lower[k])
     return lower, upper
 
 
-def _broken(problem: OneWayProblem, lower: Array, upper: Array, k: int, way: float) -> Callable[[float], bool]:
-    """Whether a limit that goes one way with an open number is broken all over a slice of a box."""
-    told = [(most, number, number.least_at(lower, upper)) for most, number in problem.limits if number.ways[k] == way]
-    return lambda at: any(number.value(_with(corner, k, at)) > most for most, number, corner in told)
+def _violates(problem: MonotoneProblem, lower: Array, upper: Array, k: int, sign: float) -> Callable[[float], bool]:
+    """Return a test whether a limit with this slope along number k is violated all over a slice of a box."""
+    limits = [(most, f, f.lowest_corner(lower, upper)) for most, f in problem.limits if f.signs[k] == sign]
+
+    def violated(at: float) -> bool:
+        slices = (
+            (most, function, np.where(np.arange(len(lower)) == k, at, corner)) for most, function, corner in limits
+        )
+        return any(function.value(x) > most for most, function, x in slices)
+
+    return violated
 
 
-def _last(broken: Callable[[float], bool], start: float, end: float) -> float:
-    """How far from its start a side may be cut: the last place known to be broken, or the start where nothing is."""
-    if start == end or not broken(start):
+def _cut_side(violated: Callable[[float], bool], start: float, end: float) -> float:
+    """Return how far a side may be cut from its start."""
+    if start == end or not violated(start):
         return start
-    return parted(broken, start, end, CUTS)[0]
+    return parted(violated, start, end, CUTS)[0]

@@ -1,14 +1,14 @@
-"""What no design goes under while a crank leads another that it shares chambers with, and gas works in these (P15).
+"""Lower bounds over leads of a crank that shares gas chambers with another crank (P15).
 
-The mixed cycle is one function p of the volume v over its displacement, whatever the lead d: only v hangs on it. With
-the ways x_1 of the piston that stands and x_2 of the one that leads, both towards their cranks, X = x_1 + x_2,
+The mixed cycle is one function p of the volume v over its displacement for every lead d; only v depends on d. With
+the travels x_1 of the fixed piston and x_2 of the leading one, both towards their cranks, X = x_1 + x_2,
 
     T = A (p - p_c) X'(gamma),       dT/dd = A p'(v) v_d X' + A (p - p_c) x_2'',
     v_d = (x_2' - x_2'(top) - v (x_2'(bottom) - x_2'(top))) / H,       H = X(bottom) - X(top),
 
-as what is least or largest moves by no more than what it is looked at. p jumps at dead centres alone, where X' = 0, so
-that T follows from its slope. Every factor is bounded on cells of d and gamma from its value in the middle and the next
-derivative. A norm then changes by no more than that of what the shafts' masses and these torques can change by.
+since a minimum over angles moves no more than the function itself. p jumps at dead centres alone, where X' = 0, so that
+T follows from its slope. The value at the middle of cells of d and gamma and the next derivative bound every factor.
+A norm then changes by no more than the norm of the changes of mass loads and torques.
 """
 
 from __future__ import annotations
@@ -36,49 +36,51 @@ from laufruhe.problem.measure import Measure, load_rows, selected
 from laufruhe.problem.problem import Problem
 
 CELLS = 1440
-"""Of a turn of the crank."""
+"""Cells of one turn of the crank."""
 _STEPS = 256
 
 
 @dataclass(frozen=True)
-class _Way:
-    """Of a piston towards its crank: radius [m] and rod ratio."""
+class _Travel:
+    """Travel of a piston towards its crank, by crank radius [m] and rod ratio."""
 
     radius: float
     ratio: float
 
     def at(self, angle: Array | float) -> Array:
-        """[m]."""
+        """Return the travel at a crank angle [m]."""
         return np.asarray(self.radius * kinematics.travel(np, np.asarray(angle), self.ratio))
 
     def slope(self, angle: Array | float) -> Array:
-        """By the angle of its crank."""
+        """Return the derivative by the crank angle [m]."""
         return np.asarray(-self.radius * kinematics.piston_velocity(np, np.asarray(angle), self.ratio))
 
     def bend(self, angle: Array | float) -> Array:
-        """Once more."""
+        """Return the second derivative by the crank angle [m]."""
         return np.asarray(-self.radius * kinematics.piston_acceleration(np, np.asarray(angle), self.ratio))
 
     @property
     def most(self) -> tuple[float, float, float]:
-        """What its first three derivatives do not exceed: the sums of their orders' amplitudes."""
+        """Upper bounds of the first three derivatives [m]: sums of amplitudes of orders."""
         orders = np.abs(np.fft.rfft(self.at(math.tau * np.arange(_STEPS) / _STEPS)))[1:] * (2.0 / _STEPS)
         h = np.arange(1, len(orders) + 1)
         return float(h @ orders), float(h**2 @ orders), float(h**3 @ orders)
 
 
 def torque_change(gas: Seiliger, part: SliderCrank, cycle: Cycle, half: float) -> Array:
-    """What the torque of a shared chamber changes by at the most, on cells from the dead centre of `part` on [N m].
+    """Return an upper bound of the change of torque of a shared chamber [N m], on cells from the dead centre of `part`.
 
     Parameters
     ----------
     part
-        The piston that stands; the other leads by up to `half` [rad] more or less than where it is.
+        The piston with a fixed crank.
+    half
+        Largest change of the lead of the other piston [rad].
     """
     other, chamber, ratio = part.facing, part.swept.chamber, part.shaft.ratio
     assert isinstance(other, Facing)
     count = CELLS * cycle.turns
-    own, far, ahead = _Way(part.crank_radius, part.rod_ratio), _Way(*_size(other)), other.ahead
+    own, far, ahead = _Travel(part.crank_radius, part.rod_ratio), _Travel(*_size(other)), other.ahead
     gamma, g = cycle.angle * (np.arange(count) + 0.5) / count, 0.5 * cycle.angle / count
     (m1, m2, _), (n1, n2, n3) = own.most, far.most
     top, bottom = (ratio * angle for angle in chamber.dead_centres)
@@ -108,7 +110,7 @@ def _size(other: Facing) -> tuple[float, float]:
 
 
 def _strokes(gamma: Array, top: float, bottom: float, margin: float, cycle: Cycle) -> tuple[NDArray[np.bool_], ...]:
-    """Where a chamber may be compressing, expanding, or open."""
+    """Return the cells in which a chamber may compress, expand, or be open."""
     since = np.mod(gamma - (bottom - math.tau) + margin, cycle.angle) - margin
     up, down = top - bottom + math.tau, math.tau
     ends = cycle.angle - margin
@@ -121,7 +123,7 @@ def _strokes(gamma: Array, top: float, bottom: float, margin: float, cycle: Cycl
 def _pressed(
     gas: Seiliger, cycle: Cycle, low: Array, high: Array, strokes: Sequence[NDArray[np.bool_]]
 ) -> tuple[Array, Array]:
-    """Pressure over that behind the pistons, and its slope by volume, the most of either while volumes lie between."""
+    """Return upper bounds of the pressure difference at the pistons, and of its slope by volume, between volumes."""
     small = 1.0 / (gas.compression_ratio - 1.0)
     n1, n2, cut = gas.compression_exponent, gas.expansion_exponent, small * seiliger_cut_off(gas, cycle)
     squeezed, later = (gas.intake_pressure * ((1.0 + small) / v) ** n1 for v in (low, high))
@@ -138,7 +140,7 @@ def _pressed(
 
 
 class SharedGasBoxes:
-    """Bounds of boxes of leads where gas works between two cranks."""
+    """Bounds of boxes of leads for cranks that share gas chambers."""
 
     what = "boxes of leads"
     at_once = 1
@@ -150,7 +152,7 @@ class SharedGasBoxes:
         self._names = self._model.names
         if not all(_is_known(point.gas) for point in problem.points):
             raise ModelError("a lead between two cranks that share chambers is decided with a seiliger cycle")
-        self._stand = self._standing(problem.engine)
+        self._fixed = self._fixed_pistons(problem.engine)
         self._masses = {m: [self._moved(m, s) for s in range(len(self._names))] for m in self._measures}
         self._gains = {m: [self._gain(m, point) for point in problem.points] for m in self._measures}
 
@@ -158,8 +160,8 @@ class SharedGasBoxes:
     def _measures(self) -> list[Measure]:
         return list(dict.fromkeys(measure for measure in self.problem.measures if measure.is_load))
 
-    def _standing(self, engine: Engine) -> list[str]:
-        """Of every chamber that is shared the piston that stands."""
+    def _fixed_pistons(self, engine: Engine) -> list[str]:
+        """Return the fixed piston of every shared chamber."""
         found = []
         for part in engine.slider_cranks:
             for other in engine.slider_cranks:
@@ -178,13 +180,13 @@ class SharedGasBoxes:
         return found
 
     def _moved(self, measure: Measure, shaft: int) -> float:
-        """What a norm changes by at the most for each radian by which the masses of a shaft come earlier."""
+        """Return an upper bound of the slope of a norm by the lead of the masses on a shaft [1/rad]."""
         shares = measure.shares(self.problem.points)
         own = [signal.derivative for signal in self._model.counted(measure, shaft)]
         return float(measure.norm.above(own, shares[shares > 0.0]))
 
     def _gain(self, measure: Measure, point: OperatingPoint) -> Array:
-        """What a unit of roll moment does at every place that counts, shape (places,)."""
+        """Return the load of a unit roll moment at every counted place, shape (places,)."""
         engine, fidelity = self.problem.engine, self.problem.fidelity
         wrench, mounting = Spectrum(engine.cycle.base_order, np.stack([0.0 * ROLL, ROLL]).astype(complex)), None
         if engine.mounts:
@@ -195,15 +197,21 @@ class SharedGasBoxes:
         return lengths(signal.coefficients[1].real)
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
-        found = [self._bounded(0.5 * (a + b), 0.5 * (b - a)) for a, b in zip(lower, upper, strict=True)]
-        return np.array(found), np.argmax(upper - lower, axis=1)
+        """Return the lower bound of every box, infinite without a feasible design, and the side to halve.
+
+        Parameters
+        ----------
+        lower, upper
+            Leads [rad], shape (boxes, leads).
+        """
+        bounds = [self._bounded(0.5 * (a + b), 0.5 * (b - a)) for a, b in zip(lower, upper, strict=True)]
+        return np.array(bounds), np.argmax(upper - lower, axis=1)
 
     def _bounded(self, middle: Array, half: Array) -> float:
         try:
             evaluation = evaluate(self.problem, self.problem.design([float(x) for x in middle]))
         except ModelError:
-            # pistons too far apart are no reason for others to be
+            # the middle has no evaluation, but other leads may have one
             return 0.0
         changes = self._torques(evaluation.engine, float(half.sum()))
 
@@ -223,13 +231,13 @@ class SharedGasBoxes:
         return max(sum(term.weight * least(term.measure) for term in self.problem.objective), 0.0)
 
     def _torques(self, engine: Engine, half: float) -> list[Array]:
-        """What the torque of all shared chambers changes by at every operating point, on cells of a cycle."""
+        """Return the change of torque of all shared chambers at every operating point, on cells of a cycle [N m]."""
         found = []
         for point in self.problem.points:
             total = np.zeros(CELLS * engine.cycle.turns)
             gas = self.problem.fidelity.gas_of(point)
             for part in engine.slider_cranks:
-                if part.name in self._stand and isinstance(gas, Seiliger):
+                if part.name in self._fixed and isinstance(gas, Seiliger):
                     own = torque_change(gas, part, engine.cycle, half)
                     place = math.floor(part.firing_angle / engine.cycle.angle * len(total))
                     total = total + np.maximum(np.roll(own, place), np.roll(own, place + 1))
@@ -237,7 +245,7 @@ class SharedGasBoxes:
         return found
 
     def _by_gas(self, measure: Measure, changes: Sequence[Array]) -> float:
-        """What a norm can change by with the torque."""
+        """Return an upper bound of the change of a norm by changes of torque."""
         shares, gains, norm = measure.shares(self.problem.points), self._gains[measure], measure.norm
         squares = [float(np.mean(each**2)) for each in changes]
         if norm.refinement == 1:
@@ -247,7 +255,7 @@ class SharedGasBoxes:
         tops = [
             math.sqrt(2.0 * len(measure.orders) * square)
             if measure.orders is not None
-            # without its mean a change is at most its largest value and its mean together
+            # a change less its mean is at most its largest value and its mean together
             else float(each.max() + measure.alternating * each.mean())
             for each, square in zip(changes, squares, strict=True)
         ]

@@ -194,6 +194,11 @@ class StiffnessBoxes:
             own = boxes.kept(left)
             pull[left] = np.maximum(pull[left], self.add_simulated(own, lower[left], upper[left]))
             found[left] = self.constant + numbers[left] + own.least
+            boxes.pulls.append(np.zeros_like(pull))
+            boxes.pulls[-1][left] = own.pull
+        if math.isinf(self.enough):
+            # without a known design the question is whether the limits can be kept
+            pull = boxes.pull
         found = np.where(broken, np.inf, found)
         return found, worth_halving(pull, lower, upper)
 

@@ -1,7 +1,7 @@
-"""Leads of geared shafts, and of machines coupled on one: boxes of leads, each bounded by its program (P13, P14).
+"""Phase leads of geared shafts and coupled machines by branch and bound (P13, P14).
 
-What is affine stands in a cone program in the middle of every box, whose dual rows bound the whole of it. Where nothing
-but leads is open, searches from the best points of a grid find a design first.
+A cone program at the middle of every box decides the unbalances; its dual rows bound the objective in the whole box.
+If only leads are open, simplex searches from the best points of a grid find the first design.
 """
 
 from __future__ import annotations
@@ -23,28 +23,28 @@ from laufruhe.prove.best_first import EMPTY, Box, Over, halves
 from laufruhe.prove.boxes.leads import SLACK, LeadBound, LeadBoxes
 from laufruhe.prove.certificate import Multipliers, best_bound
 from laufruhe.prove.witness import thin
-from laufruhe.solvers.boxes.held_designs import SHARE, HeldDesign, HeldDesigns, best_with
-from laufruhe.solvers.boxes.search import searched
+from laufruhe.solvers.boxes.box_designs import SHARE, RebalancedDesign, RebalancedSearch, rebalance
+from laufruhe.solvers.boxes.search import search_from_grid
 from laufruhe.solvers.conclusion import judged
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import on_grid
 from laufruhe.solvers.result import Result
 
 MOST_BOXES, MOST_PROGRAMS = 20_000, 2_000
-"""Boxes of leads alone, and of those with a cone program each."""
+"""Largest number of boxes without and with cone programs."""
 GRID, MOST_STARTS, MOST_STEPS = 24, 600, 300
-"""Steps of a lead, and points in all, among which searches begin, and their own steps."""
+"""Points of the start grid along a lead and in all, and iterations of a simplex search."""
 COARSE, NEAR = 4, 10.0
-"""Part of the angles at which the programs of boxes stand, and the tolerances from which these stand at all."""
-LOOKS, SAME = (0.0, 0.31, 0.67), 1e-6
-"""Places at which a lead is looked at for whether anything asked changes, and the share that is no change."""
+"""Factor of coarser sampling in programs, and the tolerances within which programs use all angles."""
+PROBES, SAME = (0.0, 0.31, 0.67), 1e-6
+"""Shares of the range at which a lead is tested for an effect, and the relative change that counts as none."""
 EXACT = 0.02
-"""Of the tolerance, by which parts of a box may still be better."""
+"""Share of the tolerance by which a part of a box may still be better."""
 
 
 def solve_leads(problem: Problem) -> Result:
-    """The best leads, and the unbalances with them, proven as far as boxes go."""
-    search = _Search(problem)
+    """Return the best leads and unbalances, with a bound by boxes of leads."""
+    search = LeadSearch(problem)
     search.check_acts()
     root, first = search.box(search.model.lower, search.model.upper), search.first()
     if search.model.domains:
@@ -54,7 +54,7 @@ def solve_leads(problem: Problem) -> Result:
 
 @dataclass(frozen=True, eq=False)
 class _Box:
-    """Leads between bounds, and what bounds the objective there."""
+    """Leads between bounds, the lower bound there, and that at the middle."""
 
     lower: Array
     upper: Array
@@ -63,13 +63,8 @@ class _Box:
     side: int
     is_exact: bool
 
-    @property
-    def middle(self) -> Array:
-        """Of its sides."""
-        return np.asarray(0.5 * (self.lower + self.upper))
 
-
-class _Search(HeldDesigns[_Box]):
+class LeadSearch(RebalancedSearch[_Box]):
     """Boxes of the leads of a problem."""
 
     def __init__(self, problem: Problem) -> None:
@@ -78,78 +73,77 @@ class _Search(HeldDesigns[_Box]):
         self.boxes = LeadBoxes(self.model)
         self.samples = max(problem.fidelity.samples // COARSE, 24) * COARSE
 
-    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | Over, HeldDesign | None]]:
-        """Halves of a box, each with the best design at its middle where that may be better than a value."""
+    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | Over, RebalancedDesign | None]]:
+        """Yield the halves of a box, each with the best design at its middle if that may be better than a value."""
         for low, high in halves(Box(box.lower, box.upper, box.side)):
             half = self.box(low, high, box.bound, value)
             level = value * (1.0 - SHARE * self.problem.tolerance)
             is_worth = not isinstance(half, Over) and half.bound < value and half.at_middle < level
-            yield half, self.at(0.5 * (low + high)) if is_worth else None
+            yield half, self.rebalance_at(0.5 * (low + high)) if is_worth else None
 
     def box(self, lower: Array, upper: Array, floor: float = 0.0, value: float = math.inf) -> _Box | Over:
-        """The bound of a box, or that no design is allowed in it. Near a value the program stands at all angles."""
+        """Return the bound of a box, or that it has no feasible design; bounds close to `value` use all angles."""
         middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
-        found = self._bound(middle, half, COARSE)
-        if self.model.domains and value * (1.0 - NEAR * self.problem.tolerance) < found.value < value:
-            found = self._bound(middle, half, 1)
-        if math.isinf(found.value):
-            self.told(found.broken)
+        result = self._bound(middle, half, COARSE)
+        if self.model.domains and value * (1.0 - NEAR * self.problem.tolerance) < result.value < value:
+            result = self._bound(middle, half, 1)
+        if math.isinf(result.value):
+            self.add_conflict(result.broken)
             return EMPTY
-        side = int(np.argmax(found.pull + 1e-12 * half))
-        bound, room = max(found.value, floor), EXACT * self.problem.tolerance * found.at_middle
-        return _Box(lower, upper, bound, found.at_middle, side, found.at_middle - bound <= room < math.inf)
+        side = int(np.argmax(result.pull + 1e-12 * half))
+        bound, room = max(result.value, floor), EXACT * self.problem.tolerance * result.at_middle
+        return _Box(lower, upper, bound, result.at_middle, side, result.at_middle - bound <= room < math.inf)
 
     def _bound(self, middle: Array, half: Array, part: int) -> LeadBound:
         fine, norms = self.model.at(middle, self.samples, averaged=True)
         if not self.model.domains:
-            return self._alone(middle, half, fine, norms)
+            return self._bound_without_unbalances(middle, half, fine, norms)
         coarse, rough = self.model.at(middle, self.samples // part, averaged=True)
         solution = solve_cones(coarse)
         if solution.x is None:
             limits = solution.multipliers.limits
-            found = self._excluded(middle, half, coarse, rough[len(coarse.terms) :], limits)
-            # nothing is known of its halves yet, nor that designs in its middle are allowed
-            return found or LeadBound(0.0, math.inf, half)
+            excluded = self._excluded(middle, half, coarse, rough[len(coarse.terms) :], limits)
+            # the middle has no feasible design, but the halves may have one
+            return excluded or LeadBound(0.0, math.inf, half)
         bound = best_bound(fine, solution.x, on_grid(coarse, fine, solution.multipliers))
         return self.boxes.bound(middle, half, fine, norms, bound.multipliers)
 
-    def _alone(self, middle: Array, half: Array, program: AffineProblem, norms: tuple[LedNorm, ...]) -> LeadBound:
-        """Where nothing but leads is open: by the rows themselves."""
+    def _bound_without_unbalances(
+        self, middle: Array, half: Array, program: AffineProblem, norms: tuple[LedNorm, ...]
+    ) -> LeadBound:  # fmt: skip
         none = tuple(np.zeros_like(norm.constant) for _, norm in program.limits)
         for k, (most, norm) in enumerate(program.limits):
             if norm.value(np.zeros(0)) > most * (1.0 + SLACK):
                 only = tuple(norm.subgradient(np.zeros(0)) if j == k else z for j, z in enumerate(none))
-                found = self._excluded(middle, half, program, norms[len(program.terms) :], only)
-                if found is not None:
-                    return found
+                excluded = self._excluded(middle, half, program, norms[len(program.terms) :], only)
+                if excluded is not None:
+                    return excluded
         rows = tuple(norm.subgradient(np.zeros(0)) for _, norm in program.terms)
         return self.boxes.bound(middle, half, program, norms, Multipliers(rows, none))
 
     def _excluded(
         self, middle: Array, half: Array, program: AffineProblem, norms: tuple[LedNorm, ...], limits: tuple[Array, ...]
     ) -> LeadBound | None:  # fmt: skip
-        """That no design in a box is allowed; None where these dual rows do not show it."""
+        """Return an infinite bound if dual rows of limits prove that a box has no feasible design, else None."""
         stripped = replace(program, terms=())
-        found = self.boxes.bound(middle, half, stripped, norms, Multipliers((), limits))
-        if not math.isinf(found.value):
+        bound = self.boxes.bound(middle, half, stripped, norms, Multipliers((), limits))
+        if not math.isinf(bound.value):
             return None
-        self.told([x.name for x, z in zip(self.problem.load_limits, limits, strict=True) if z.any()])
-        return found
+        self.add_conflict([x.name for x, z in zip(self.problem.load_limits, limits, strict=True) if z.any()])
+        return bound
 
-    def around(self, found: HeldDesign) -> _Box | Over:
-        """Return a thin box around the leads of a design, and its bound."""
-        return self.box(*thin(self.place(found), self.model.lower, self.model.upper), 0.0, found.value)
-
-    # designs
+    def around(self, design: RebalancedDesign) -> _Box | Over:
+        """Return a thin box around the leads of a design with its bound."""
+        return self.box(*thin(self.place(design), self.model.lower, self.model.upper), 0.0, design.value)
 
     def check_acts(self) -> None:
-        """Refuse a lead that nothing asked hangs on: each of its loads is the same, a little earlier."""
+        """Raise ModelError if a lead changes neither the objective nor a limit."""
         lower, upper = self.model.lower, self.model.upper
         for k, decision in enumerate(self.model.leads if not self.model.domains else ()):
             here = np.arange(len(lower)) == k
-            places = [np.where(here, lower + share * (upper - lower), self.model.start) for share in LOOKS]
-            found = [self._numbers(place) for place in places]
-            if np.ptp(found, axis=0).max() <= SAME * np.abs(found).max():
+            places = [np.where(here, lower + share * (upper - lower), self.model.start) for share in PROBES]
+            numbers = [self._numbers(place) for place in places]
+            if np.ptp(numbers, axis=0).max() <= SAME * np.abs(numbers).max():
                 why = "is open, and nothing that is asked depends on it; fix it, or ask for what shafts share"
                 raise ModelError(f"{decision.name} {why}")
 
@@ -158,23 +152,26 @@ class _Search(HeldDesigns[_Box]):
         norms = [norm.value(np.zeros(0)) for _, norm in (*program.terms, *program.limits)]
         return np.array([*norms, *self.boxes.numbers(leads)])
 
-    def first(self) -> HeldDesign:
-        """The design as given, and the best that searches find where leads alone are open."""
-        found = [HeldDesign(judged(self.problem, self.problem.start))]
+    def first(self) -> RebalancedDesign:
+        """Return the best of the baseline design and of a few others."""
+        designs = [RebalancedDesign(judged(self.problem, self.problem.start))]
         if self.model.domains:
-            found += [self.at(self.model.start), self.at(0.5 * (self.model.lower + self.model.upper))]
+            designs += [
+                self.rebalance_at(self.model.start),
+                self.rebalance_at(0.5 * (self.model.lower + self.model.upper)),
+            ]
         else:
-            ends = searched(self._penalised, self.model.lower, self.model.upper, GRID, MOST_STARTS, MOST_STEPS)
-            found += [HeldDesign(judged(self.problem, each.tolist())) for each in ends]
-        return min(found, key=lambda each: each.design.rank)
+            ends = search_from_grid(self._penalised, self.model.lower, self.model.upper, GRID, MOST_STARTS, MOST_STEPS)
+            designs += [RebalancedDesign(judged(self.problem, each.tolist())) for each in ends]
+        return min(designs, key=lambda each: each.rank)
 
-    def at(self, leads: Array) -> HeldDesign:
-        """The best design with its leads given."""
+    def rebalance_at(self, leads: Array) -> RebalancedDesign:
+        """Return the best design with these leads [rad]."""
         where: dict[str, Value] = {d.name: float(x) for d, x in zip(self.model.leads, leads, strict=True)}
-        return best_with(self.problem, self._held(leads), where)
+        return rebalance(self.problem, self._with_fixed_leads(leads), where)
 
-    def _held(self, leads: Array) -> Problem:
-        """The problem with its leads given: what turns with them has turned."""
+    def _with_fixed_leads(self, leads: Array) -> Problem:
+        """Return the problem of the unbalances; the gains of those on led shafts are turned."""
         by = dict(zip(self.model.names, leads - self.model.start, strict=True))
         shafts = {rotor.name: rotor.shaft for rotor in self.problem.engine.rotors}
 
@@ -189,7 +186,7 @@ class _Search(HeldDesigns[_Box]):
         return replace(self.problem, engine=engine, decisions=tuple(turned(d) for d in self.problem.unbalances))
 
     def _penalised(self, leads: Array) -> float:
-        """The objective, and what limits are broken by, many times over."""
+        """Return the objective with a penalty on violated limits."""
         inside = np.clip(leads, self.model.lower, self.model.upper)
         program, _ = self.model.at(inside, self.samples)
         (swing, broken), x = self.boxes.degrees(inside, np.zeros_like(inside)), np.zeros(0)

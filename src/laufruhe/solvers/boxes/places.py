@@ -1,4 +1,4 @@
-"""Places of unbalances, and what is open with them: boxes of places, each bounded by its program (P8, P20)."""
+"""Positions of unbalances by branch and bound; a relaxed program bounds every box of positions (P8, P20)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TypeAlias
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
+from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Side
 from laufruhe.problem.nothing import nothing_of
@@ -18,7 +19,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import EMPTY, Box, Over, halves
 from laufruhe.prove.witness import thin
-from laufruhe.solvers.boxes.held_designs import SHARE, HeldDesign, HeldDesigns, best_with
+from laufruhe.solvers.boxes.box_designs import SHARE, RebalancedDesign, RebalancedSearch, rebalance
 from laufruhe.solvers.boxes.place_boxes import Relaxation
 from laufruhe.solvers.boxes.search import divided
 from laufruhe.solvers.conclusion import Design, judged, none_within, values_of
@@ -30,31 +31,33 @@ from laufruhe.solvers.result import Result, Status
 Solve: TypeAlias = Callable[[Problem], Result]
 Propose: TypeAlias = Callable[[Problem, Sequence[Sequence[Value]]], Result]
 MOST_BOXES, MOST_OTHERS = 300, 500
-"""Boxes of places, and those of a method that decides what else is open."""
+"""Largest number of boxes of positions, and of boxes of the method for other decisions."""
 HALF = 0.5
-"""Share of the tolerance that such a method may use up."""
+"""Share of the tolerance for the method of other decisions."""
 # [m]
 EXACT = 1e-6
-# share of the bounds of a place by which it is moved to see what that is worth
+# share of the range of a position by which finite differences move it
 STEP = 1e-3
-# [m], by which a limit on a distance may be missed, and by which it is kept where places are moved for it
+# [m] tolerance of limits on distances, and margin where positions are moved into them
 REACH, INSIDE = 1e-9, 1e-7
-# of the part of a side that is cut away
+# bisections of the slice that is cut off a side
 HALVINGS = 10
-# of a box, from which allowed places are sought
+# corners of a box from which feasible positions are sought
 MOST_CORNERS = 16
 
 
 @dataclass(frozen=True, eq=False)
 class _Box:
-    """Places between bounds, shape (places,) each, what bounds the objective there, and where it looks best.
+    """Positions between bounds, the lower bound there, and the positions of its relaxation.
 
     Attributes
     ----------
+    lower, upper, middle
+        Positions [m], shape (places,) each.
     spread
-        By how much what was left out pulls each place apart [m]; next to nothing where it made no difference.
+        Distance by which the relaxation spreads the unbalances of each position [m]; zero if it is exact.
     near
-        Decisions of the problem that are about those of its program.
+        Values of all decisions of the problem about the solution of the relaxation.
     """
 
     lower: Array
@@ -66,47 +69,47 @@ class _Box:
 
     @property
     def is_exact(self) -> bool:
-        """Whether it left nothing out: no part of it has more than a bound as near as its program came."""
+        """Whether the relaxation is exact."""
         return bool(self.spread.max() <= EXACT)
 
 
 def solve_places(problem: Problem) -> Result:
-    """Places and unbalances, proven as far as dividing the boxes of places goes."""
-    search = _Search(problem)
+    """Return the best positions and unbalances, with a bound by boxes of positions."""
+    search = PlaceSearch(problem)
     root = search.box(*search.bounds)
-    first = None if isinstance(root, Over) else search.at(root.middle)
+    first = None if isinstance(root, Over) else search.rebalance_at(root.middle)
     return search.solved(root, first, problem.search.boxes_or(MOST_BOXES), "places", "second-order cones over")
 
 
 def solve_places_with(problem: Problem, prove: Solve, how: str, propose: Propose) -> Result:
-    """Places and whatever else is open by a proposal, with the bound of the box of all places (P20).
+    """Return a proposed design, with the bound of the relaxation over all positions (P20).
 
     Parameters
     ----------
     prove, how
-        Decides the same without places, and its name.
+        Method for the problem without open positions, and its name.
     propose
-        Seeks a design near some.
+        Local search that starts from given values of the decisions.
     """
     started, most = time.perf_counter(), problem.search.boxes_or(MOST_OTHERS)
 
     def prove_roughly(part: Problem) -> Result:
         return prove(replace(part, tolerance=HALF * problem.tolerance, search=replace(part.search, boxes=most)))
 
-    search = _Others(problem, prove_roughly)
+    search = _PlaceSearchByMethod(problem, prove_roughly)
     root = search.box(*search.bounds)
     if isinstance(root, Over):
         return none_within(problem, evaluate(problem), search.conflict, {"solve": time.perf_counter() - started})
-    found = propose(problem, [root.near])
-    if not found.status.has_design or not problem.search.proves:
-        return found
-    first = HeldDesign(judged(problem, values_of(problem, found), found.final.samples), found)
+    result = propose(problem, [root.near])
+    if not result.status.has_design or not problem.search.proves:
+        return result
+    first = RebalancedDesign(judged(problem, values_of(problem, result), result.final.samples), result)
     _, bound, _ = divided(search, root, first, nothing_of(problem), problem.tolerance, 1, "boxes of places")
-    return with_bound(found, bound, f"{how} with places at the corners of their bounds")
+    return with_bound(result, bound, f"{how} with places at the corners of their bounds")
 
 
-class _Search(HeldDesigns[_Box]):
-    """Boxes of the places of a problem."""
+class PlaceSearch(RebalancedSearch[_Box]):
+    """Boxes of the open positions of a problem."""
 
     is_shared = True
 
@@ -118,60 +121,57 @@ class _Search(HeldDesigns[_Box]):
 
     @property
     def bounds(self) -> tuple[Array, Array]:
-        """Of all places."""
-        return np.array([p.lower for p in self.places]), np.array([p.upper for p in self.places])
+        """Bounds of all positions [m]."""
+        return sides_of(self.places)
 
-    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | Over, HeldDesign | None]]:
-        """Halves of a box, each with the best design at its middle if it may be better than a value."""
-        for half in self._halves(box):
-            yield half, None if isinstance(half, Over) or half.bound >= value else self.at(half.middle)
-
-    def _halves(self, box: _Box) -> Iterator[_Box | Over]:
+    def parts(self, box: _Box, value: float) -> Iterator[tuple[_Box | Over, RebalancedDesign | None]]:
+        """Yield the halves of a box, each with the best design at its middle if that may be better than a value."""
         width, whole = box.upper - box.lower, self.bounds[1] - self.bounds[0]
         pulled = box.spread if box.spread.max(initial=0.0) > 1e-9 * whole.max() else width / whole
         side = int(np.argmax(pulled))
-        for half in halves(Box(box.lower, box.upper, side), float(box.middle[side])):
-            yield self.box(*half, box.bound)
+        for bounds in halves(Box(box.lower, box.upper, side), float(box.middle[side])):
+            half = self.box(*bounds, box.bound)
+            yield half, None if isinstance(half, Over) or half.bound >= value else self.rebalance_at(half.middle)
 
     def box(self, lower: Array, upper: Array, floor: float = 0.0) -> _Box | Over:
-        """The bound of a box, and where its program puts the places; or that no design is allowed."""
-        beyond = self._beyond(lower, upper)
-        if beyond:
-            self.told(beyond)
+        """Return a box with the bound and the positions of its relaxation, or that it has no feasible design."""
+        violated = self._violated(lower, upper)
+        if violated:
+            self.add_conflict(violated)
             return EMPTY
         lower, upper = self._shrunk(lower, upper)
         relaxed = self.relaxation.program(lower, upper)
         result = self._solve(relaxed)
         if result.status is Status.INFEASIBLE:
-            self.told(result.conflict)
+            self.add_conflict(result.conflict)
             return EMPTY
         bound = result.certificate.lower_bound if result.certificate is not None else 0.0
         middle, spread = self.relaxation.placing(relaxed, result, lower, upper)
-        allowed = self._pushed(middle, lower, upper)
-        # what the program does not know of moves the places too
-        moved = upper - lower if allowed is None else np.abs(allowed - middle)
-        spread, middle = np.maximum(spread, moved), middle if allowed is None else allowed
+        feasible = self._move_into_limits(middle, lower, upper)
+        # limits on distances are not in the relaxation
+        moved = upper - lower if feasible is None else np.abs(feasible - middle)
+        spread, middle = np.maximum(spread, moved), middle if feasible is None else feasible
         near = self.relaxation.values(relaxed, result, middle)
         return _Box(lower, upper, max(bound, floor), middle, spread, near)
 
-    def place(self, found: HeldDesign) -> Array:
-        """Return the places of a design."""
-        values = dict(zip((d.name for d in self.problem.decisions), found.design.values, strict=True))
+    def place(self, design: RebalancedDesign) -> Array:
+        """Return the positions of a design [m], shape (places,)."""
+        values = dict(zip((d.name for d in self.problem.decisions), design.design.values, strict=True))
         return np.array([float(np.real(values[place.name])) for place in self.places])
 
-    def around(self, found: HeldDesign) -> _Box | Over:
-        """Return a thin box around the places of a design, and its bound at the first angles that are tried."""
-        few = _Search(self.problem.changed(search=replace(self.problem.search, proves=False)))
-        return few.box(*thin(self.place(found), *self.bounds))
+    def around(self, design: RebalancedDesign) -> _Box | Over:
+        """Return a thin box around the positions of a design, with its bound by few angles."""
+        few = PlaceSearch(self.problem.changed(search=replace(self.problem.search, proves=False)))
+        return few.box(*thin(self.place(design), *self.bounds))
 
     def _solve(self, relaxed: Problem) -> Result:
         result = solve_unbalances(relaxed, angles=self.angles)
-        # what all places needed, their parts need too
+        # halves need as many angles as the first box
         self.angles = self.angles or result.final.samples // 2
         return result
 
     def _spans(self, lower: Array, upper: Array) -> Iterator[tuple[Limit, float, float]]:
-        """Least and largest of each distance that is limited, with its places in a box."""
+        """Yield the range of each limited distance [m] over a box."""
         if not self._envelope:
             return
         low = self.problem.design(lower.tolist(), self.places)
@@ -180,15 +180,15 @@ class _Search(HeldDesigns[_Box]):
             for least, most in limit.measure.channel.span(limit.measure, low, high):
                 yield limit, least, most
 
-    def _beyond(self, lower: Array, upper: Array) -> tuple[str, ...]:
-        """A limit on distances that is broken all over a box; none where there is no such."""
+    def _violated(self, lower: Array, upper: Array) -> tuple[str, ...]:
+        """Return the name of a limit on distances that is violated all over a box, if any."""
         for limit, least, most in self._spans(lower, upper):
             if least > limit.maximum + REACH or most < limit.minimum - REACH:
                 return (limit.name,)
         return ()
 
     def _shrunk(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """A box without slices at its sides in which a limit on distances is broken everywhere."""
+        """Return a box without slices at its sides that violate a limit on distances everywhere."""
         lower, upper = lower.copy(), upper.copy()
         for side, at_top in product(range(len(lower)) if self._envelope else (), (True, False)):
             low, high, width = 0.0, 1.0, upper[side] - lower[side]
@@ -199,15 +199,15 @@ class _Search(HeldDesigns[_Box]):
                     first[side] = upper[side] - share * width
                 else:
                     last[side] = lower[side] + share * width
-                low, high = (share, high) if self._beyond(first, last) else (low, share)
+                low, high = (share, high) if self._violated(first, last) else (low, share)
             if at_top:
                 upper[side] -= low * width
             else:
                 lower[side] += low * width
         return lower, upper
 
-    def _pushed(self, middle: Array, lower: Array, upper: Array) -> Array | None:
-        """Places in a box that keep the limits on distances, near its middle; None where none are found."""
+    def _move_into_limits(self, middle: Array, lower: Array, upper: Array) -> Array | None:
+        """Return positions in a box close to `middle` that keep the limits on distances, or None."""
 
         def room(places: Array) -> Array:
             spans = self._spans(places, places)
@@ -218,65 +218,65 @@ class _Search(HeldDesigns[_Box]):
             return middle
         from scipy.optimize import NonlinearConstraint, minimize
 
-        kept = NonlinearConstraint(room, INSIDE, np.inf)
+        limits = NonlinearConstraint(room, INSIDE, np.inf)
         width, sides = np.where(upper > lower, upper - lower, 1.0), list(zip(lower, upper, strict=True))
 
-        def away(places: Array) -> float:
+        def distance(places: Array) -> float:
             return float(np.square((places - middle) / width).sum())
 
         def slope(places: Array) -> Array:
             return np.asarray(2.0 * (places - middle) / width**2)
 
         corners = [np.array(corner) for corner in islice(product(*sides), MOST_CORNERS)]
-        found = []
+        feasible = []
         for start in (middle, *corners):
-            pushed = minimize(away, start, jac=slope, method="SLSQP", bounds=sides, constraints=[kept])
-            found += [at for at in (np.clip(pushed.x, lower, upper), start) if room(at).min() >= -REACH]
-        return min(found, key=away, default=None)
+            end = minimize(distance, start, jac=slope, method="SLSQP", bounds=sides, constraints=[limits])
+            feasible += [at for at in (np.clip(end.x, lower, upper), start) if room(at).min() >= -REACH]
+        return min(feasible, key=distance, default=None)
 
     def prices(self, design: Design) -> dict[Side, Price]:
-        """Prices of limits on distances: what the least objective loses and they gain as places move (P19)."""
-        places = self.place(HeldDesign(design))
-        # every shaft that stands at a limit has a distance of its own
-        held = [
+        """Return prices of limits on distances, by finite differences of the objective and the distances (P19)."""
+        places = self.place(RebalancedDesign(design))
+        # every shaft at a limit has its own distance
+        active = [
             (limit, k, side)
             for limit in self._envelope for k, value in enumerate(design.evaluation.values(limit.measure))
             for room, _, side in (limit.room(value),) if room <= ACTIVE
         ]  # fmt: skip
-        if not held:
+        if not active:
             return {}
         width = self.bounds[1] - self.bounds[0]
-        ends = [(self.at(places - step), self.at(places + step)) for step in np.diag(STEP * width)]
+        ends = [(self.rebalance_at(places - step), self.rebalance_at(places + step)) for step in np.diag(STEP * width)]
 
         def slope(number: Callable[[Design], float]) -> Array:
             return np.array([(number(high.design) - number(low.design)) / (2.0 * STEP) for low, high in ends])
 
         signs = {"at most": 1.0, "at least": -1.0}
-        bends = [
-            signs[side] * slope(lambda own, limit=limit, k=k: own.evaluation.values(limit.measure)[k])  # type: ignore[misc]
-            for limit, k, side in held
+        gradients = [
+            signs[side] * slope(lambda at, limit=limit, k=k: at.evaluation.values(limit.measure)[k])  # type: ignore[misc]
+            for limit, k, side in active
         ]  # fmt: skip
         edges = [
             normal * width[k] * np.eye(len(places))[k]
             for k, place in enumerate(self.places) for normal in edges_at(place, places[k : k + 1]).values()
         ]  # fmt: skip
-        objective = [Slopes.smooth(slope(lambda own: own.value))]
-        told = prices_of(objective, [Slopes.smooth(own) for own in bends], np.reshape(edges, (-1, len(places))))
-        found: dict[Side, Price] = {}
-        for (limit, _, side), price in zip(held, told or (), strict=False):
-            found[limit, side] = price + found.get((limit, side), Price(0.0, 0.0))
-        return found
+        objective = [Slopes.smooth(slope(lambda at: at.value))]
+        prices = prices_of(objective, [Slopes.smooth(row) for row in gradients], np.reshape(edges, (-1, len(places))))
+        by_side: dict[Side, Price] = {}
+        for (limit, _, side), price in zip(active, prices or (), strict=False):
+            by_side[limit, side] = price + by_side.get((limit, side), Price(0.0, 0.0))
+        return by_side
 
-    def at(self, places: Array) -> HeldDesign:
-        """The best design with its places given."""
+    def rebalance_at(self, places: Array) -> RebalancedDesign:
+        """Return the best design with these positions [m]."""
         where: dict[str, Value] = {p.name: float(x) for p, x in zip(self.places, places, strict=True)}
-        engine, own = self.problem.design(list(where.values()), self.places), self.relaxation
-        held = replace(own.problem, engine=engine, decisions=own.others)
-        return best_with(self.problem, held, where, self.angles)
+        engine = self.problem.design(list(where.values()), self.places)
+        fixed = replace(self.relaxation.problem, engine=engine, decisions=self.relaxation.others)
+        return rebalance(self.problem, fixed, where, self.angles)
 
 
-class _Others(_Search):
-    """Boxes of the places of a problem whose other decisions have a method of their own."""
+class _PlaceSearchByMethod(PlaceSearch):
+    """Boxes of positions of a problem whose other decisions need another method than cones."""
 
     is_shared = False
 
@@ -284,9 +284,9 @@ class _Others(_Search):
         super().__init__(problem)
         self._prove = prove
 
-    def around(self, found: HeldDesign) -> _Box | Over:
-        """Return a thin box around the places of a design, and its bound."""
-        return self.box(*thin(self.place(found), *self.bounds))
+    def around(self, design: RebalancedDesign) -> _Box | Over:
+        """Return a thin box around the positions of a design with its bound."""
+        return self.box(*thin(self.place(design), *self.bounds))
 
     def _solve(self, relaxed: Problem) -> Result:
         return self._prove(relaxed)

@@ -1,4 +1,4 @@
-"""Boxes of what is not convex with a design from each, some worked out ahead by others (P9)."""
+"""Branch and bound over boxes with a design from each box; worker processes prepare boxes ahead (P9)."""
 
 from __future__ import annotations
 
@@ -17,90 +17,87 @@ from laufruhe.prove.best_first import Division, Over, Parts, Waiting
 from laufruhe.prove.certificate import gap_of
 from laufruhe.prove.witness import Bounder, Known, check_around
 
-# of the tolerance that counts as met
+# share of the tolerance at which the gap counts as closed
 NEARLY = 0.99
-# boxes that may be wanted next
+# boxes that workers prepare ahead
 AHEAD = 32
-# points of a grid from which searches begin
+# best points of a grid from which simplex searches begin
 POLISHED = 3
 
 
 class Box(Protocol):
-    """A part of what is open."""
+    """A box of open numbers."""
 
     @property
     def bound(self) -> float:
-        """What no design in it goes under."""
+        """Lower bound of the objective in the box."""
 
     @property
     def is_exact(self) -> bool:
-        """Whether its bound left nothing out: no part of it has a better one."""
+        """Whether the bound has no relaxation error: no part of the box has a better one."""
 
 
-class Found(Protocol):
-    """A design."""
+class BoxDesign(Protocol):
+    """A design from a box."""
 
     @property
     def value(self) -> float:
-        """Its objective; infinite where it is not allowed."""
+        """Objective; infinite if a limit is violated."""
 
     @property
     def rank(self) -> tuple[bool, float]:
-        """By what breaks limits least, then by what is least."""
+        """Sort key: feasible designs first, then by objective."""
 
 
 B = TypeVar("B", bound=Box)
-F = TypeVar("F", bound=Found)
+D = TypeVar("D", bound=BoxDesign)
 
 
-class Search(Generic[B, F]):
-    """What a method knows of its boxes and designs.
+class Search(Generic[B, D]):
+    """Boxes and designs of one method.
 
     Attributes
     ----------
     is_shared
-        Whether other processes may divide its boxes.
+        Whether worker processes may divide the boxes.
     """
 
     is_shared = False
 
     @property
     def conflict(self) -> tuple[str, ...]:
-        """Limits that were not met in boxes."""
+        """Names of limits that boxes without a feasible design violate."""
         raise NotImplementedError
 
-    def parts(self, box: B, value: float) -> Iterator[tuple[B | Over, F | None]]:
-        """Boxes that cover one together, and a design from each, None where none was sought.
-
-        Of a box in which no design is allowed, or none under a level, there is what is proven of it.
-        """
+    def parts(self, box: B, value: float) -> Iterator[tuple[B | Over, D | None]]:
+        """Yield boxes that cover a box, or the level below which a part has no design, each with a design or None."""
         raise NotImplementedError
 
     def level(self, _: float) -> float:
-        """Least objective that designs may have which bounds cut off where one of a value is known."""
+        """Return the least objective of designs that bounds cut off, for the value of the incumbent."""
         return math.inf
 
-    def known(self, _: F) -> Known | None:
-        """Return a design as a witness of bounds; None where it is none."""
+    def known(self, _: D) -> Known | None:
+        """Return a design as a witness of bounds, or None."""
         raise NotImplementedError
 
-    def holds(self, _box: B, _design: F) -> bool:
+    def holds(self, _box: B, _design: D) -> bool:
         """Return whether a design lies in a box."""
         return False
 
-    def around(self, _: F) -> B | Over | None:
-        """Return a thin box that holds a design, and its bound; None where the box cannot be stated."""
+    def around(self, _: D) -> B | Over | None:
+        """Return a thin box around a design with its bound, or None."""
         raise NotImplementedError
 
-    def told(self, conflict: Sequence[str]) -> None:
-        """Limits that were not met in boxes that another process divided."""
+    def add_conflict(self, conflict: Sequence[str]) -> None:
+        """Add names of limits that boxes of a worker process violate."""
 
 
-class _Designed(Division[B], Generic[B, F]):
-    """Boxes of a search, and the best design found in them."""
+class _Branching(Division[B], Generic[B, D]):
+    """Branch and bound that keeps the best design of all boxes."""
 
     def __init__(
-        self, search: Search[B, F], best: F, nothing: float, tolerance: float, what: str, ahead: Foresight[Any, Any]
+        self, search: Search[B, D], best: D, nothing: float, tolerance: float, what: str, ahead: Foresight[Any, Any]
     ) -> None:  # fmt: skip
         self.what, self.best, self.value = what, best, best.value
         self.known = search.known(best)
@@ -108,7 +105,7 @@ class _Designed(Division[B], Generic[B, F]):
 
     @property
     def level(self) -> float:
-        """Least objective that designs may have which bounds cut off; infinite where none are."""
+        """Least objective of designs that bounds cut off; infinite if they cut off none."""
         return self._search.level(self.value)
 
     def holds(self, box: B) -> bool:
@@ -116,70 +113,70 @@ class _Designed(Division[B], Generic[B, F]):
         return self._search.holds(box, self.best)
 
     def is_done(self, one: Waiting[B]) -> bool:
-        """Whether it meets the best design."""
+        """Return whether the gap between a box and the incumbent is closed."""
         gap = gap_of(self.value, one.bound, self._nothing)
-        # a box that left nothing out has no better design, only a bound as near as its program came
+        # the bound of an exact box differs from its best design by no more than the tolerance of its program
         return gap <= NEARLY * self._tolerance or (gap < np.inf and one.part.is_exact)
 
-    def _take(self, found: F) -> None:
-        if found.rank < self.best.rank:
-            self.best, self.value, self.known = found, found.value, self._search.known(found)
-
     def parts(self, taken: Sequence[Waiting[B]]) -> Parts[B]:
-        """Parts of a box, worked out ahead where others divide boxes too."""
-        ((known, name, box),) = taken
+        """Yield the parts of a box, prepared by workers if the search is shared."""
+        ((bound, name, box),) = taken
         search, step = self._search, (self._search, box, self.value)
         if search.is_shared:
             others = ((number, (search, part, self.value)) for _, number, part in self.coming(AHEAD))
             self._ahead.likely([(name, step), *others])
         parts, conflict = self._ahead.wanted(name, step)
-        search.told(conflict)
-        for part, found in parts:
-            if found is not None:
-                self._take(found)
+        search.add_conflict(conflict)
+        for part, design in parts:
+            if design is not None and design.rank < self.best.rank:
+                self.best, self.value, self.known = design, design.value, search.known(design)
             yield part if isinstance(part, Over) else (part.bound, part)
             if not search.is_shared and passed():
-                # what is left of the box is bounded by its own bound
-                yield known, box
+                # the remaining parts have at least the bound of the box
+                yield bound, box
                 return
 
 
 def divided(
-    search: Search[B, F], root: B, best: F, nothing: float, tolerance: float, most: int, what: str
-) -> tuple[F, float, int]:
-    """Divide boxes until their least bound meets the best design, or as often as is worth it.
+    search: Search[B, D], root: B, best: D, nothing: float, tolerance: float, most: int, what: str
+) -> tuple[D, float, int]:
+    """Divide boxes until the least bound meets the best design.
 
     Parameters
     ----------
+    root, best
+        Box of all open numbers, and a design to begin with.
     nothing
-        Objective that counts as zero.
+        Objective that counts as zero [SI].
+    tolerance
+        Relative gap at which the search ends.
     most
-        Boxes.
+        Largest number of boxes.
     what
-        Is divided, in words.
+        Name of the boxes in progress reports.
 
     Returns
     -------
-    The best design; what no design goes under, infinite where none is allowed; and how many boxes there were.
+    The best design, the lower bound of all designs (infinite if none is feasible), and the number of boxes.
     """
     with foresight(_parted) as ahead:
-        boxes = _Designed(search, best, nothing, tolerance, what, ahead)
+        boxes = _Branching(search, best, nothing, tolerance, what, ahead)
         bound = boxes.divide((root.bound, root), most)
     if boxes.known is not None:
-        around: Bounder[F, B | Over] = _Around(search, what)
+        around: Bounder[D, B | Over] = _Around(search, what)
         check_around(around, boxes.best, boxes.known)
     return boxes.best, bound, boxes.seen
 
 
 @dataclass(frozen=True, eq=False)
-class _Around(Generic[B, F]):
-    """Bounder of thin boxes of a search."""
+class _Around(Generic[B, D]):
+    """Thin boxes of a search, to check bounds around a known design."""
 
-    search: Search[B, F]
+    search: Search[B, D]
     what: str
 
-    def around(self, design: F) -> B | Over | None:
-        """Return a thin box around a design, with its bound."""
+    def around(self, design: D) -> B | Over | None:
+        """Return a thin box around a design with its bound."""
         return self.search.around(design)
 
     def bound(self, box: B | Over) -> float:
@@ -188,27 +185,38 @@ class _Around(Generic[B, F]):
 
 
 def _parted(step: tuple[Any, Any, float]) -> tuple[Iterable[tuple[Any, Any]], tuple[str, ...]]:
-    """Parts of a box; one by one as they are wanted where nobody else divides boxes."""
     search, box, value = step
     parts = search.parts(box, value)
     return (list(parts) if search.is_shared else parts), search.conflict
 
 
-def searched(
+def search_from_grid(
     penalised: Callable[[Array], float], lower: Array, upper: Array, steps: int, most: int, most_steps: int
 ) -> list[Array]:
-    """Where simplex searches end that begin at the best points of a grid, of so many steps a side and points in all."""
+    """Return the ends of simplex searches from the best points of a grid.
+
+    Parameters
+    ----------
+    penalised
+        Objective with penalties on violated limits.
+    lower, upper
+        Bounds, shape (n,).
+    steps, most
+        Points of the grid along a side, and in all.
+    most_steps
+        Iterations of one search.
+    """
     from scipy.optimize import minimize
 
     count = min(steps, max(int(most ** (1.0 / len(lower))), 2))
     sides = [np.linspace(a, b, count) for a, b in zip(lower, upper, strict=True)]
     points = sorted((np.array(point) for point in itertools.product(*sides)), key=penalised)
     bounds: Any = list(zip(lower, upper, strict=True))
-    found = []
+    ends = []
     for point in points[:POLISHED]:
         simplex = np.clip(np.vstack([point, point + np.diag(0.5 * (upper - lower) / count)]), lower, upper)
-        least = 1e-12 * max(penalised(point), 1e-300)
-        told: Any = {"initial_simplex": simplex, "xatol": 1e-8, "fatol": least, "maxiter": most_steps}
-        end = minimize(penalised, point, method="Nelder-Mead", bounds=bounds, options=told).x
-        found.append(np.clip(end, lower, upper))
-    return found
+        tolerance = 1e-12 * max(penalised(point), 1e-300)
+        options: Any = {"initial_simplex": simplex, "xatol": 1e-8, "fatol": tolerance, "maxiter": most_steps}
+        end = minimize(penalised, point, method="Nelder-Mead", bounds=bounds, options=options).x
+        ends.append(np.clip(end, lower, upper))
+    return ends

@@ -1,26 +1,31 @@
-"""What provers tell of designs that a search of mounts has found."""
+"""Lower bounds of designs on open mounts, and proofs that limits contradict each other."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time, passed
+from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import NEARLY, Divided
 from laufruhe.prove.certificate import Reach, certified, room_of
 from laufruhe.prove.mounts.provers import Question, proven
-from laufruhe.prove.mounts.subdivision import divides
+from laufruhe.prove.mounts.subdivision import divided_bounds, divides
 from laufruhe.solvers.conclusion import KEPT, Design, known_of, values_of
+from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.mounts.search import MountSearch
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.told_limits import over_read
 
 MOST_DIVISIONS = 3
+# share of the boxes of a problem that each set of limits may use up
+FEW = 0.1
 
 
 def mount_numbers(design: Design) -> Array:
@@ -79,3 +84,20 @@ def bounded_under(result: Result, value: float, enough: float = math.inf, of_man
         result.objective.value, found.bound, nothing, problem.tolerance, Reach.NEAR, certificate.kkt_residual, text
     )
     return replace(result, certificate=told)
+
+
+def excludes(problem: Problem, limits: Sequence[Limit]) -> bool:
+    """Return whether a share of the boxes of a problem that `divides` proves that no stiffness keeps some limits."""
+    alone = replace(problem, objective=(), limits=tuple(limits))
+    return bool(limits) and any(found.bound == math.inf for found in divided_bounds(alone, math.inf, 0.0, (FEW,)))
+
+
+def conflict_of(problem: Problem) -> tuple[str, ...]:
+    """Return the names of limits that contradict each other, without those that boxes prove to be needless for that.
+
+    Parameters
+    ----------
+    problem
+        That `divides`, proven to have no design that keeps all limits.
+    """
+    return smallest_conflict(problem.limits, lambda limits: excludes(problem, limits))

@@ -30,9 +30,8 @@ from laufruhe.prove.mounts.provers import Question, proven, provers
 from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, decided, nearest_of, none_within, unbalances_of
 from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_unbalances
-from laufruhe.solvers.mounts.bounds import divided_by
+from laufruhe.solvers.mounts.bounds import conflict_of, divided_by, excludes
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
-from laufruhe.solvers.mounts.limits_kept import ruled_out
 from laufruhe.solvers.mounts.places import Place, judged_at
 from laufruhe.solvers.mounts.search import Found, MountSearch
 from laufruhe.solvers.mounts.starts import looks, place_of
@@ -178,7 +177,7 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
     # what no load is in is the same for all unbalances
     limits = tuple(limit for limit in problem.mount_limits if not limit.measure.channel.of_loads)
     alone = replace(problem, decisions=problem.mount_decisions, objective=(), limits=limits)
-    return ruled_out(alone) if limits and divides(alone) else ()
+    return conflict_of(alone) if divides(alone) and excludes(alone, limits) else ()
 
 
 def mounts_bound(problem: Problem, near: Sequence[Value] = ()) -> float:
@@ -256,7 +255,7 @@ def _none(
     """No start ended at a design within the limits: a proof where the convex limits, or all boxes, tell of none."""
     conflict = _proven_conflict(problem)
     if not conflict and divided.bound == math.inf:
-        conflict = ruled_out(problem)
+        conflict = conflict_of(problem)
     result = none_within(problem, initial, conflict, timing)
     if conflict:
         return result

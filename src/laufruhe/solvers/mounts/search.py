@@ -19,7 +19,7 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.nothing import nothing_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Design, given_design
+from laufruhe.solvers.conclusion import FEASIBLE, Design, given_design
 from laufruhe.solvers.mounts.places import Place, judged_at, started_at
 from laufruhe.solvers.mounts.starts import start_points
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, is_explored
@@ -217,12 +217,6 @@ class MountSearch:
             design = started_at(self.problem, place)
             limits = [x for x in limits if design is not None and design.evaluation.standing(x).excess < -ROOM]
         return set(limits)
-
-    @property
-    def starts_kept(self) -> bool:
-        """Whether any of the first starts keeps all limits."""
-        designs = (started_at(self.problem, place) for place in self._points[:LOOKED])
-        return any(design is not None and design.excess <= KEPT for design in designs)
 
     def _under_what_is_felt(self, search: Callable[[], None]) -> None:
         """A search, and again under the limits that were left out where its best ends come near them."""

@@ -1,12 +1,17 @@
-"""The largest excess over limits that linear functions tell of boxes (E67): against linear programs."""
+"""Bounds of the largest violation of limits over boxes (E67): against linear programs."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 
 from laufruhe.prove.mounts.box_lines import BoxLines
+from laufruhe.solvers import solve
+from laufruhe.solvers.result import Status
+from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
 
 
 def test_the_least_excess_is_never_over_that_of_a_linear_program() -> None:
@@ -40,3 +45,26 @@ def test_three_limits_exclude_a_box_that_no_two_of_them_do() -> None:
 
     assert excess([0, 1, 2]) == pytest.approx(over)
     assert all(excess(pair) < 0.0 for pair in ([0, 1], [0, 2], [1, 2]))
+
+
+def test_limits_that_are_kept_are_no_conflict_of_those_that_are_not(tmp_path: Path) -> None:
+    """A limit on forces that no search meets says nothing of sag, which all designs keep."""
+    asked = """
+    [search]
+    starts = 1
+    [[counterweights]]
+    name = "front"
+    x = "200 mm"
+    unbalance = { between = ["0 kg m", "0.05 kg m"] }
+    [objective]
+    minimise = "rms mount force"
+    [[constraints]]
+    limit = "static sag"
+    max = "1 m"
+    [[constraints]]
+    limit = "maximum mount force"
+    max = "1e-3 N"
+    """
+    result = solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, asked))
+    assert result.status is Status.FAILED
+    assert result.conflict == ()

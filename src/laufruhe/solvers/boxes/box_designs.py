@@ -1,0 +1,156 @@
+"""Branch and bound over decisions that are not affine, with optimal unbalances for fixed values of these."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.problem.measure import Side
+from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.problem import Problem
+from laufruhe.problem.sets import Value
+from laufruhe.prove.best_first import Over
+from laufruhe.prove.certificate import Reach
+from laufruhe.prove.witness import Known
+from laufruhe.solvers.boxes.search import Box, Search, divided
+from laufruhe.solvers.conclusion import Design, Shown, concluded, judged, known_of, none_within, unbalances_of
+from laufruhe.solvers.cones.unbalances import solve_unbalances
+from laufruhe.solvers.prices import Price
+from laufruhe.solvers.result import Result, Status
+
+SHARE = 0.25
+"""Share of the tolerance that the programs of boxes use up."""
+
+
+@dataclass(frozen=True, eq=False)
+class RebalancedDesign:
+    """A design, and the result that decided its unbalances."""
+
+    design: Design
+    result: Result | None = None
+
+    @property
+    def value(self) -> float:
+        """Objective; infinite if a limit is violated."""
+        return math.inf if self.design.rank[0] else self.design.value
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """Sort key of the design."""
+        return self.design.rank
+
+
+class BoundedBox(Box, Protocol):
+    """A box with bounds of its numbers."""
+
+    @property
+    def lower(self) -> Array:
+        """Lower bounds."""
+
+    @property
+    def upper(self) -> Array:
+        """Upper bounds."""
+
+
+S = TypeVar("S", bound=BoundedBox)
+
+
+class RebalancedSearch(Search[S, RebalancedDesign]):
+    """Boxes of decisions that are not affine, with designs whose unbalances are optimal."""
+
+    conflict: tuple[str, ...] = ()
+    angles = 0
+    """Least number of angles of a cycle at which programs start."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem = problem
+
+    def known(self, design: RebalancedDesign) -> Known | None:
+        """Return a design as a witness of bounds, or None if it violates limits."""
+        return known_of(design.design, self.place(design))
+
+    def place(self, design: RebalancedDesign) -> Array:
+        """Return the numbers of a design that boxes bound, shape (n,)."""
+        pairs = zip(self.problem.decisions, design.design.values, strict=True)
+        return np.array([float(value.real) for decision, value in pairs if not decision.is_affine])
+
+    def holds(self, box: S, design: RebalancedDesign) -> bool:
+        """Return whether a design lies in a box."""
+        at = self.place(design)
+        return bool(np.all(box.lower <= at) and np.all(at <= box.upper))
+
+    def prices(self, _: Design) -> dict[Side, Price]:
+        """Return prices of limits that the problem of the unbalances lacks."""
+        return {}
+
+    def add_conflict(self, conflict: Sequence[str]) -> None:
+        """Add names of limits that a box without a feasible design violates."""
+        names = {*self.conflict, *conflict}
+        self.conflict = tuple(limit.name for limit in self.problem.limits if limit.name in names)
+
+    def solved(self, root: S | Over, first: RebalancedDesign | None, most: int, what: str, how: str) -> Result:
+        """Return the best design of a branch and bound search, with its certificate.
+
+        Parameters
+        ----------
+        root
+            Box of all open numbers, or the proof that no design is feasible.
+        first
+            Incumbent to start with.
+        most
+            Largest number of boxes.
+        what, how
+            Names of the open numbers and of the bounding method.
+        """
+        started, problem = time.perf_counter(), self.problem
+        initial, best, bound, boxes = evaluate(problem), first, math.inf, 1
+        if not isinstance(root, Over) and first is not None:
+            nothing = nothing_of(problem)
+            best, bound, boxes = divided(self, root, first, nothing, problem.tolerance, most, f"boxes of {what}")
+        timing = {"solve": time.perf_counter() - started}
+        if best is None or (math.isinf(bound) and best.design.rank[0]):
+            return none_within(problem, initial, self.conflict, timing)
+        balance, design = best.result, best.design
+        proof = Shown(
+            bound=0.0 if design.rank[0] else bound,
+            reach=Reach.WHOLE,
+            kkt_residual=balance.certificate.kkt_residual if balance and balance.certificate else math.inf,
+            method=f"{how} {boxes} box{'es' * (boxes > 1)} of {what}",
+            prices=(balance.prices if balance else {}) | self.prices(design),
+        )
+        return concluded(design, replace(initial, samples=design.evaluation.samples), proof, timing)
+
+
+def rebalance(problem: Problem, fixed: Problem, where: dict[str, Value], angles: int = 0) -> RebalancedDesign:
+    """Return the best design with fixed values of some decisions.
+
+    If none is feasible, the unbalances keep their start values, and the design violates limits.
+
+    Parameters
+    ----------
+    problem
+        All decisions.
+    fixed
+        The unbalances alone, with the other decisions at their values.
+    where
+        Values of the fixed decisions by name.
+    angles
+        Least number of angles of a cycle at which the program starts.
+    """
+    result, samples = None, None
+    values: dict[str, Value] = {decision.name: decision.start for decision in problem.decisions} | where
+    if fixed.decisions:
+        fixed = replace(fixed, tolerance=SHARE * problem.tolerance)
+        result = solve_unbalances(fixed, angles=angles)
+        if result.status is not Status.INFEASIBLE:
+            unbalances = unbalances_of(fixed, result)
+            values |= dict(zip((decision.name for decision in fixed.decisions), unbalances, strict=True))
+        samples = result.final.samples
+    return RebalancedDesign(judged(problem, list(values.values()), samples), result)
