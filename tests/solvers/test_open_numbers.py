@@ -15,8 +15,7 @@ from scipy.optimize import brentq, minimize
 import laufruhe
 from files.test_reader import complaint_about
 from laufruhe.errors import InputError, ModelError
-from laufruhe.files.model_walk import number_at
-from laufruhe.files.nested import inside, put
+from laufruhe.files.nested import inside, number_at, put
 from laufruhe.files.problem_file import file_model
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.problem.evaluation import evaluate, objective_value

@@ -1,4 +1,4 @@
-"""[[main_bearings]] of a problem file: where the shafts are carried."""
+"""[[main_bearings]] of a problem file, and the bearings that they make."""
 
 from __future__ import annotations
 
@@ -30,56 +30,61 @@ class MainBearingTable(Table):
 
 
 def one_by_one(tables: Sequence[MainBearingTable], throws: Sequence[Throw]) -> list[MainBearingTable]:
-    """A table for every bearing, those beside throws in order from the front."""
-    found: list[MainBearingTable] = []
-    for k, table in enumerate(tables):
-        where, beyond = f"main_bearings[{k + 1}]", table.beside_throws
+    """Return a table for every bearing, those beside throws in order from the front."""
+    single: list[MainBearingTable] = []
+    for k, table in enumerate(tables, 1):
+        where, beyond = f"main_bearings[{k}]", table.beside_throws
         if (beyond is None) == (table.x is None):
             rule = "is missing; give a place, or beside_throws" if beyond is None else "is told beside beside_throws"
             raise Refused(f"{where}.x", None, rule, "leave one out" if beyond else '"-62.5 mm", for example')
         if beyond is None:
-            found.append(table)
+            single.append(table)
             continue
         if table.name is not None:
             raise Refused(f"{where}.name", table.name, "names several bearings", "leave it out")
         for key in ("diameter", "width"):
             if isinstance(getattr(table, key), Open):
                 raise Refused(f"{where}.{key}", None, "is open for several bearings", "list them one by one, by x")
-        at = sorted({throw.x for throw in throws if throw.shaft.name == table.shaft}, reverse=True)
-        if not at:
+        pins = sorted({throw.x for throw in throws if throw.shaft.name == table.shaft}, reverse=True)
+        if not pins:
             raise Refused(f"{where}.shaft", table.shaft, "has no throws", "name a shaft with cranks")
-        places = [at[0] + beyond, *(0.5 * (a + b) for a, b in pairwise(at)), at[-1] - beyond]
-        found += [table.model_copy(update={"x": x, "beside_throws": None}) for x in places]
-    return found
+        places = [pins[0] + beyond, *(0.5 * (a + b) for a, b in pairwise(pins)), pins[-1] - beyond]
+        single += [table.model_copy(update={"x": x, "beside_throws": None}) for x in places]
+    return single
 
 
 def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]) -> tuple[Bearing, ...]:
-    """Main bearings, on the shafts that slider-cranks work on, beside every throw and clear of each other."""
+    """Return the main bearings, on shafts with slider-cranks, beside every throw and clear of each other."""
     shafts = {part.shaft.name: part.shaft for part in parts}
-    found: list[Bearing] = []
-    for k, table in enumerate(tables):
-        where = f"main_bearings[{k + 1}]"
+    bearings: list[Bearing] = []
+    for k, table in enumerate(tables, 1):
+        where = f"main_bearings[{k}]"
         if table.shaft not in shafts:
             raise Refused(f"{where}.shaft", table.shaft, "is no shaft with cranks", nearest(table.shaft, list(shafts)))
         if table.friction is not None and table.diameter is None:
             rule = "rubs on a journal whose diameter is missing"
             raise Refused(f"{where}.friction", table.friction, rule, "add diameter")
-        name = table.name or str(k + 1)
+        name = table.name or str(k)
         size = [None if each is None else Open.of(each).start for each in (table.diameter, table.width)]
         bearing = Bearing(name, table.x or 0.0, size[0], size[1], table.friction, shafts[table.shaft])
-        for other in found:
-            _check_apart(bearing, other, where)
+        for other in bearings:
+            if name == other.name:
+                raise Refused(f"{where}.name", name, "is the name of another bearing", "give each its own name")
+            reach = 0.5 * ((bearing.width or 0.0) + (other.width or 0.0))
+            if bearing.shaft == other.shaft and abs(bearing.x - other.x) <= reach:
+                rule = f"lets its journal overlap that of bearing {other.name}"
+                raise Refused(f"{where}.x", units.shown(bearing.x, "m"), rule, "move one of them, or make it narrower")
         if any(part.shaft == bearing.shaft and part.x == bearing.x for part in parts):
             rule = "is the place of a crank pin"
             raise Refused(f"{where}.x", units.shown(bearing.x, "m"), rule, "move it beside the throw")
-        found.append(bearing)
-    for shaft in shafts.values() if found else ():
-        _check_carried(shaft, [b.x for b in found if b.shaft == shaft], [p for p in parts if p.shaft == shaft])
-    return tuple(found)
+        bearings.append(bearing)
+    for shaft in shafts.values() if bearings else ():
+        _check_carried(shaft, [b.x for b in bearings if b.shaft == shaft], [p for p in parts if p.shaft == shaft])
+    return tuple(bearings)
 
 
 def _check_carried(shaft: Shaft, bearings: Sequence[float], parts: Sequence[SliderCrank]) -> None:
-    """Every throw between two bearings; one alone may hang over, and one at each end of an axle on two."""
+    """Refuse throws that are not between two bearings; a single one may hang over, and one at each end of an axle."""
     if len(bearings) < 2:
         rule = f"leaves {shaft.name} on {['no', 'one'][len(bearings)]} bearing, which does not carry its throws"
         raise Refused("main_bearings", None, rule, "give it two at least")
@@ -89,12 +94,3 @@ def _check_carried(shaft: Shaft, bearings: Sequence[float], parts: Sequence[Slid
         if not first < part.x < last:
             rule = f"leaves the throw of {part.name} at x = {units.shown(part.x, 'm')} beside all bearings"
             raise Refused("main_bearings", None, rule, "put one on its other side")
-
-
-def _check_apart(bearing: Bearing, other: Bearing, where: str) -> None:
-    if bearing.name == other.name:
-        raise Refused(f"{where}.name", bearing.name, "is the name of another bearing", "give each its own name")
-    apart = abs(bearing.x - other.x)
-    if bearing.shaft == other.shaft and apart <= 0.5 * ((bearing.width or 0.0) + (other.width or 0.0)):
-        rule = f"lets its journal overlap that of bearing {other.name}"
-        raise Refused(f"{where}.x", units.shown(bearing.x, "m"), rule, "move one of them, or make it narrower")

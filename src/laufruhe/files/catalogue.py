@@ -1,4 +1,4 @@
-"""Engines that were built, whose figures a problem takes as defaults (docs/reference/engine-catalogue.md)."""
+"""Engine catalogue, whose figures are defaults of a problem (docs/reference/engine-catalogue.md)."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from typing import Any
 from laufruhe.files.complaints import Refused, nearest
 
 KEY = "catalogue"
-"""Of [engine]; `engine = "name"` says the same."""
-# of each two one is given: whoever gives one means it
+"""Key of [engine]; `engine = "name"` is the same."""
+# pairs of keys that exclude each other
 _EITHER = (("rod_ratio", "rod_length"), ("rod", "rod_inertia_deficit"))
 _PHASES = ("throws", "firing_order")
 
 
 @dataclass(frozen=True)
 class CatalogueEngine:
-    """One engine, as it was published.
+    """Published engine.
 
     Attributes
     ----------
     key
-        In a problem file.
+        Name in a problem file.
     source
-        Of what is not assumed.
+        Source of all that is not assumed.
     displacement
-        As published: it checks bore and stroke.
+        Published displacement, a check of bore and stroke.
     assumed
-        Keys of `engine` that no source gives.
+        Keys of `engine` without a source.
     note
-        What else a user should know.
+        Remark for users.
     engine
         Keys and values of [engine].
     """
@@ -47,25 +47,22 @@ class CatalogueEngine:
     engine: Mapping[str, Any]
 
     def assumption(self, own: Mapping[str, Any]) -> str:
-        """What is assumed where a problem has no value of its own; empty where it has all."""
+        """Return the sentence about assumed values that a problem does not give; empty if it gives all."""
         left = [f"{key.replace('_', ' ')} {shown(self.engine[key])}" for key in self.assumed if key not in own]
         return f"{self.name}: assumed, not published: {', '.join(left)}." if left else ""
 
     def under(self, own: Mapping[str, Any]) -> dict[str, Any]:
-        """[engine] with its figures where the problem has none."""
-        told = dict(self.engine)
-        for key, other in _EITHER:
-            if key in own or other in own:
-                told.pop(key, None)
-                told.pop(other, None)
+        """Return [engine] with the figures of the catalogue as defaults."""
+        dropped = {KEY, *(key for pair in _EITHER if any(one in own for one in pair) for key in pair)}
         if any(own.get(key) == "open" for key in _PHASES):
-            told = {key: value for key, value in told.items() if key not in _PHASES}
-        return {**told, **{key: value for key, value in own.items() if key != KEY}}
+            dropped |= {*_PHASES}
+        defaults = {key: value for key, value in self.engine.items() if key not in dropped}
+        return {**defaults, **{key: value for key, value in own.items() if key != KEY}}
 
 
 @cache
 def engines() -> Mapping[str, CatalogueEngine]:
-    """The whole catalogue, by key."""
+    """Return the engines by key."""
     text = (files("laufruhe.files") / "engines.toml").read_text(encoding="utf-8")
     return {
         key: CatalogueEngine(key, **{**entry, "assumed": tuple(entry["assumed"]), "note": entry.get("note", "")})
@@ -74,31 +71,30 @@ def engines() -> Mapping[str, CatalogueEngine]:
 
 
 def engine_named(name: object, where: str) -> CatalogueEngine:
-    """An engine of the catalogue; `Refused` where there is none of that name."""
-    found = engines().get(name) if isinstance(name, str) else None
-    if found is None:
+    """Return an engine by name; `Refused` if there is none."""
+    engine = engines().get(name) if isinstance(name, str) else None
+    if engine is None:
         remedy = nearest(str(name), list(engines()), "laufruhe engines lists them")
         raise Refused(where, name, "is no engine of the catalogue", remedy)
-    return found
+    return engine
 
 
 def with_catalogue(tables: dict[str, Any]) -> dict[str, Any]:
-    """Tables of a problem in which the engine that they name is written out, with its source and what is assumed."""
+    """Return tables with the catalogue engine written out, with its source and assumptions."""
     given = tables.get("engine")
     own = given if isinstance(given, dict) else {KEY: given} if isinstance(given, str) else {}
     if KEY not in own:
         return tables
-    found = engine_named(own[KEY], "engine" if isinstance(given, str) else f"engine.{KEY}")
-    told = {key: value for key, value in own.items() if key != KEY}
+    engine = engine_named(own[KEY], "engine" if isinstance(given, str) else f"engine.{KEY}")
     assumptions, source = tables.get("assumptions", []), tables.get("source", "")
-    whole = {**tables, "engine": found.under(told)}
+    whole = {**tables, "engine": engine.under(own)}
     if isinstance(assumptions, list):
-        whole["assumptions"] = [*assumptions, *filter(None, (found.assumption(told),))]
+        whole["assumptions"] = [*assumptions, *filter(None, (engine.assumption(own),))]
     if isinstance(source, str):
-        whole["source"] = f"{source}; engine: {found.source}" if source else found.source
+        whole["source"] = f"{source}; engine: {engine.source}" if source else engine.source
     return whole
 
 
 def shown(value: Any) -> str:
-    """A value as a sentence has it."""
+    """Return a value as text; a list is joined by hyphens."""
     return "-".join(map(str, value)) if isinstance(value, list) else str(value)

@@ -1,4 +1,4 @@
-"""From what a validator found to one line that a user can act on; all that assembles a problem raises `Refused`."""
+"""Complaints about a file: one line with place, rule and remedy. Code that assembles a problem raises `Refused`."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from laufruhe.files.toml_text import toml_key
 
 Loc: TypeAlias = tuple[str | int, ...]
 MOST_COMPLAINTS = 20
-"""That a file gets at once."""
+"""Largest number of complaints about a file at once."""
 _CLOSE = 0.6
 _FEW = 3
 _TABLES: Mapping[str, Tables] = {"kind": "study_kinds", "layout": "layouts", "drive": "drives"}
-"""Tables of objects that a file names, by their keys."""
+"""Tables of extensions by the keys that name their objects."""
 _COUNTED = {
     "too_short": ("at least", "min_length", "add what is missing"),
     "too_long": ("at most", "max_length", "take some out"),
@@ -44,27 +44,29 @@ _RULES = {
 
 
 def complaints_of(error: ValidationError, model: type[BaseModel]) -> tuple[Complaint, ...]:
-    """One complaint for every key that is wrong, in the order of the file, as far as a reader follows."""
-    found: dict[str, Complaint] = {}
-    told = error.errors(include_url=False)[: 10 * MOST_COMPLAINTS]
-    details = [(*_walk(detail["loc"], model), detail) for detail in told]
+    """Return a complaint for every wrong key in the order of the file, up to a readable number."""
+    complaints: dict[str, Complaint] = {}
+    errors = error.errors(include_url=False)[: 10 * MOST_COMPLAINTS]
+    details = [(*_walk(detail["loc"], model), detail) for detail in errors]
     unknown = [loc for loc, _, detail in details if detail["type"] == "extra_forbidden"]
     for loc, tables, detail in details:
-        if detail["type"] == "missing" and _is_misspelt(loc, unknown):
+        # a key that is missing may be there in another spelling, which is a complaint of its own
+        words = [str(other[-1]) for other in unknown if other[:-1] == loc[:-1]]
+        if detail["type"] == "missing" and difflib.get_close_matches(str(loc[-1]), words, n=1, cutoff=_CLOSE):
             continue
-        found.setdefault(key_path(loc), _complaint(detail, loc, tables, _home(str(loc[-1]), model)))
-    lacking = tuple(complaint for complaint in found.values() if complaint.remedy == INSTALL)
+        complaints.setdefault(key_path(loc), _complaint(detail, loc, tables, model))
+    lacking = tuple(complaint for complaint in complaints.values() if complaint.remedy == INSTALL)
     if lacking:
-        # keys of an extension that is not there are no faults
+        # keys of a missing extension are no faults
         return lacking
-    first = list(found.values())[:MOST_COMPLAINTS]
-    rest = error.error_count() - len(told) + len(found) - len(first)
+    first = list(complaints.values())[:MOST_COMPLAINTS]
+    rest = error.error_count() - len(errors) + len(complaints) - len(first)
     more = [Complaint("file", "", f"has {rest} more such faults", "correct these first")] if rest else []
     return (*first, *more)
 
 
 def _walk(loc: Loc, model: type[BaseModel]) -> tuple[Loc, list[type[BaseModel]]]:
-    """A path without what pydantic adds for tables of several sorts (gas.seiliger.imep), and the tables at its end."""
+    """Return a path without the tags of unions (gas.seiliger.imep), and the tables at its end."""
     path: list[str | int] = []
     here = [model]
     for part in loc:
@@ -84,14 +86,8 @@ def _tables_in(annotation: Any) -> list[type[BaseModel]]:
     return [table for part in get_args(annotation) for table in _tables_in(part)]
 
 
-def _is_misspelt(loc: Loc, unknown: Sequence[Loc]) -> bool:
-    """Whether a missing key is there in another spelling: what is wrong is said once."""
-    words = [str(other[-1]) for other in unknown if other[:-1] == loc[:-1]]
-    return bool(difflib.get_close_matches(str(loc[-1]), words, n=1, cutoff=_CLOSE))
-
-
 def key_path(loc: Sequence[str | int]) -> str:
-    """engine.throws[2], counted from one as the reader counts; in quotes what TOML has in quotes."""
+    """Return a path as engine.throws[2], counted from one, with keys in quotes as in TOML."""
     text = ""
     for part in loc:
         key = f"[{part + 1}]" if isinstance(part, int) else toml_key(part)
@@ -100,19 +96,19 @@ def key_path(loc: Sequence[str | int]) -> str:
 
 
 def short(value: Any) -> str:
-    """A value as the file has it, cut where it is long."""
+    """Return a value as the file has it, cut if it is long."""
     if isinstance(value, dict | list):
         return printed(json.dumps(value, default=str, ensure_ascii=False), 60)
     return printed(f'"{value}"' if isinstance(value, str) else str(value), 60)
 
 
 def _plain(word: str) -> str:
-    """A name as it is compared: in small letters, its words in one order."""
+    # small letters, words in alphabetical order
     return " ".join(sorted(re.split(r"[\s_-]+", word.lower())))
 
 
 def nearest(word: str, words: Sequence[str], otherwise: str = "") -> str:
-    """A remedy that names the nearest right word, those that hold it, or all of them; `otherwise` in place of all."""
+    """Return a remedy that names the nearest word, the words that contain it, or else `otherwise` or all words."""
     plain = {_plain(each): each for each in words}
     parts = set(_plain(word).split())
     holding = sorted(
@@ -126,29 +122,26 @@ def nearest(word: str, words: Sequence[str], otherwise: str = "") -> str:
 
 
 def beside(path: Path, otherwise: str) -> str:
-    """A remedy that names the file most like one that is not there."""
+    """Return a remedy that names the file closest to a missing one."""
     names = [other.stem for other in path.parent.glob("*.toml")] if path.parent.is_dir() else []
     close = difflib.get_close_matches(path.stem, names, n=1, cutoff=_CLOSE)
     return f"did you mean '{path.with_name(close[0])}.toml'?" if close else otherwise
 
 
-def _home(key: str, model: type[BaseModel]) -> str:
-    """In which tables of a file a key stands; empty where in none."""
-    found = []
-    for name, field in model.model_fields.items():
-        table = f"[[{name}]]" if field.annotation is not None and "list[" in str(field.annotation) else f"[{name}]"
-        found += [table] * any(key in inner.model_fields for inner in _tables_in(field.annotation))
-    return f"it stands in {' or '.join(found)}" if found else ""
-
-
-def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], home: str) -> Complaint:
+def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], model: type[BaseModel]) -> Complaint:
     kind, where = detail["type"], key_path(loc)
     if kind == "extra_forbidden" and len(loc) == 1 and loc[0] in HOMES["keys"]:
         return Complaint(where, "", *lack(HOMES["keys"][str(loc[0])]))
     if kind == "extra_forbidden":
         keys = [field.alias or name for table in tables[:1] for name, field in table.model_fields.items()]
-        of_unit = 'a unit stands beside its number, as in "120 mm"'
-        remedy = of_unit if loc[-1] == "unit" else nearest(str(loc[-1]), keys, home)
+        homes = [
+            f"[[{name}]]" if "list[" in str(field.annotation) else f"[{name}]"
+            for name, field in model.model_fields.items()
+            if any(str(loc[-1]) in inner.model_fields for inner in _tables_in(field.annotation))
+        ]
+        remedy = nearest(str(loc[-1]), keys, f"it stands in {' or '.join(homes)}" if homes else "")
+        if loc[-1] == "unit":
+            remedy = 'a unit stands beside its number, as in "120 mm"'
         return Complaint(where, short(detail["input"]), "is not a key here", remedy)
     if kind == "missing":
         return Complaint(where, "", "is missing", "add it")
@@ -165,7 +158,7 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], home: s
         if table and (extension := HOMES[table].get(str(value))):
             return Complaint(where, short(value), *lack(extension))
         words = allowed.replace("' or '", "', '").replace("'", "").split(", ")
-        # of two or three all are told: the nearest in letters need not be the one that is meant
+        # of two or three words all are named: the nearest in letters may not be meant
         remedy = nearest(str(value), words) if len(words) > _FEW else "use one of: " + ", ".join(words)
         return Complaint(where, short(value), "is not allowed", remedy)
     if kind in _COUNTED:
@@ -179,7 +172,7 @@ def _complaint(detail: Any, loc: Loc, tables: Sequence[type[BaseModel]], home: s
 
 
 class Refused(LaufruheError):
-    """Raised while a problem is put together; the reader adds the file's name."""
+    """Complaint while a problem is assembled; the reader adds the name of the file."""
 
     def __init__(self, where: str, value: Any, rule: str, remedy: str) -> None:
         self.complaint = Complaint(where, "" if value is None else short(value), rule, remedy)
@@ -187,7 +180,7 @@ class Refused(LaufruheError):
 
 
 def number_read(number: Number, place: Sequence[str | int], given: Any) -> float | Open:
-    """Return what stands at a place of a file, as its key reads a number.
+    """Read the number at a place of a file.
 
     Raises
     ------
@@ -203,7 +196,7 @@ def number_read(number: Number, place: Sequence[str | int], given: Any) -> float
 
 @contextmanager
 def in_file(source: object) -> Iterator[None]:
-    """What is refused within is led by the name of the file it stands in."""
+    """Turn `Refused` into `InputError` with the name of the file."""
     try:
         yield
     except Refused as refused:
@@ -211,19 +204,19 @@ def in_file(source: object) -> Iterator[None]:
 
 
 def measured(text: str | float, unit: str, where: str, given: str | None = None) -> float:
-    """SI value of a text such as '120 mm', or of a plain number; `given` stands at the key that the text is made of."""
+    """Return the SI value of a text such as '120 mm' or of a number; `given` is the unit alone at a key for units."""
     try:
         return units.parse(str(text), unit)
     except units.UnitError as error:
         found = Complaint.of(error, where)
-        # where the unit has a key of its own, it stands there without a number
+        # a key for units has no number
         remedy = f"use {units.usual(unit)} ..." if given else found.remedy
         raise Refused(where, given or text, found.rule, remedy) from None
 
 
 @contextmanager
 def blamed_on(where: str, value: str = "") -> Iterator[None]:
-    """A machine that cannot exist is the fault of this key, at which a value stands."""
+    """Turn `ModelError` into a complaint about this key and its value."""
     try:
         yield
     except ModelError as error:
@@ -232,7 +225,7 @@ def blamed_on(where: str, value: str = "") -> Iterator[None]:
 
 
 def one_of(table: BaseModel, where: str, key: str, other: str, shown: Any = None, named: str = "") -> None:
-    """Refuse two keys of which one is wanted, where both or neither stand; `named` is the other as a remedy says it."""
+    """Refuse both or none of two keys; `named` is the name of the other in the remedy."""
     given = [getattr(table, k) not in (None, []) for k in (key, other)]
     if given[0] == given[1]:
         state = f"is given twice, also as {other}" if given[0] else "is missing"
@@ -240,14 +233,14 @@ def one_of(table: BaseModel, where: str, key: str, other: str, shown: Any = None
 
 
 def none_of(table: BaseModel, keys: Sequence[str], where: str, rule: str, remedy: str) -> None:
-    """Refuse keys that mean nothing here, where they do not stand as if left out."""
+    """Refuse keys that mean nothing here, unless they have their default."""
     for key in keys:
         if getattr(table, key) != type(table).model_fields[key].default:
             raise Refused(f"{where}.{key}", None, rule, remedy)
 
 
 def all_different(things: Sequence[Any], where: str, rule: str, remedy: str = "rename one") -> None:
-    """Refuse two of the same."""
+    """Refuse equal things."""
     for k, thing in enumerate(things):
         if thing in things[:k]:
             raise Refused(f"{where}[{k + 1}]", thing, f"two {rule}", remedy)

@@ -1,4 +1,4 @@
-"""Rows of numbers in a CSV file beside a problem."""
+"""Rows of numbers in a CSV file beside a problem file."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ MOST_ROWS, MOST_BYTES = 100_000, 10_000_000
 
 
 def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[tuple[float, ...]]:
-    """The numbers of a file's first columns, whose names a complaint about `key` tells.
+    """Return the numbers in the first columns of a file; complaints about `key` name the columns.
 
-    Columns are parted by commas, semicolons or tabs; beside the latter two a comma may
-    be the decimal sign. The first row may be a heading, rows that begin with # are notes.
+    Columns are separated by commas, semicolons or tabs; with the latter two a comma may be the decimal sign. The first
+    row may be a heading; rows that begin with # are skipped.
     """
     beside, many = "give a CSV file beside the problem", "pair" if len(columns) == 2 else "row"
     try:
@@ -27,16 +27,16 @@ def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[t
     except (OSError, ValueError) as error:
         why = error.strerror or "error" if isinstance(error, OSError) else "it is no UTF-8 text"
         raise Refused(key, file, f"cannot be read ({why})", beside) from None
-    parted_by = next((sign for sign in ";\t" if sign in text), ",")
+    separator = next((sign for sign in ";\t" if sign in text), ",")
     rows: list[tuple[float, ...]] = []
     heading = True
     for number, line in enumerate(text.splitlines(), 1):
-        cells = [cell.strip().strip('"') for cell in line.split(parted_by, len(columns))]
+        cells = [cell.strip().strip('"') for cell in line.split(separator, len(columns))]
         if not line.strip() or cells[0].startswith("#"):
             continue
         try:
-            told = [cells[k] if parted_by == "," else cells[k].replace(",", ".") for k in range(len(columns))]
-            rows.append(tuple(float(cell) for cell in told))
+            numbers = [cells[k] if separator == "," else cells[k].replace(",", ".") for k in range(len(columns))]
+            rows.append(tuple(map(float, numbers)))
         except (ValueError, IndexError):
             if not heading:
                 rule = f"line {number} is no {many} of numbers"

@@ -1,4 +1,4 @@
-"""A problem file to begin with: every table that is usually wanted, with what to change beside it."""
+"""Drafts of problem files: the usual tables with comments on what to change."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from laufruhe import units
-from laufruhe.files.catalogue import CatalogueEngine, engine_named
+from laufruhe.files.catalogue import engine_named
 from laufruhe.files.reader import load_tables
 from laufruhe.files.ready import schema_line
 from laufruhe.files.toml_text import toml_value
@@ -20,8 +20,8 @@ from laufruhe.physics.shaking_loads import shaking_loads
 SPEED = "3000 rpm"
 _ASIDE = 0.25
 _OVERHANG = 0.1
-# share of one cylinder's own force, or that force at the spacing of two, from which an order is worth balancing
-_FELT = 0.02
+# fraction of one cylinder's force, or of its moment about the middle, from which an order is worth balancing
+_WORTH = 0.02
 _HEAD = """\
 {schema}
 # Numbers with a dimension are text with a unit: "120 mm", "1.25 kg", "2500 rpm"; bare ones are degrees or plain.
@@ -57,46 +57,42 @@ alternating = true              # without the steady reaction to the mean torque
 
 @dataclass(frozen=True)
 class _Excitation:
-    """What an engine leaves free of an order: force and couple are felt, or not."""
+    """Free force and couple of one order, and whether they are worth balancing."""
 
     order: int
     force: float
     couple: float
-    felt: bool
+    is_large: bool
 
     def __str__(self) -> str:
         return f"order {self.order}: force {self.force:.4g} N, couple {self.couple:.4g} N m"
 
 
 def draft_of_engine(name: str) -> str:
-    """A problem about an engine of the catalogue; `Refused` where there is none of that name."""
-    found = engine_named(name, "engine")
-    return _draft(found.name, _catalogue_table(found), engine_of_table(found.name, found.engine, Path(name)))
+    """Return the draft for an engine of the catalogue; `Refused` if there is none of that name."""
+    entry = engine_named(name, "engine")
+    lines = {key: f"# {key} = {toml_value(value)}" for key, value in entry.engine.items()}
+    published = [line for key, line in lines.items() if key not in entry.assumed]
+    assumed = [line for key, line in lines.items() if key in entry.assumed]
+    table = "\n".join([
+        "", f"# Published: {entry.source}.", *([f"# {entry.note}"] if entry.note else []),
+        "[engine]", f'catalogue = "{entry.key}"',
+        "# What it takes from there; without its #, a line takes the place of the catalogue's.", *published,
+        "# Assumed, for no source gives them; the report says so until you put your own:", *assumed, "",
+    ])  # fmt: skip
+    return _draft(entry.name, table, engine_of_table(entry.name, entry.engine, Path(name)))
 
 
 def draft_of_table(title: str, engine: Mapping[str, Any], path: Path) -> str:
-    """A problem about an engine that is described; `InputError`, which names the file, where it cannot be."""
+    """Return the draft for a described engine; an `InputError` names the file if it cannot exist."""
     lines = "\n".join(f"{key} = {toml_value(value)}" for key, value in engine.items())
     return _draft(title, f"\n[engine]\n{lines}\n", engine_of_table(title, engine, path))
 
 
 def engine_of_table(title: str, engine: Mapping[str, Any], path: Path) -> Engine:
-    """The engine that a table describes; `InputError`, which names the file, where it cannot be."""
+    """Return the engine of a table; an `InputError` names the file if it cannot exist."""
     tables = {"title": title, "engine": dict(engine), "operating_points": [{"speed": SPEED}]}
     return load_tables(tables, path).engine
-
-
-def _catalogue_table(found: CatalogueEngine) -> str:
-    lines = {key: f"# {key} = {toml_value(value)}" for key, value in found.engine.items()}
-    told = [line for key, line in lines.items() if key not in found.assumed]
-    own = [line for key, line in lines.items() if key in found.assumed]
-    note = [f"# {found.note}"] if found.note else []
-    return "\n".join([
-        "", f"# Published: {found.source}.", *note,
-        "[engine]", f'catalogue = "{found.key}"',
-        "# What it takes from there; without its #, a line takes the place of the catalogue's.", *told,
-        "# Assumed, for no source gives them; the report says so until you put your own:", *own, "",
-    ])  # fmt: skip
 
 
 def _draft(title: str, engine: str, built: Engine) -> str:
@@ -110,38 +106,44 @@ def _draft(title: str, engine: str, built: Engine) -> str:
 
 
 def _free(engine: Engine) -> list[_Excitation]:
-    """Free forces and couples of first and second order, the roll moment left out."""
+    """Return free forces and couples of first and second order, without the roll moment."""
     speed = units.parse(SPEED, "rad/s")
     wrench = shaking_loads(engine, OperatingPoint(SPEED, speed))
     parts = engine.slider_cranks
     one = max(part.reciprocating_mass * part.crank_radius for part in parts) * speed**2
-    apart = max((abs(part.x) for part in parts), default=0.0) or 0.1
-    found = []
+    arm = max((abs(part.x) for part in parts), default=0.0) or 0.1
+    excitations = []
     for order in (1, 2):
         amplitudes = wrench.at(order)
         force = float(order_amplitude(amplitudes[:3]))
         couple = float(order_amplitude(amplitudes[4:]))
-        felt = force > _FELT * one or couple > _FELT * one * apart
-        found.append(_Excitation(order, _rounded(force, one), _rounded(couple, one * apart), felt))
-    return found
-
-
-def _rounded(value: float, scale: float) -> float:
-    return 0.0 if value < 1e-9 * scale else value
+        is_large = force > _WORTH * one or couple > _WORTH * one * arm
+        force, couple = (0.0 if value < 1e-9 * scale else value for value, scale in ((force, one), (couple, one * arm)))
+        excitations.append(_Excitation(order, force, couple, is_large))
+    return excitations
 
 
 def _balance(engine: Engine) -> str:
-    """Weights and shafts that may take off what is free."""
+    """Return weights and shafts that may balance free forces and couples."""
     free = _free(engine)
     lines = [f"# Free at {SPEED}: {'; '.join(map(str, free))}."]
     half = max(abs(part.x) for part in engine.slider_cranks)
     moment = sum(part.reciprocating_mass * part.crank_radius for part in engine.slider_cranks)
-    if free[0].felt:
+    if free[0].is_large:
         lines += _webs(half, moment)
-    if free[1].felt:
+    if free[1].is_large:
         ratio = max(part.rod_ratio for part in engine.slider_cranks)
-        lines += _pair(half, 0.25 * ratio * moment)
-    if not any(one.felt for one in free):
+        lines += ["# two shafts at twice crank speed, against each other"]
+        for name, speed, y in (("left", 2, 100), ("right", -2, -100)):
+            lines += [
+                "[[balancer_shafts]]", f'name = "{name}"', f"ratio = {speed}",
+                f'position = ["{y} mm", "-100 mm"]   # y, z',
+            ]  # fmt: skip
+            for place, x in (("front", half), ("rear", -half)) if half else (("middle", 0.0),):
+                named = [f'name = "{place}"', f'x = "{1e3 * x:g} mm"']
+                lines += ["[[balancer_shafts.unbalances]]", *named, *_open(0.25 * ratio * moment)]
+            lines.append("")
+    if not any(one.is_large for one in free):
         lines += ["# Nothing of first or second order is left to balance; weights are shown as an example."]
         lines += _webs(half, moment)
     return "\n".join(lines) + "\n"
@@ -151,20 +153,6 @@ def _webs(half: float, moment: float) -> list[str]:
     lines = ["# weights that turn with the crank"]
     for name, x in (("front", half), ("rear", -half)) if half else (("web", 0.0),):
         lines += ["[[counterweights]]", f'name = "{name}"', f'x = "{1e3 * x:g} mm"', *_open(moment), ""]
-    return lines
-
-
-def _pair(half: float, moment: float) -> list[str]:
-    lines = ["# two shafts at twice crank speed, against each other"]
-    for name, ratio, y in (("left", 2, 100), ("right", -2, -100)):
-        lines += [
-            "[[balancer_shafts]]", f'name = "{name}"', f"ratio = {ratio}",
-            f'position = ["{y} mm", "-100 mm"]   # y, z',
-        ]  # fmt: skip
-        for place, x in (("front", half), ("rear", -half)) if half else (("middle", 0.0),):
-            named = [f'name = "{place}"', f'x = "{1e3 * x:g} mm"']
-            lines += ["[[balancer_shafts.unbalances]]", *named, *_open(moment)]
-        lines.append("")
     return lines
 
 

@@ -1,26 +1,28 @@
-"""[engine] of a problem file: its common keys, those that layouts own, and the slider-cranks that it makes."""
+"""[engine] of a problem file: its tables, the slider-cranks that they make, and open masses and leads."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias, TypeVar
 
-from pydantic import Field
+from pydantic import BaseModel, Field
 
 from laufruhe import units
 from laufruhe.errors import counted
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, blamed_on, nearest, none_of, one_of
-from laufruhe.files.engine_keys import BigEndTable, RodTable, ShaftTable, SliderCrankTable, with_owned_keys
-from laufruhe.files.fields import CylinderNumber, Open, Table
+from laufruhe.files.fields import CylinderNumber, Name, Open, Table
+from laufruhe.files.rotors import CounterweightTable, check_factors
 from laufruhe.machine import CRANKSHAFT, Cycle, Rod, Shaft, SliderCrank
 from laufruhe.machine.drives import DRIVES, Sizes
 from laufruhe.machine.facing import least_room, with_shared_chambers
 from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, LayoutKind, Mechanism, Throw, even_throws, rod_of
 from laufruhe.machine.leads import led_parts
 from laufruhe.numerics.turns import direction
+from laufruhe.problem.decision import Decision, Kind, NumberDrive
 
+T = TypeVar("T", bound=BaseModel)
 FiringOrder: TypeAlias = Annotated[list[int] | Literal["open"], f.OrOpen(list[CylinderNumber], "[1, 3, 4, 2]")]
 
 _CYCLES = {str(cycle): cycle for cycle in Cycle}
@@ -28,13 +30,94 @@ _OWNED = tuple(dict.fromkeys(key for k in LAYOUTS.values() for key in (*(own.nam
 _OF_PISTONS = (
     "drive", "bore", "stroke", "rod_ratio", "rod_length", "offset", "reciprocating_mass", "rod", "rod_inertia_deficit",
 )  # fmt: skip
-# what a slider-crank of a free list takes from [engine] unless it says otherwise
+# keys that a slider-crank of a free list takes from [engine] by default
 _INHERITED = {"stroke", "bore", "offset", "reciprocating_mass", "rod_inertia_deficit"}
+_OPPOSED = "second crankshaft"
+_SECOND, _RECIPROCATING = "second_reciprocating_mass", "reciprocating_mass"
 
 
-@with_owned_keys
+class RodTable(Table):
+    """The connecting rod as a rigid body."""
+
+    mass: f.PositiveMass
+    centre_of_gravity: f.Length = f.needed(
+        "Distance of the centre of gravity from the crank pin, on the line of the pins."
+    )
+    inertia: f.Inertia = f.needed("Moment of inertia about the centre of gravity.")
+
+
+class BigEndTable(Table):
+    """The rod's bearing on the crank pin."""
+
+    diameter: f.OpenPositiveLength
+    width: f.OpenPositiveLength
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Diameter and width [m], open ones at their start."""
+        return Open.of(self.diameter).start, Open.of(self.width).start
+
+
+class ShaftTable(Table):
+    """A crankshaft of a free list of parts."""
+
+    name: Name
+    ratio: f.Ratio = 1.0
+    position: f.Pair[f.Length] = f.needed("Position of the axis: y to the left, z up.")
+    lead: f.OpenAngle = f.told("Crank angle by which all that it carries comes earlier.", 0.0)
+
+
+class SliderCrankTable(Table):
+    """Slider-crank of a free list of parts; missing keys are those of [engine]."""
+
+    x: f.Length
+    bank_angle: f.Angle = f.told("Angle of the cylinder axis, from upright towards the left.", 0.0)
+    throw: f.Angle = 0.0
+    firing_angle: f.Angle | None = f.told("Crank angle at which it fires.")
+    shaft: str = "crankshaft"
+    stroke: f.PositiveLength | None = None
+    bore: f.PositiveLength | None = None
+    rod_ratio: f.NonNegative | None = None
+    rod_length: f.PositiveLength | None = None
+    offset: f.Length | None = None
+    reciprocating_mass: f.OpenMass | None = None
+    rotating_mass: f.Mass | None = None
+    rod_inertia_deficit: f.Inertia | None = None
+
+
+_KINDS: dict[str, Any] = {
+    "length": f.Length,
+    "positive length": f.PositiveLength,
+    "non-negative length": f.NonNegativeLength,
+    "angle": f.Angle,
+    "open angle": f.OpenAngle,
+    "open lead": f.OpenAngle,
+    "angles": list[f.Angle],
+    "mass": f.Mass,
+    "inertia": f.Inertia,
+    "open mass": f.OpenMass,
+    "ratio": f.Positive,
+    "cylinder": CylinderNumber,
+    "sign": Literal[1, -1],
+    "rod": RodTable,
+}
+
+
+def _with_owned_keys(table: type[T]) -> type[T]:
+    """Return [engine] with the names of all layouts and drives, and their own keys."""
+    names: Any = tuple(LAYOUTS)
+    drives: Any = tuple(DRIVES)
+    fields: dict[str, Any] = {"layout": (Literal[names], ...), "drive": (Literal[drives], "slider-crank")}
+    owned = [kind.keys for kind in LAYOUTS.values()] + [kind.keys for kind in DRIVES.values()]
+    for key in (key for keys in owned for key in keys):
+        kind = _KINDS[key.kind] if key.default is not None else _KINDS[key.kind] | None
+        fields[key.name] = (kind, Field(default=key.default, description=key.description or None))
+    return f.with_keys(table, fields)
+
+
+@_with_owned_keys
 class EngineTable(Table):
-    """What the engine is."""
+    """The engine."""
 
     layout: str
     drive: str
@@ -60,65 +143,72 @@ class EngineTable(Table):
 
     @property
     def piston_mass(self) -> Open:
-        """Reciprocating mass without a share of the rod, which may be open."""
+        """Reciprocating mass without a share of the rod; it may be open."""
         return Open.of(self.reciprocating_mass or 0.0)
 
     @property
     def open_masses(self) -> dict[str, Open]:
-        """Masses that are open, by their keys, which are those of the mechanisms."""
+        """Open masses by their keys, which are those of the mechanisms."""
         keys = ["reciprocating_mass", *(k.name for k in DRIVES[self.drive].keys if k.kind == "open mass")]
         return {key: own for key in keys if isinstance(own := getattr(self, key), Open) and own.is_open}
 
     @property
     def given_throws(self) -> list[float] | None:
-        """Throws, where every one is a number."""
+        """Angles of the throws [rad]; None unless all are numbers."""
         angles = [angle for angle in self.throws or () if isinstance(angle, float)]
         return angles if self.throws is not None and len(angles) == len(self.throws) else None
 
     @property
     def given_order(self) -> list[int] | None:
-        """Firing order, where it is a list."""
+        """Firing order; None unless it is a list."""
         return None if self.firing_order is None or self.firing_order == "open" else self.firing_order
 
     def own(self, key: str) -> Any:
-        """What stands at a key that a layout owns."""
+        """Return the value of a key that a layout owns."""
         return getattr(self, key)
 
     @property
     def kind(self) -> LayoutKind:
-        """What its layout takes and builds."""
+        """Kind of its layout."""
         return LAYOUTS[self.layout]
 
 
 def cycle_of(table: EngineTable) -> Cycle:
-    """In which its loads repeat."""
+    """Return the working cycle."""
     with blamed_on("engine.cycle"):
         return table.kind.cycle(_CYCLES[table.cycle])
 
 
 def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
-    """Slider-cranks of [engine], and the throws that they work on."""
+    """Return the slider-cranks of [engine], and the throws that they work on."""
     kind = table.kind
     for key in _OWNED:
         if table.own(key) and not kind.takes(key):
             raise Refused(f"engine.{key}", None, f"means nothing in layout '{table.layout}'", "leave it out")
     _check_pistons(table)
-    _check_drive(table)
+    drive, rule = DRIVES[table.drive], f"means nothing with drive '{table.drive}'"
+    none_of(table, [key.name for other in DRIVES.values() for key in other.keys if key not in drive.keys], "engine",
+            rule, "leave it out")  # fmt: skip
+    if kind.needs_rod and not drive.has_rod:
+        remedy = "leave it out, or take another layout"
+        raise Refused("engine.drive", table.drive, "has no rod that could carry the others", remedy)
+    if not drive.has_rod:
+        none_of(table, ("rod_ratio", "rod_length", "rod", "rod_inertia_deficit"), "engine", rule, "leave it out")
     bores = [part.bore for part in table.slider_cranks] or [None]
     if gas and kind.has_pistons and table.bore is None and None in bores:
         raise Refused("engine.bore", None, "is missing, and gas acts on it", "add it")
     if kind.is_free:
         parts = _sharing_chambers(table, _free_parts(table), gas)
         return parts, tuple(Throw(p.x, p.throw, (k,), shaft=p.shaft) for k, p in enumerate(parts))
-    asked, layout = _asked(table, gas), layout_of(table)
+    layout_input, layout = _layout_input(table, gas), layout_of(table)
     throws = _throws(table, layout)
     with blamed_on("engine.firing_order" if table.given_order else "engine"):
-        parts, cranks = kind.parts(asked, layout, throws)
+        parts, cranks = kind.parts(layout_input, layout, throws)
     return _sharing_chambers(table, parts, gas), cranks
 
 
 def _sharing_chambers(table: EngineTable, parts: Sequence[SliderCrank], gas: bool) -> tuple[SliderCrank, ...]:
-    """Pistons that face each other: with room between them and, where gas acts, with the chamber that both sweep."""
+    """Return slider-cranks whose facing pistons have room between them and, with gas, share a chamber."""
     for k, part in enumerate(parts):
         for other in parts[:k]:
             if part.faces(other) and least_room(part, other) <= 0.0:
@@ -137,27 +227,15 @@ def _check_pistons(table: EngineTable) -> None:
         none_of(table, _OF_PISTONS, "engine", f"means nothing in layout '{table.layout}'", "leave it out")
 
 
-def _check_drive(table: EngineTable) -> None:
-    """Refuse keys that mean nothing with the drive."""
-    drive, rule = DRIVES[table.drive], f"means nothing with drive '{table.drive}'"
-    none_of(table, [key.name for kind in DRIVES.values() for key in kind.keys if key not in drive.keys], "engine",
-            rule, "leave it out")  # fmt: skip
-    if table.kind.needs_rod and not drive.has_rod:
-        remedy = "leave it out, or take another layout"
-        raise Refused("engine.drive", table.drive, "has no rod that could carry the others", remedy)
-    if not drive.has_rod:
-        none_of(table, ("rod_ratio", "rod_length", "rod", "rod_inertia_deficit"), "engine", rule, "leave it out")
-
-
 def layout_of(table: EngineTable) -> Layout:
-    """Places, banks and pins, without masses."""
+    """Return the layout: positions, banks and pins without masses."""
     _check_pistons(table)
     with blamed_on("engine.cylinders"):
-        return table.kind.place(_asked(table))
+        return table.kind.place(_layout_input(table))
 
 
-def _asked(table: EngineTable, gas: bool = False) -> Asked:
-    """What [engine] says to its layout."""
+def _layout_input(table: EngineTable, gas: bool = False) -> Asked:
+    """Return the input of the layout."""
     given = {key.name: table.own(key.name) for key in table.kind.keys}
     masses = [key.name for key in table.kind.keys if key.kind in ("open mass", "open lead")]
     own = {
@@ -166,31 +244,27 @@ def _asked(table: EngineTable, gas: bool = False) -> Asked:
     }
     rods = {name: value.model_dump() for name, value in own.items() if isinstance(value, RodTable)}
     order = None if table.given_order is None else tuple(table.given_order)
-    count, (mechanism, rod) = _cylinders(table), _mechanism(table, own)
-    return Asked(cycle_of(table), count, mechanism, own | rods, order, table.piston_mass.start, rod, gas)
-
-
-def _cylinders(table: EngineTable) -> int:
-    given = told_cylinders(table)
-    if not given:
+    counts = cylinder_counts(table)
+    if not counts:
         raise Refused("engine.cylinders", None, "is missing", "add it, or throws, or firing_order")
-    first, count = given[0]
-    for key, other in given:
+    first, count = counts[0]
+    for key, other in counts:
         if other != count:
             rule = f"makes {counted(other, 'cylinder')}, but engine.{first} makes {count}"
             raise Refused(f"engine.{key}", None, rule, "let them agree")
     check_order(table.given_order, count)
-    return count
+    mechanism, rod = _mechanism(table, own)
+    return Asked(cycle_of(table), count, mechanism, own | rods, order, table.piston_mass.start, rod, gas)
 
 
-def told_cylinders(table: EngineTable) -> list[tuple[str, int]]:
-    """Keys that tell how many cylinders there are, and how many each tells."""
+def cylinder_counts(table: EngineTable) -> list[tuple[str, int]]:
+    """Return the keys that give the number of cylinders, with that number."""
     throws, order, per_throw = table.throws, table.given_order, table.kind.cylinders_per_throw
-    told = [("cylinders", table.cylinders)] if table.cylinders is not None else []
+    counts = [("cylinders", table.cylinders)] if table.cylinders is not None else []
     if order is not None and not order:
         raise Refused("engine.firing_order", [], "names no cylinder", "name every cylinder once")
-    told += [("firing_order", len(order))] if order is not None else []
-    return told + ([("throws", len(throws) * per_throw)] if isinstance(throws, list) else [])
+    counts += [("firing_order", len(order))] if order is not None else []
+    return counts + ([("throws", len(throws) * per_throw)] if isinstance(throws, list) else [])
 
 
 def check_order(order: Sequence[int] | None, count: int) -> None:
@@ -214,14 +288,19 @@ def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
 
 
 def _mechanism(table: EngineTable, own: Mapping[str, Any] | None = None) -> tuple[Mechanism, Rod | None]:
-    """Masses and lengths of one cylinder, and its rod where that is a rigid body."""
+    """Return masses and lengths of one cylinder, and its rod if that is a rigid body."""
     big_end = None if table.big_end is None else table.big_end.size
     if not table.kind.has_pistons:
         return table.kind.mechanism(own or {}, rotating_mass=table.rotating_mass, big_end=big_end), None
     radius, rod_length = _radius_and_rod(table)
-    rod = _rod(table, rod_length)
-    if rod is not None and table.rod_inertia_deficit != 0.0:
-        raise Refused("engine.rod_inertia_deficit", None, "is given twice, here and by [engine.rod]", "keep one")
+    rod = None
+    if table.rod is not None:
+        if math.isinf(rod_length):
+            raise Refused("engine.rod", None, "means nothing in a Scotch yoke (rod_ratio = 0)", "leave it out")
+        with blamed_on("engine.rod"):
+            rod = rod_of("rod", table.rod.model_dump(), rod_length, "crank pin")
+        if table.rod_inertia_deficit != 0.0:
+            raise Refused("engine.rod_inertia_deficit", None, "is given twice, here and by [engine.rod]", "keep one")
     plain = Mechanism(
         crank_radius=radius,
         rod_length=rod_length,
@@ -237,25 +316,15 @@ def _mechanism(table: EngineTable, own: Mapping[str, Any] | None = None) -> tupl
 
 
 def _sizes(table: EngineTable) -> Sizes:
-    """What [engine] says of lengths to its drive."""
     own = {key.name: getattr(table, key.name) for key in DRIVES[table.drive].keys}
-    told = {name: value.model_dump() if isinstance(value, RodTable) else value for name, value in own.items()}
-    told = {name: value.start if isinstance(value, Open) else value for name, value in told.items()}
+    values = {name: value.model_dump() if isinstance(value, RodTable) else value for name, value in own.items()}
+    values = {name: value.start if isinstance(value, Open) else value for name, value in values.items()}
     length = None if table.rod_length is None else Open.of(table.rod_length).start
-    return Sizes(table.stroke or 0.0, table.offset, length, table.rod_ratio, told)
-
-
-def _rod(table: EngineTable, length: float) -> Rod | None:
-    if table.rod is None:
-        return None
-    if math.isinf(length):
-        raise Refused("engine.rod", None, "means nothing in a Scotch yoke (rod_ratio = 0)", "leave it out")
-    with blamed_on("engine.rod"):
-        return rod_of("rod", table.rod.model_dump(), length, "crank pin")
+    return Sizes(table.stroke or 0.0, table.offset, length, table.rod_ratio, values)
 
 
 def _radius_and_rod(table: EngineTable) -> tuple[float, float]:
-    """Crank radius and rod length [m] from stroke, offset and one of rod ratio and rod length."""
+    """Return crank radius and rod length [m] from stroke, offset and one of rod ratio and rod length."""
     drive, sizes = DRIVES[table.drive], _sizes(table)
     ratio, length = sizes.rod_ratio, sizes.rod_length
     if drive.has_rod:
@@ -281,30 +350,64 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
             raise Refused(f"{where}.name", shaft.name, "is the name of another shaft", "give each its own name")
         with blamed_on(where):
             shafts[shaft.name] = Shaft(shaft.name, shaft.ratio, *shaft.position)
-    leads = {shaft.name: Open.of(shaft.lead).start for shaft in table.shafts}
-    return led_parts([_free_part(table, part, k, shafts) for k, part in enumerate(table.slider_cranks)], leads)
+    # slider-cranks on one throw share the mass that is given for every throw
+    pins = [(part.shaft, part.x, direction(part.throw)) for part in table.slider_cranks if part.rotating_mass is None]
+    parts = []
+    for k, part in enumerate(table.slider_cranks, 1):
+        where = f"engine.slider_cranks[{k}]"
+        if part.shaft not in shafts:
+            raise Refused(f"{where}.shaft", part.shaft, "is no shaft of this engine", nearest(part.shaft, list(shafts)))
+        own = {key: getattr(part, key) for key in _INHERITED if getattr(part, key) is not None}
+        if part.rod_ratio is not None or part.rod_length is not None:
+            own |= {"rod_ratio": part.rod_ratio, "rod_length": part.rod_length}
+        shaft, rotating = shafts[part.shaft], part.rotating_mass
+        if rotating is None:
+            rotating = table.rotating_mass / pins.count((part.shaft, part.x, direction(part.throw)))
+        with blamed_on(where):
+            mechanism, _ = _mechanism(table.model_copy(update=own))
+            first = (part.bank_angle - part.throw) / shaft.ratio % (math.tau / abs(shaft.ratio))
+            fires = part.firing_angle if part.firing_angle is not None else first
+            parts.append(mechanism.cylinder(k, part.x, part.throw, part.bank_angle, fires, rotating, shaft))
+    return led_parts(parts, {shaft.name: Open.of(shaft.lead).start for shaft in table.shafts})
 
 
-def _sharing(table: EngineTable, part: SliderCrankTable) -> int:
-    """Slider-cranks on the throw of this one that share the mass given for every throw."""
-    here = (part.shaft, part.x, direction(part.throw))
-    return sum(
-        (each.shaft, each.x, direction(each.throw)) == here and each.rotating_mass is None
-        for each in table.slider_cranks
-    )
+def piston_masses(
+    table: EngineTable, parts: Sequence[SliderCrank], weights: Sequence[CounterweightTable]
+) -> list[Decision]:
+    """Return decisions about masses of slider-cranks: of all that give none of their own, and of single ones."""
+    second = getattr(table, _SECOND)
+    decisions = list[Decision]()
+
+    def decide(name: str, mass: Open, names: Sequence[str], key: str = _RECIPROCATING) -> None:
+        decisions.extend(mass.decisions(name, "kg", *(NumberDrive(Kind.PISTON, (part, key)) for part in names)))
+
+    for key, mass in table.open_masses.items():
+        own = [getattr(row, key, None) for row in table.slider_cranks] or [
+            second if part.shaft != CRANKSHAFT and key == _RECIPROCATING else None for part in parts
+        ]
+        names = [part.name for part, given in zip(parts, own, strict=True) if given is None]
+        decide(key.replace("_", " "), mass, names, key)
+    if isinstance(second, Open):
+        names = [part.name for part in parts if part.shaft != CRANKSHAFT]
+        decide("second reciprocating mass", second, names)
+    for part, row in zip(parts, table.slider_cranks, strict=False):
+        if isinstance(row.reciprocating_mass, Open):
+            decide(f"reciprocating mass of {part.name}", row.reciprocating_mass, [part.name])
+    if decisions:
+        check_factors(weights, f"counts the {decisions[0].name}, which is open")
+    return decisions
 
 
-def _free_part(table: EngineTable, part: SliderCrankTable, k: int, shafts: dict[str, Shaft]) -> SliderCrank:
-    where = f"engine.slider_cranks[{k + 1}]"
-    if part.shaft not in shafts:
-        raise Refused(f"{where}.shaft", part.shaft, "is no shaft of this engine", nearest(part.shaft, list(shafts)))
-    own = {key: getattr(part, key) for key in _INHERITED if getattr(part, key) is not None}
-    if part.rod_ratio is not None or part.rod_length is not None:
-        own |= {"rod_ratio": part.rod_ratio, "rod_length": part.rod_length}
-    shaft = shafts[part.shaft]
-    with blamed_on(where):
-        mechanism, _ = _mechanism(table.model_copy(update=own))
-        rotating = part.rotating_mass if part.rotating_mass is not None else table.rotating_mass / _sharing(table, part)
-        first = (part.bank_angle - part.throw) / shaft.ratio % (math.tau / abs(shaft.ratio))
-        fires = part.firing_angle if part.firing_angle is not None else first
-        return mechanism.cylinder(k + 1, part.x, part.throw, part.bank_angle, fires, rotating, shaft)
+def leads_of(table: EngineTable) -> list[Decision]:
+    """Return a decision for every shaft with an open phase lead."""
+    lead, ports = table.own("crank_lead"), table.own("port_arc")
+    # the layout knows the start only
+    if isinstance(lead, Open) and ports is not None and max(map(abs, lead.bounds)) >= ports:
+        rule = f"goes beyond the ports, which are open for {units.shown(ports, 'rad')}"
+        raise Refused("engine.crank_lead", None, rule, "narrow its bounds")
+    leads = [(f"{shaft.name}.lead", shaft.name, shaft.lead) for shaft in table.shafts]
+    return [
+        decision
+        for name, shaft, own in (*leads, ("crank lead", _OPPOSED, lead))
+        for decision in Open.of(own).decisions(name, "rad", NumberDrive(Kind.LEAD, shaft))
+    ]

@@ -1,4 +1,4 @@
-"""[fidelity] of a problem file: choices by hand, or the cheapest that is good enough."""
+"""[fidelity] of a problem file: fidelity options by hand, or the cheapest that is accurate enough."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ T = TypeVar("T", bound=BaseModel)
 
 
 def _with_knobs(table: type[T]) -> type[T]:
-    """A table with a key for every choice of fidelity that it does not name itself."""
+    """Return the table with a key for every other fidelity option."""
     keys: dict[str, Any] = {}
     for knob in KNOBS:
         if knob.key not in table.model_fields:
@@ -41,18 +41,17 @@ class FidelityTable(Table):
     tolerance: f.Tolerance | None = f.told("Relative error of the objective that auto may make.")
 
     def own(self, key: str) -> Any:
-        """What stands at the key of a choice."""
+        """Return the value of a fidelity option."""
         return getattr(self, key)
 
 
 def at_fidelity(problem: Problem, table: FidelityTable) -> Problem:
-    """The problem at the fidelity that a table describes."""
+    """Return the problem at the fidelity of a table."""
     is_auto = table.kinematics == "auto"
     if table.tolerance is not None and not is_auto:
-        raise Refused(
-            "fidelity.tolerance", table.tolerance, 'is for kinematics = "auto" only', 'add kinematics = "auto"'
-        )
-    told: dict[str, Any] = {}
+        rule, remedy = 'is for kinematics = "auto" only', 'add kinematics = "auto"'
+        raise Refused("fidelity.tolerance", table.tolerance, rule, remedy)
+    options: dict[str, Any] = {}
     for knob in KNOBS:
         value = getattr(table, knob.key)
         if value is None or value == "auto":
@@ -62,10 +61,10 @@ def at_fidelity(problem: Problem, table: FidelityTable) -> Problem:
         refused = knob.refused(problem, value)
         if refused is not None:
             raise Refused(f"fidelity.{knob.key}", value, *refused)
-        told[knob.key] = tuple(value) if isinstance(value, list) else value
+        options[knob.key] = tuple(value) if isinstance(value, list) else value
     try:
-        fidelity = replace(EXACT, **told)
+        fidelity = replace(EXACT, **options)
     except ChoiceError as error:
         raise Refused(f"fidelity.{error.key}", getattr(table, error.key), error.rule, error.remedy) from None
-    asked = replace(problem, fidelity=fidelity)
-    return automatic(asked, table.tolerance or DEFAULT_TOLERANCE) if is_auto else asked
+    problem = replace(problem, fidelity=fidelity)
+    return automatic(problem, table.tolerance or DEFAULT_TOLERANCE) if is_auto else problem

@@ -1,4 +1,4 @@
-"""Field types of problem files: numbers with units, and numbers left open."""
+"""Field types of problem files: numbers with units, and open numbers."""
 
 from __future__ import annotations
 
@@ -26,25 +26,25 @@ from laufruhe.machine.crank_names import CRANKS
 from laufruhe.problem.decision import Decision, Drive
 from laufruhe.problem.sets import Interval
 
-# SI; squares and products of what lies between stay finite, and off zero.
+# SI; squares and products of numbers between these stay finite and nonzero
 SMALLEST, LARGEST = 1e-40, 1e12
-# Ratios are taken as fractions with a denominator of at most a thousand.
+# ratios are fractions with a denominator of at most a thousand
 SLOWEST = 1e-3
 
 T = TypeVar("T")
 Given = TypeVar("Given", bound=BaseModel)
 
 
-# what may stand behind a number: what of it is no tolerance, the reader says
+# a tolerance behind a number; the reader checks it
 _BEHIND = "(?:(?:±|[+]/?-).*)?$"
 ANYWHERE = "A number that a local search decides, without a bound."
-"""What a schema says of a number that is open where no method knows what depends on it."""
+"""Description of an open number without known dependences, in the schema."""
 _TOLERANCE = {"type": "string", "description": "How far a built one may be off.", "examples": ["± 2 %"]}
 
 
 @dataclass(frozen=True)
 class Open:
-    """A number left open between bounds [SI], with a value to start from."""
+    """Open number between bounds [SI], with a start value."""
 
     lower: float
     upper: float
@@ -52,40 +52,40 @@ class Open:
 
     @classmethod
     def of(cls, value: float | Open | None) -> Open:
-        """A number that may be open; one that is given stands at both bounds, and none is zero."""
+        """Return a number as open: a fixed one has equal bounds, None is zero."""
         return value if isinstance(value, Open) else cls(*(float(value or 0.0),) * 3)
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Smallest and largest value."""
+        """Lower and upper bound."""
         return self.lower, self.upper
 
     @property
     def is_open(self) -> bool:
-        """Whether the bounds leave anything to decide."""
+        """True if the bounds differ."""
         return self.lower < self.upper
 
     def decisions(self, name: str, unit: str, *drives: Drive) -> list[Decision]:
-        """What is to be decided of it: the number itself, or nothing."""
+        """Return one decision if it is open, else none."""
         return [Decision(name, unit, Interval(*self.bounds), self.start, drives)] if self.is_open else []
 
 
 @dataclass(frozen=True)
 class Number:
-    """A pydantic field that reads a number with a unit into SI (C1).
+    """Pydantic field that reads a number with a unit into SI (C1).
 
     Attributes
     ----------
     unit
         SI unit; "" for a plain number.
     openable
-        Whether `{ between = [low, high] }` may stand in place of the number.
+        True if `{ between = [low, high] }` is allowed in place of the number.
     least, above, most, below
-        Smallest value, value to exceed, largest value, value to stay under [SI].
+        Inclusive and exclusive lower bound, inclusive and exclusive upper bound [SI].
     plain
-        Factor that turns a bare number into SI, where one is allowed (degrees).
+        Factor that turns a bare number into SI, if one is allowed (degrees).
     closed
-        Why it may not be open at all, after "it"; empty where any search may move it.
+        Reason why it may never be open, as the end of "it ..."; empty if a search may move it.
     """
 
     unit: str
@@ -117,15 +117,15 @@ class Number:
 
     def _number_schema(self) -> dict[str, Any]:
         if not self.unit:
-            # text where it has a tolerance
+            # a number with a tolerance is text
             return {"anyOf": [{"type": "number"}, {"type": "string", "examples": ["0.26 ± 1 %"]}]}
         dimension = units.dimension_name(self.unit)
-        told = {"description": dimension, "x-dimension": dimension, "examples": [units.example(self.unit)]}
-        text = {"type": "string", "pattern": units.pattern(self.unit)[:-1] + _BEHIND, **told}
+        about = {"description": dimension, "x-dimension": dimension, "examples": [units.example(self.unit)]}
+        text = {"type": "string", "pattern": units.pattern(self.unit)[:-1] + _BEHIND, **about}
         return {"anyOf": [text, {"type": "number"}]} if self.plain is not None else text
 
     def read(self, given: Any) -> float | Open:
-        """Return a number [SI], or the bounds of one that is open; a refusal says what is wrong."""
+        """Return a number [SI], or an open one."""
         return self._open(given) if isinstance(given, dict) else self._bounded(self._number(given))
 
     def _number(self, given: Any) -> float:
@@ -171,16 +171,15 @@ class Number:
         pair = given.get("between")
         if not isinstance(pair, list) or len(pair) != 2:
             raise refusal("needs two bounds; write { between = [low, high] }")
-        low, high = (self._within(bound, "bound") for bound in pair)
+        low, high = (self._part(bound, "bound") for bound in pair)
         if low > high:
             raise refusal("has its bounds reversed; write the smaller one first")
-        start = self._within(given["start"], "start") if "start" in given else min(max(0.0, low), high)
+        start = self._part(given["start"], "start") if "start" in given else min(max(0.0, low), high)
         if not low <= start <= high:
             raise refusal("starts outside its bounds; move start or the bounds")
         return Open(low, high, start)
 
-    def _within(self, given: Any, what: str) -> float:
-        """A number of an open one; a complaint says which it is of."""
+    def _part(self, given: Any, what: str) -> float:
         try:
             return self._bounded(self._number(given))
         except PydanticCustomError as error:
@@ -189,14 +188,14 @@ class Number:
 
 
 def _without_note(text: str) -> str:
-    """Return what is wrong with a note that is of an extension that is not there; empty of any other text."""
+    # rule and remedy of a note of a missing extension; empty for other texts
     home = next((home for mark, home in HOMES["notes"].items() if mark in text), "")
     return "" if not home or any(one.name == home for one in extensions()) else "; ".join(lack(home))
 
 
 @dataclass(frozen=True)
 class OrOpen:
-    """A pydantic field that reads a list of the type `inner`, or in its place the word "open" or the name of a list."""
+    """Pydantic field that reads a list of the type `inner`, the word "open" or the name of a list."""
 
     inner: Any
     example: str
@@ -217,14 +216,14 @@ class OrOpen:
             if given in dict(self.named):
                 return inner(list(dict(self.named)[given]))
             names = ", ".join(f'"{name}"' for name, _ in self.named)
-            told = f', "open" or a name: {names}' if names else ' or "open"'
-            raise refusal(f'is neither a list nor "open"; write for example {self.example}{told}')
+            others = f', "open" or a name: {names}' if names else ' or "open"'
+            raise refusal(f'is neither a list nor "open"; write for example {self.example}{others}')
         return inner(given)
 
 
 @dataclass(frozen=True)
 class OneOrEach:
-    """A pydantic field that reads one value for all, or a list with one for each; gives a list either way."""
+    """Pydantic field that reads a list, or a single value as a list of one."""
 
     inner: Any
 
@@ -240,13 +239,13 @@ class OneOrEach:
 
     def _read(self, given: Any, inner: Callable[[Any], Any]) -> Any:
         if not isinstance(given, list) and isinstance(self.inner, type) and issubclass(self.inner, BaseModel):
-            # a complaint about the one table counts no list
+            # a complaint about a single table has no index
             return [self.inner.model_validate(given)]
         return inner(given if isinstance(given, list) else [given])
 
 
 def refusal(text: str) -> PydanticCustomError:
-    """What a validator raises: a rule, and a remedy after '; '."""
+    """Return the error of a validator: a rule, and a remedy after '; '."""
     # braces would be read as a template
     return PydanticCustomError("laufruhe", "{text}", {"text": text})
 
@@ -258,7 +257,7 @@ def _turning(ratio: float) -> float:
 
 
 def _side(given: Any) -> str | float:
-    """A text or a bare number: which unit is missing, if any, is known with the quantity."""
+    # the unit is checked with the quantity
     if isinstance(given, bool) or not isinstance(given, int | float | str):
         raise refusal("must be text in quotes")
     return given
@@ -324,7 +323,7 @@ FORMS = {
     _SHARE: 'is no share; write for example "15 %"',
     _FORMAT: 'is no format of numbers; write for example ".2f"',
 }
-"""What is said of a text that has not the form of a field."""
+"""Messages about texts that do not match the pattern of a field."""
 Name: TypeAlias = Annotated[str, Field(min_length=1, max_length=60, pattern=_LINE)]
 Slug: TypeAlias = Annotated[str, Field(pattern=_SLUG, max_length=60)]
 Share: TypeAlias = Annotated[str, Field(pattern=_SHARE)]
@@ -335,7 +334,7 @@ Three: TypeAlias = Annotated[list[T], Field(min_length=3, max_length=3)]
 
 
 def without_open(schema: Any) -> Any:
-    """Return a schema without numbers that are open where no key says so."""
+    """Return a schema without open numbers at keys that do not say so."""
     if isinstance(schema, list):
         return [without_open(one) for one in schema]
     if not isinstance(schema, dict):
@@ -345,24 +344,24 @@ def without_open(schema: Any) -> Any:
     if number is None:
         return {key: without_open(one) for key, one in schema.items()}
     others = [one for one in choices if one is not number]
-    # a number is one of two beside its being open; pydantic joins further ones
+    # a number has two alternatives, itself and open; pydantic adds further ones
     first = [*others[0].get("anyOf", [others[0]]), *others[1:]]
     rest = {key: without_open(one) for key, one in schema.items() if key != "anyOf"}
     return dict(sorted({**({"anyOf": first} if len(first) > 1 else first[0]), **rest}.items()))
 
 
 class Table(BaseModel):
-    """A TOML table that knows its keys and takes no others."""
+    """TOML table with fixed keys."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, defer_build=True)
     closed: ClassVar[str] = ""
-    """Why no number in it may be open but those whose keys say so, after "it"; empty where any may."""
+    """Reason why no other number in it may be open, as the end of "it ..."; empty if any may."""
 
     @classmethod
     def __get_pydantic_json_schema__(
         cls, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        """Return the schema, which offers no open number where the table is closed."""
+        """Return the schema, without open numbers for a closed table."""
         found = handler(schema)
         if cls.closed:
             own = handler.resolve_ref_schema(found)
@@ -371,15 +370,15 @@ class Table(BaseModel):
 
 
 def needed(text: str) -> Any:
-    """A field that may not be left out, and what an editor says of it."""
+    """Return a required field with its description for editors."""
     return Field(description=text)
 
 
 def told(text: str, default: Any = None) -> Any:
-    """A field that may be left out, and what an editor says of it."""
+    """Return an optional field with its description for editors."""
     return Field(default=default, description=text)
 
 
 def with_keys(table: type[Given], keys: Mapping[str, Any]) -> type[Given]:
-    """A table with further keys: the type and the field of each."""
+    """Return a table with further keys: the type and the field of each."""
     return create_model(table.__name__, __base__=table, __doc__=table.__doc__, __module__=table.__module__, **keys)

@@ -1,17 +1,21 @@
-"""[flywheel] of a problem file: its table, the flywheel it makes, and what of it is decided."""
+"""[flywheel] and [[geared_inertias]] of a problem file, and the decisions about them."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Sequence
+from typing import Annotated, TypeAlias
 
 from pydantic import Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, one_of
-from laufruhe.files.fields import Open, Table
-from laufruhe.machine import Arms, Flywheel, Rim
+from laufruhe.files.fields import Name, Open, Table
+from laufruhe.machine import Arms, Flywheel, GearedInertia, Rim
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
+
+OpenShare: TypeAlias = Annotated[float | Open, f.Number("", least=0.0, most=1.0, openable=True)]
+_ROUNDING = 1e-12
 
 
 class ArmsTable(Table):
@@ -50,7 +54,7 @@ _SECTION = ("mean_diameter", "width", "height")
 
 
 def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tuple[Flywheel | None, list[Decision]]:
-    """The flywheel, or what [fidelity] says of its inertia, and the decisions about it."""
+    """Return the flywheel, or the inertia of [fidelity] as one, and the decisions about it."""
     if table is None:
         return None if crank_inertia is None else Flywheel(crank_inertia), []
     one_of(table, "flywheel", "inertia", "rim", named="[flywheel.rim]")
@@ -58,29 +62,23 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
         if table.crankshaft_inertia is not None:
             rule = "needs a rim; inertia is that of all that turns"
             raise Refused("flywheel.crankshaft_inertia", None, rule, "leave it out")
-        numbers = {"inertia": ("kg m^2", Open.of(table.inertia))}
-        wheel = Flywheel(numbers["inertia"][1].start)
-        decisions = _decided(numbers, 0)
+        numbers = [("inertia", "kg m^2", Open.of(table.inertia))]
+        wheel, first = Flywheel(numbers[0][2].start), 0
     else:
-        section = {key: ("m", Open.of(getattr(table.rim, key))) for key in _SECTION}
-        wheel = Flywheel(table.crankshaft_inertia or 0.0, _rim(table.rim))
-        decisions = _decided(section, 1)
+        numbers = [(key, "m", Open.of(getattr(table.rim, key))) for key in _SECTION]
+        wheel, first = Flywheel(table.crankshaft_inertia or 0.0, _rim(table.rim)), 1
     if crank_inertia is not None:
         rule, told = "is given by [flywheel] too", units.shown(crank_inertia, "kg m^2")
         raise Refused("fidelity.crank_inertia", told, rule, "keep one: with this one loads feel the uneven speed")
-    return wheel, decisions
-
-
-def _decided(numbers: dict[str, tuple[str, Open]], first: int) -> list[Decision]:
-    return [
+    return wheel, [
         decision
-        for k, (key, (unit, given)) in enumerate(numbers.items(), first)
-        for decision in given.decisions(f"flywheel.{key}", unit, NumberDrive(Kind.FLYWHEEL, k))
+        for k, (key, unit, number) in enumerate(numbers, first)
+        for decision in number.decisions(f"flywheel.{key}", unit, NumberDrive(Kind.FLYWHEEL, k))
     ]
 
 
 def _rim(table: RimTable) -> Rim:
-    """The rim at the start of what is open; every section allowed leaves a hole and room for arms."""
+    """Return the rim with open numbers at their start; every allowed section leaves a hole and room for arms."""
     diameter, width, height = (Open.of(getattr(table, key)) for key in _SECTION)
     hole = diameter.lower - height.upper
     if hole <= 0.0:
@@ -94,3 +92,25 @@ def _rim(table: RimTable) -> Rim:
         own = table.arms
         arms = Arms(own.count, (own.at_rim[0], own.at_rim[1]), (own.at_hub[0], own.at_hub[1]), own.hub_diameter)
     return Rim(diameter.start, width.start, height.start, table.density, table.whole, arms)
+
+
+class GearedInertiaTable(Table):
+    """A second crank, or a flywheel on a shaft of its own."""
+
+    name: Name
+    ratio: f.Ratio = f.told("Speed over crank speed; negative runs against the crank.", -1.0)
+    share: OpenShare = f.needed("Share of the inertia of all that turns, reduced to the crank.")
+
+
+def geared_of(tables: Sequence[GearedInertiaTable]) -> tuple[tuple[GearedInertia, ...], list[Decision]]:
+    """Return the geared inertias, and the decisions about their shares (L8)."""
+    inertias, decisions = [], list[Decision]()
+    for table in tables:
+        share = Open.of(table.share)
+        inertias.append(GearedInertia(table.name, table.ratio, share.start))
+        decisions += share.decisions(f"{table.name}.share", "", NumberDrive(Kind.SHARE, table.name))
+    most = sum(Open.of(table.share).upper for table in tables)
+    if most > 1.0 + _ROUNDING:
+        rule = f"add up to {most:g}, and the inertia of all that turns is one"
+        raise Refused("geared_inertias", None, rule, "let shares, and the largest of open ones, add up to 1 at most")
+    return tuple(inertias), decisions

@@ -1,4 +1,4 @@
-"""The working gas of a problem file: its tables, and the model or the measured trace that they make."""
+"""[gas] of a problem file, and the gas model or pressure trace that it makes."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from laufruhe.physics.gas_cycle import check_chamber
 
 
 class ChargeTable(Table):
-    """What every computed cycle says of the charge and of the gas exchange."""
+    """Charge and gas exchange of a computed cycle."""
 
     compression_ratio: f.Positive | None = None
     intake_pressure: f.PositivePressure | None = None
@@ -130,12 +130,12 @@ GasTable: TypeAlias = Annotated[SeiligerTable | WiebeTable | TraceTable | Chambe
 
 
 def needs_bore(table: GasTable | None) -> bool:
-    """Whether the gas acts on the bore of [engine]; chambers have their own."""
+    """Return True if the gas acts on the bore of [engine]; chambers have their own."""
     return table is not None and not isinstance(table, ChambersTable)
 
 
 def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank]) -> GasModel | None:
-    """The working gas, a trace's file beside the problem file in `folder`."""
+    """Return the gas model; `folder` holds the file of a trace."""
     if table is None:
         return None
     air = AMBIENT_PRESSURE if table.crankcase_pressure is None else table.crankcase_pressure
@@ -144,16 +144,14 @@ def gas_of(table: GasTable | None, folder: Path, cycle: Cycle, parts: Sequence[S
             return Chambers(_chambers(table, folder, cycle, parts), air)
         if isinstance(table, TraceTable):
             return replace(_trace(table, folder, "gas"), crankcase_pressure=air)
-        made: GasModel = table.makes(**table.model_dump(exclude={"model"}, exclude_none=True))
+        gas: GasModel = table.makes(**table.model_dump(exclude={"model"}, exclude_none=True))
     with blamed_on("gas.compression_ratio"):
         for part in parts:
-            check_chamber(made, part)
-    return made
+            check_chamber(gas, part)
+    return gas
 
 
-def _chambers(
-    table: ChambersTable, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank]
-) -> tuple[Chamber, ...]:  # fmt: skip
+def _chambers(table: ChambersTable, folder: Path, cycle: Cycle, parts: Sequence[SliderCrank]) -> tuple[Chamber, ...]:
     if cycle is not Cycle.TWO_STROKE:
         raise Refused("engine.cycle", str(cycle), "has chambers that work once a turn", 'write "two-stroke"')
     if any(not part.has_rod for part in parts):
@@ -161,13 +159,13 @@ def _chambers(
     if any(one.faces(other) for one in parts for other in parts):
         rule = "has pistons that share a chamber, and chambers here are between a piston and a cylinder head"
         raise Refused("engine.layout", None, rule, "list the pistons on cylinders of their own, or leave gas out")
-    found = tuple(_chamber(own, k, folder, parts) for k, own in enumerate(table.chambers))
-    all_different([chamber.name for chamber in found], "gas.chambers", "chambers have one name")
-    return found
+    chambers = tuple(_chamber(own, k, folder, parts) for k, own in enumerate(table.chambers, 1))
+    all_different([chamber.name for chamber in chambers], "gas.chambers", "chambers have one name")
+    return chambers
 
 
 def _chamber(table: ChamberTable, k: int, folder: Path, parts: Sequence[SliderCrank]) -> Chamber:
-    where = f"gas.chambers[{k + 1}]"
+    where = f"gas.chambers[{k}]"
     given = {key: own for key in ("steam", "pump", "trace") if (own := getattr(table, key)) is not None}
     if len(given) != 1:
         rule = "says nothing of its pressure" if not given else f"is said to be {' and '.join(given)}"
@@ -179,16 +177,14 @@ def _chamber(table: ChamberTable, k: int, folder: Path, parts: Sequence[SliderCr
             rule = f"is none of {counted(len(parts), 'cylinder')}"
             raise Refused(f"{where}.cylinders", str(number), rule, "count them from 1")
     with blamed_on(f"{where}.{key}"):
-        made = (
-            _trace(diagram, folder, f"{where}.trace") if key == "trace" else diagram.makes(**diagram.model_dump())
-        )  # fmt: skip
+        is_trace = key == "trace"
+        model = _trace(diagram, folder, f"{where}.trace") if is_trace else diagram.makes(**diagram.model_dump())
     names = tuple(parts[number - 1].name for number in numbers)
     with blamed_on(f"{where}.rod"):
-        return Chamber(table.name or f"chamber {k + 1}", names, table.end, table.bore, table.rod, made)
+        return Chamber(table.name or f"chamber {k}", names, table.end, table.bore, table.rod, model)
 
 
 def _trace(table: TraceTable | SideTraceTable, folder: Path, key: str) -> PressureTrace:
-    """Crank angles and absolute pressures of a CSV file."""
     angle = measured(f"1 {table.angle_unit}", "rad", f"{key}.angle_unit", table.angle_unit)
     pressure = measured(f"1 {table.pressure_unit}", "Pa", f"{key}.pressure_unit", table.pressure_unit)
     pairs = rows_of(table.file, folder / table.file, f"{key}.file", ("crank angle", "pressure"))

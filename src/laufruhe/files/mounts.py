@@ -1,20 +1,23 @@
-"""[mounts] and [block] of a problem file: their tables, the mounts and the block they make, and what is open."""
+"""[mounts], [block] and [[load_cases]] of a problem file, and the decisions about mounts."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, all_different, blamed_on, nearest, none_of
-from laufruhe.files.dynamic_mounts import DynamicStiffnessTable, FluidTrackTable, dynamic_of
+from laufruhe.files.complaints import Refused, all_different, blamed_on, measured, nearest, none_of
+from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import Block, Mount
-from laufruhe.machine.dynamic import Dynamic
+from laufruhe.machine.dynamic import Dynamic, FluidTrack, MeasuredStiffness
+from laufruhe.machine.load_case import LoadCase
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.modes import free_motion
 from laufruhe.problem.decision import (
@@ -38,7 +41,7 @@ _FIELDS = {
         ("position", "m", POSITION), ("turned", "rad", TURNED), ("damping_per_stiffness", "s", slice(LAG, LAG + 1)),
     )
 }  # fmt: skip
-# what mirroring in y = 0 does to each number of a mount
+# factors of the numbers of a mount when it is mirrored in y = 0
 _MIRRORED = [1.0] * 8 + [-1.0, 1.0, -1.0, 1.0, -1.0, 1.0]
 _OF_ALL = ("stiffness", "loss_factor", "damping_per_stiffness")
 _DYNAMIC = ("fluid_track", "dynamic_stiffness")
@@ -69,8 +72,31 @@ class StopTable(Table):
     stiffness: f.Stiffness
 
 
+class FluidTrackTable(Table):
+    """The fluid of a hydraulic mount, all referred to its travel by the area of the piston."""
+
+    axis: Literal["x", "y", "z"] = f.told("Own axis of the mount along which it acts.", "z")
+    mass: f.PositiveMass = f.needed("Effective mass of the fluid in the track: its inertance times the area squared.")
+    bulge_stiffness: f.Stiffness = f.needed("Stiffness of the rubber against swelling: area squared over compliance.")
+    chamber_stiffness: f.Stiffness = f.told("Of the lower chamber.", 0.0)
+    damping: f.Damping = f.told("Of the flow through the track.", 0.0)
+
+
+class DynamicStiffnessTable(Table):
+    """Complex stiffness along an own axis from a CSV file: frequency, stiffness, and loss or its angle."""
+
+    axis: Literal["x", "y", "z"] = f.told("Own axis of the mount along which it acts.", "z")
+    file: str = f.needed("CSV file beside the problem.")
+    frequency_unit: str = f.told("Unit of the first column.", "Hz")
+    stiffness_unit: str = f.told("Unit of the stiffness.", "N/mm")
+    columns: Literal["stiffness and loss", "amount and angle"] = f.told(
+        "What follows the frequency: storage and loss stiffness, or its amount and its loss angle in degrees.",
+        "amount and angle",
+    )
+
+
 class MountTable(Table):
-    """One mount."""
+    """Mount of the engine."""
 
     name: Name | None = None
     position: f.Three[f.OpenLength] | None = None
@@ -95,7 +121,7 @@ class MountTable(Table):
 
 
 class MountsTable(Table):
-    """How the engine is held."""
+    """Mounts of the engine."""
 
     kind: Literal["rigid", "elastic"] = "rigid"
     positions: list[f.Three[f.Length]] = Field(default_factory=list)
@@ -112,9 +138,19 @@ class MountsTable(Table):
     places: list[MountTable] = Field(default_factory=list)
 
 
+class LoadCaseTable(Table):
+    """A load that is held: weight, a bump, a torque. Travel counts from where the engine stands without it."""
+
+    name: Name
+    times_weight: f.Three[f.Factor] | None = f.told("The weight of the block, so many times along x, y and z.")
+    torque: f.Moment | None = f.told("Moment about x, as that of the crank on the block.")
+    force: f.Three[f.SignedForce] | None = f.told("A force along x, y and z.")
+    place: f.Three[f.Length] | None = f.told("Where the force acts.")
+
+
 @dataclass(frozen=True)
 class MountsFound:
-    """Mounts of a file, the block they carry, and what of them is open."""
+    """Mounts of a file, their block, and the decisions about them."""
 
     mounts: tuple[Mount, ...] = ()
     block: Block | None = None
@@ -123,14 +159,18 @@ class MountsFound:
 
 
 def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path) -> MountsFound:
-    """Rigid mounts, or elastic ones with the block on them."""
+    """Return rigid mounts, or elastic ones with the block on them."""
     if table is None or table.kind == "rigid":
         if block is not None:
             raise Refused("block", None, "needs elastic mounts", 'add [mounts] with kind = "elastic", or leave it out')
         return MountsFound(_rigid(table)) if table else MountsFound()
     if block is None:
         raise Refused("block", None, "is missing, and elastic mounts carry it", "add [block] with mass and inertia")
-    return _elastic(table, _block(block), folder)
+    (a, b, c), (xy, xz, yz) = block.inertia, block.inertia_products
+    x, y, z = block.centre_of_gravity
+    with blamed_on("block"):
+        body = Block(block.mass, ((a, xy, xz), (xy, b, yz), (xz, yz, c)), (x, y, z), block.turning_inertia)
+    return _elastic(table, body, folder)
 
 
 def _places(table: MountsTable) -> tuple[list[MountTable], list[str]]:
@@ -149,12 +189,12 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
     none_of(table, ("stiffness", "loss_factor", "damping_per_stiffness", "stop"), "mounts", *_NOT_RIGID)
     places, names = _places(table)
     mounts = []
-    for k, (name, place) in enumerate(zip(names, places, strict=True)):
-        where = f"mounts.places[{k + 1}]"
+    for k, (name, place) in enumerate(zip(names, places, strict=True), 1):
+        where = f"mounts.places[{k}]"
         none_of(place, _ELASTIC, where, *_NOT_RIGID)
         stiffness = place.relative_stiffness or table.relative_stiffness
         if not any(stiffness):
-            own = f"places[{k + 1}]." if place.relative_stiffness else ""
+            own = f"places[{k}]." if place.relative_stiffness else ""
             raise Refused(f"mounts.{own}relative_stiffness", stiffness, "carries nothing", "give one a value")
         numbers = [*stiffness, 0.0, 0.0, 0.0, 0.0]
         for key in ("position", "turned"):
@@ -174,22 +214,20 @@ def _values(table: MountsTable, place: MountTable, key: str, where: str, remedy:
     return [value] if len(_FIELDS[key][1]) == 1 else value or [0.0, 0.0, 0.0]
 
 
-def _block(table: BlockTable) -> Block:
-    (a, b, c), (xy, xz, yz) = table.inertia, table.inertia_products
-    x, y, z = table.centre_of_gravity
-    with blamed_on("block"):
-        return Block(table.mass, ((a, xy, xz), (xy, b, yz), (xz, yz, c)), (x, y, z), table.turning_inertia)
-
-
 def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsFound:
     none_of(table, ("relative_stiffness",), "mounts", *_NOT_ELASTIC)
     places, names = _places(table)
-    read, joins = _Numbers([], []), list[int]()
+    read, joins, laws = _Numbers([], []), list[int](), list[tuple[Dynamic, ...]]()
+    springs = []
     for k, (name, place) in enumerate(zip(names, places, strict=True)):
-        where = f"mounts.places[{k + 1}]"
+        where, stop = f"mounts.places[{k + 1}]", place.stop or table.stop
         none_of(place, ("relative_stiffness",), where, *_NOT_ELASTIC)
-        leader, followed, joined = _leader(place, names, k, where), _followed(place), _joined(place, names, k, joins)
+        leader, followed = _leader(place, names, k, where), _followed(place)
+        joined = _joined(place, names, joins, where)
         joins.append(joined)
+        laws.append(_laws(place, folder, where) if leader is None else laws[leader])
+        spring = Mount(name, (0.0, 0.0, 0.0), dynamic=laws[k])
+        springs.append(spring if stop is None else replace(spring, stop_gap=stop.gap, stop_stiffness=stop.stiffness))
         read.rows.append([0.0] * NUMBERS_OF_MOUNT)
         if leader is not None:
             keys = [key for key in followed if key in _FIELDS and (key != _AT or joined == k)]
@@ -199,9 +237,7 @@ def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsFound:
         for key in _FIELDS:
             if key not in followed and (key != _AT or joined == k):
                 read.take(name, key, _values(table, place, key, where, "add it, or like, or mirror_of"))
-    stops, laws = [place.stop or table.stop for place in places], _laws(places, names, folder)
-    bare = [replace(spring, dynamic=law) for spring, law in zip(map(_bare, names, stops), laws, strict=True)]
-    springs = [mount_of(spring, row) for spring, row in zip(bare, read.rows, strict=True)]
+    springs = [mount_of(spring, row) for spring, row in zip(springs, read.rows, strict=True)]
     mounts = tuple(
         replace(springs[k], joined=tuple(springs[j] for j in range(k + 1, len(joins)) if joins[j] == k))
         for k in sorted(set(joins))
@@ -215,19 +251,38 @@ def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsFound:
     return MountsFound(mounts, block, tuple(map(tuple, read.rows)), tuple(read.decisions))
 
 
-def _laws(places: Sequence[MountTable], names: list[str], folder: Path) -> list[tuple[Dynamic, ...]]:
-    """Of every mount what depends on frequency, that of the one it follows where it follows one."""
-    found: list[tuple[Dynamic, ...]] = []
-    for k, place in enumerate(places):
-        leader, where = place.like or place.mirror_of, f"mounts.places[{k + 1}]"
-        own = dynamic_of(place.fluid_track, place.dynamic_stiffness, folder, where)
-        found.append(own if leader is None else found[names.index(leader)])
-    return found
+def _laws(place: MountTable, folder: Path, where: str) -> tuple[Dynamic, ...]:
+    """Return the stiffness of a mount that depends on frequency (E50, E51)."""
+    laws: list[Dynamic] = []
+    if (track := place.fluid_track) is not None:
+        if track.bulge_stiffness == 0.0:
+            raise Refused(f"{where}.fluid_track.bulge_stiffness", None, "is zero, and moves no fluid", "give a value")
+        axis = _AXES.index(track.axis)
+        laws.append(FluidTrack(axis, track.mass, track.bulge_stiffness, track.chamber_stiffness, track.damping))
+    if place.dynamic_stiffness is not None:
+        laws.append(_measured(place.dynamic_stiffness, folder, f"{where}.dynamic_stiffness"))
+    return tuple(laws)
 
 
-def _bare(name: str, stop: StopTable | None) -> Mount:
-    mount = Mount(name, (0.0, 0.0, 0.0))
-    return mount if stop is None else replace(mount, stop_gap=stop.gap, stop_stiffness=stop.stiffness)
+def _measured(table: DynamicStiffnessTable, folder: Path, where: str) -> MeasuredStiffness:
+    hertz = measured(f"1 {table.frequency_unit}", "Hz", f"{where}.frequency_unit", table.frequency_unit)
+    unit = measured(f"1 {table.stiffness_unit}", "N/m", f"{where}.stiffness_unit", table.stiffness_unit)
+    by_angle = table.columns == "amount and angle"
+    names = ("frequency", *(("stiffness", "loss angle") if by_angle else ("stiffness", "loss stiffness")))
+    rows = rows_of(table.file, folder / table.file, f"{where}.file", names)
+    if len(rows) < 2:
+        raise Refused(f"{where}.file", table.file, "has fewer than two rows", "measure more frequencies")
+    values = []
+    for k, (_, amount, other) in enumerate(rows, 1):
+        if by_angle and not 0.0 <= other < 180.0:
+            rule = f"has a loss angle of {other:g} deg in row {k}"
+            raise Refused(f"{where}.file", table.file, rule, "give it from 0 to 180, or set columns")
+        value = amount * np.exp(1j * math.radians(other)) if by_angle else complex(amount, other)
+        values.append(complex(unit * value))
+    with blamed_on(f"{where}.file", table.file):
+        return MeasuredStiffness(
+            _AXES.index(table.axis), tuple(math.tau * hertz * row[0] for row in rows), tuple(values)
+        )
 
 
 def _leader(place: MountTable, names: list[str], k: int, where: str) -> int | None:
@@ -244,18 +299,19 @@ def _leader(place: MountTable, names: list[str], k: int, where: str) -> int | No
     return names.index(leader)
 
 
-def _joined(place: MountTable, names: list[str], k: int, joins: Sequence[int]) -> int:
-    """Number of the mount that it stands with, its own where it stands alone."""
-    where, other = f"mounts.places[{k + 1}].joined_to", place.joined_to
+def _joined(place: MountTable, names: list[str], joins: Sequence[int], where: str) -> int:
+    """Return the index of the mount that the next mount is joined to, its own if it stands alone."""
+    k, other = len(joins), place.joined_to
     if other is None:
         return k
     if other not in names[:k]:
         remedy = nearest(other, names[:k]) if k else "define the other one first"
-        raise Refused(where, other, "is no mount defined before this one", remedy)
+        raise Refused(f"{where}.joined_to", other, "is no mount defined before this one", remedy)
     first = joins[names.index(other)]
     if names[first] != other:
-        raise Refused(where, other, "is joined to another mount itself", f"name that one, '{names[first]}'")
-    none_of(place, (_AT,), f"mounts.places[{k + 1}]", f"is that of '{other}' already", "leave one out")
+        remedy = f"name that one, '{names[first]}'"
+        raise Refused(f"{where}.joined_to", other, "is joined to another mount itself", remedy)
+    none_of(place, (_AT,), where, f"is that of '{other}' already", "leave one out")
     return first
 
 
@@ -267,13 +323,13 @@ def _followed(place: MountTable) -> tuple[str, ...]:
 
 @dataclass
 class _Numbers:
-    """Rows of numbers of elastic mounts and decisions about them, as they are read."""
+    """Rows of numbers of elastic mounts, and decisions about them."""
 
     rows: list[list[float]]
     decisions: list[Decision]
 
     def take(self, name: str, key: str, values: Sequence[float | Open]) -> None:
-        """One key of the last mount."""
+        """Read the values of one key of the last mount."""
         unit, numbers = _FIELDS[key]
         for number, axis, value in zip(numbers, _AXES, map(Open.of, values), strict=False):
             self.rows[-1][number] = value.start
@@ -281,7 +337,7 @@ class _Numbers:
             self.decisions += value.decisions(label, unit, MountDrive(len(self.rows) - 1, number, 1.0))
 
     def sort(self, order: Sequence[int]) -> None:
-        """Rows in another order: those of one place behind each other."""
+        """Reorder the rows, so that springs of one place are neighbours."""
         self.rows = [self.rows[k] for k in order]
         new = {old: k for k, old in enumerate(order)}
         for d, decision in enumerate(self.decisions):
@@ -289,7 +345,7 @@ class _Numbers:
             self.decisions[d] = replace(decision, drives=tuple(drives))
 
     def follow(self, leader: int, keys: Sequence[str], mirrored: bool) -> None:
-        """Keys of the last mount are those of another."""
+        """Let keys of the last mount follow those of another."""
         last = len(self.rows) - 1
         for number in (number for key in keys for number in _FIELDS[key][1]):
             gain = _MIRRORED[number] if mirrored else 1.0
@@ -298,3 +354,23 @@ class _Numbers:
                 drives = [v for v in decision.mount_drives if v.mount == leader and v.number == number]
                 new = (MountDrive(last, number, gain * drive.gain) for drive in drives)
                 self.decisions[d] = replace(decision, drives=(*decision.drives, *new))
+
+
+def load_cases_of(tables: Sequence[LoadCaseTable], block: Block | None) -> tuple[LoadCase, ...]:
+    """Return the static load cases."""
+    if tables and block is None:
+        rule = "needs elastic mounts, that give way"
+        raise Refused("load_cases", None, rule, 'add [mounts] with kind = "elastic", and [block]')
+    all_different([table.name for table in tables], "load_cases", "load cases have one name")
+    cases = []
+    for k, table in enumerate(tables, 1):
+        if not any((*(table.times_weight or ()), table.torque, *(table.force or ()))):
+            raise Refused(f"load_cases[{k}]", table.name, "is no load", "give times_weight, torque or force")
+        if table.place is not None and table.force is None:
+            raise Refused(f"load_cases[{k}].place", table.place, "is of no force", "give the force, or leave it out")
+        weight, force, place = (
+            (three[0], three[1], three[2]) if three else (0.0, 0.0, 0.0)
+            for three in (table.times_weight, table.force, table.place)
+        )  # fmt: skip
+        cases.append(LoadCase(table.name, weight, force, place, (table.torque or 0.0, 0.0, 0.0)))
+    return tuple(cases)

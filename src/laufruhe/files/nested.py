@@ -1,26 +1,29 @@
-"""Tables within tables, as a TOML file has them: what stands where, another value there, and all that stands inside."""
+"""Tables within tables, as a TOML file has them: values at places, and the models of what stands there."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Annotated, Any, TypeAlias, get_args, get_origin
 
 import numpy as np
+from pydantic import BaseModel
+
+from laufruhe.files import fields as f
 
 Place: TypeAlias = tuple[str | int, ...]
-"""Keys, and numbers in lists from zero."""
+"""Keys, and indices in lists from zero."""
 
 
 def at(node: Any, place: Sequence[Any]) -> Any:
-    """What stands there; None where a table has no such key."""
+    """Return the value at a place; None if a table has no such key."""
     for key in place:
         node = node.get(key) if isinstance(node, Mapping) else node[key]
     return node
 
 
 def put(tables: Mapping[str, Any], place: Sequence[Any], value: Any) -> dict[str, Any]:
-    """Tables with another value there; the rest is shared with those given."""
+    """Return the tables with another value at a place; the rest is shared."""
     whole = dict(tables)
     here: Any = whole
     for key in place[:-1]:
@@ -31,7 +34,7 @@ def put(tables: Mapping[str, Any], place: Sequence[Any], value: Any) -> dict[str
 
 
 def inside(tables: Any) -> Iterator[tuple[Place, Any]]:
-    """Everything that stands in tables, and where; what is nested comes after what holds it."""
+    """Yield all values in tables with their places, outer ones first."""
     left = deque[tuple[Place, Any]]([((), tables)])
     while left:
         place, node = left.popleft()
@@ -41,14 +44,60 @@ def inside(tables: Any) -> Iterator[tuple[Place, Any]]:
 
 
 def texts_in(tables: Any) -> Iterator[tuple[Place, str]]:
-    """All texts of tables, and where they stand."""
+    """Yield all texts in tables with their places."""
     return ((place, node) for place, node in inside(tables) if isinstance(node, str))
 
 
-def plain(given: Any, deepest: int) -> Any:
-    """A copy as a file has it: lists of tuples and arrays, numbers of NumPy's, down to a depth."""
-    if isinstance(given, Mapping) and deepest:
-        return {key: plain(value, deepest - 1) for key, value in given.items()}
-    if isinstance(given, list | tuple) and deepest:
-        return [plain(value, deepest - 1) for value in given]
+def plain(given: Any, depth: int) -> Any:
+    """Return a copy with lists for tuples and arrays and numbers for NumPy's, down to a depth."""
+    if isinstance(given, Mapping) and depth:
+        return {key: plain(value, depth - 1) for key, value in given.items()}
+    if isinstance(given, list | tuple) and depth:
+        return [plain(value, depth - 1) for value in given]
     return given.tolist() if isinstance(given, np.ndarray | np.generic) else given
+
+
+def number_at(model: type[BaseModel], path: Sequence[str | int]) -> f.Number | None:
+    """Return the field that reads the number at a path; None if a text, a count, a list or a choice stands there."""
+    leaves = (leaf for annotation in annotations_at(model, path) for leaf in _leaves(annotation))
+    return next((leaf for leaf in leaves if isinstance(leaf, f.Number)), None)
+
+
+def annotations_at(model: type[BaseModel], path: Sequence[str | int]) -> list[Any]:
+    """Return the annotations at a path; none if the models have no such key."""
+    here: list[Any] = [model]
+    for part in path:
+        here = [inner for annotation in here for inner in _inside(annotation, part)]
+    return here
+
+
+def tables_on(model: type[BaseModel], path: Sequence[str | int]) -> list[type[f.Table]]:
+    """Return the models of the tables on the way to a path, the outermost first."""
+    leaves = (leaf for k in range(len(path)) for note in annotations_at(model, path[:k]) for leaf in _leaves(note))
+    return [leaf for leaf in leaves if isinstance(leaf, type) and issubclass(leaf, f.Table)]
+
+
+def _inside(annotation: Any, part: str | int) -> list[Any]:
+    """Return the annotations that one part of a path may lead to."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        field = annotation.model_fields.get(str(part))
+        return [] if field is None else [Annotated[field.annotation, *field.metadata, None]]
+    if get_origin(annotation) is list:
+        return list(get_args(annotation))
+    if isinstance(annotation, f.OneOrEach):
+        # a list, or its one table alone
+        return [annotation.inner, *_inside(annotation.inner, part)]
+    if isinstance(annotation, f.OrOpen):
+        return _inside(annotation.inner, part)
+    # annotated types and their notes, or the members of a union
+    return [inner for one in get_args(annotation) for inner in _inside(one, part)]
+
+
+def _leaves(annotation: Any) -> Iterator[Any]:
+    """Yield the members of a union, and the notes of annotated types, without entries of lists."""
+    if isinstance(annotation, f.OneOrEach):
+        yield from _leaves(annotation.inner)
+    elif get_origin(annotation) is not list:
+        yield annotation
+        for part in get_args(annotation):
+            yield from _leaves(part)

@@ -1,24 +1,28 @@
-"""Operating points of a problem file: their table, and the speeds and loads that it makes."""
+"""[[operating_points]] and [friction] of a problem file: speeds, and loads of the gas or at the brake."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field
 
 from laufruhe import units
 from laufruhe.files import fields as f
-from laufruhe.files.complaints import Refused, all_different, one_of
+from laufruhe.files.complaints import Refused, all_different, blamed_on, measured, one_of
+from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Name, Table
-from laufruhe.files.friction import Brake
 from laufruhe.machine import Cycle, GasModel, OperatingPoint, Seiliger, Wiebe
 from laufruhe.physics.seiliger_cycle import motored_cycle
+from laufruhe.physics.willans import FEWEST, Friction, FrictionTest, mean_pressure, motoring_friction, willans_friction
 
 MOST_POINTS = 200
-"""Of one problem, which weighs them all at once: 14 MB and a fifth of a second each where four mounts are asked."""
+"""Largest number of operating points: each takes 14 MB and a fifth of a second on four mounts."""
+SAME_SPEED = 0.01
+"""Relative difference of speeds within which rows of a fuel table belong together."""
 
 
 class OperatingPointTable(Table):
@@ -39,26 +43,119 @@ class OperatingPointTable(Table):
     weight: f.Positive = 1.0
 
 
+class FrictionTable(Table):
+    """Friction mean effective pressure, measured in a CSV file or given, with its uncertainty."""
+
+    closed: ClassVar[str] = "is of a measurement"
+
+    file: str | None = f.told("CSV file: speed, load and fuel for kind fuel; speed and drag for kind motoring.")
+    kind: Literal["fuel", "motoring"] = "fuel"
+    speed_unit: str = "rpm"
+    load_unit: str = f.told("Unit of the load in the file: of a torque, or of a mean pressure.", "N m")
+    fmep: f.PositivePressure | None = f.told("Friction mean effective pressure, in place of a file.")
+    deviation: Annotated[float, f.Number("Pa", least=0.0)] | None = f.told("Standard deviation of fmep.")
+    deviations: f.NonNegative = f.told(
+        "Number of standard deviations to either side for which the load is computed.", 2.0
+    )
+
+
+class Brake:
+    """Conversion of loads at the brake into indicated mean pressures.
+
+    Attributes
+    ----------
+    displacement
+        Displacement of the engine [m3].
+    said
+        Sentences about the loads converted so far, for the report.
+    tests
+        Measurements behind these loads.
+    """
+
+    def __init__(self, table: FrictionTable, folder: Path, displacement: float, cycle: Cycle) -> None:
+        self.table, self.displacement, self.turns = table, displacement, cycle.turns
+        one_of(table, "friction", "file", "fmep")
+        if table.file is not None and table.deviation is not None:
+            raise Refused("friction.deviation", None, "follows from the file", "leave it out")
+        self.said: list[str] = []
+        self.tests: list[FrictionTest] = []
+        self._rows = [] if table.file is None else self._read(table.file, folder)
+
+    def _read(self, file: str, folder: Path) -> list[tuple[float, ...]]:
+        """Return rows of speed [rad/s], mean pressure [Pa] and fuel."""
+        names = ("speed", "load", "fuel")[: 3 if self.table.kind == "fuel" else 2]
+        speed = measured(f"1 {self.table.speed_unit}", "rad/s", "friction.speed_unit", self.table.speed_unit)
+        text, unit = f"1 {self.table.load_unit}", self.table.load_unit
+        if units.dimension_of(text) == "N m":
+            load = self.pressure(measured(text, "N m", "friction.load_unit", unit))
+        else:
+            load = measured(text, "Pa", "friction.load_unit", unit)
+        rows = rows_of(file, folder / file, "friction.file", names)
+        for k, row in enumerate(rows, 1):
+            if not all(map(math.isfinite, row)):
+                raise Refused("friction.file", file, f"has a number in row {k} that is not finite", "leave it out")
+        return [(n * speed, p * load, *rest) for n, p, *rest in rows]
+
+    def pressure(self, torque: float) -> float:
+        """Return the mean pressure of a torque at the brake [Pa] (W1)."""
+        return mean_pressure(torque, self.displacement, self.turns)
+
+    def indicated(self, brake: float, speed: float, where: str) -> tuple[float, float, float]:
+        """Return the lowest, middle and highest indicated mean pressure at a speed [Pa] (W4)."""
+        friction = self._friction(speed, where)
+        pressures = friction.indicated(brake, self.table.deviations)
+        if pressures[0] <= brake:
+            rule = f"is off by as much as {units.shown(friction.deviation, 'Pa')}, more than it is itself"
+            raise Refused(
+                "friction", units.shown(friction.mean, "Pa"), rule, "measure more points, or fewer deviations"
+            )
+        least, middle, most, loss, off = (f"{1e-5 * p:.4g}" for p in (*pressures, friction.mean, friction.deviation))
+        self.said.append(
+            f"Indicated mean pressure at {where} {middle} bar, {least} to {most} bar: {1e-5 * brake:.4g} bar at the "
+            f"brake and {loss} bar of friction, {self.table.deviations:g} deviations of {off} bar to either side."
+        )
+        if self._rows:
+            is_motored = self.table.kind == "motoring"
+            x, y = zip(*(row[:2] if is_motored else row[1:] for row in self._readings(speed)), strict=True)
+            at = speed if is_motored else brake
+            self.tests.append(FrictionTest(where, is_motored, x, y, at, friction, self.table.deviations))
+        return pressures
+
+    def _readings(self, speed: float) -> list[tuple[float, ...]]:
+        if self.table.kind == "motoring":
+            return self._rows
+        return [row for row in self._rows if math.isclose(row[0], speed, rel_tol=SAME_SPEED)]
+
+    def _friction(self, speed: float, where: str) -> Friction:
+        if self.table.fmep is not None:
+            return Friction(self.table.fmep, self.table.deviation or 0.0)
+        own = self._readings(speed)
+        with blamed_on("friction.file", self.table.file or ""):
+            if self.table.kind == "motoring":
+                return motoring_friction([row[0] for row in own], [row[1] for row in own], speed)
+            if len(own) < FEWEST:
+                rule = f"has {len(own)} points at {units.shown(speed, 'rad/s')} of {where}, and a line takes {FEWEST}"
+                raise Refused("friction.file", self.table.file, rule, "measure more loads at that speed")
+            return willans_friction([row[1] for row in own], [row[2] for row in own])
+
+
 def operating_points(
-    tables: Sequence[OperatingPointTable],
-    gas: GasModel | None,
-    cycle: Cycle,
-    stroke: float | None,
+    tables: Sequence[OperatingPointTable], gas: GasModel | None, cycle: Cycle, stroke: float | None,
     brake: Brake | None,
-) -> tuple[OperatingPoint, ...]:
-    """Speeds and loads of an engine whose gas, where a point says no other, is this."""
+) -> tuple[OperatingPoint, ...]:  # fmt: skip
+    """Return the operating points; `gas` is the gas of points that give no load of their own."""
     points = []
-    for k, table in enumerate(tables):
-        where = f"operating_points[{k + 1}]"
+    for k, table in enumerate(tables, 1):
+        where = f"operating_points[{k}]"
         speeds = _speeds(table, stroke, where)
         for speed in speeds:
-            at = units.shown(speed, "rad/s", 6)
-            name = (f"{table.name} {at}" if len(speeds) > 1 else table.name) if table.name else at
+            shown = units.shown(speed, "rad/s", 6)
+            name = (f"{table.name} {shown}" if len(speeds) > 1 else table.name) if table.name else shown
             loads = _loads(table, speed, brake, where, name)
-            for said, imep in loads:
+            for suffix, imep in loads:
                 load = _loaded(gas, table.model_copy(update={"imep": imep}), cycle, where)
                 share = table.weight / len(speeds) / len(loads)
-                points.append(OperatingPoint(f"{name}{said}", speed, load, share))
+                points.append(OperatingPoint(f"{name}{suffix}", speed, load, share))
     if len(points) > MOST_POINTS:
         rule = f"makes {len(points)} operating points, more than {MOST_POINTS}"
         raise Refused("operating_points", None, rule, "take wider steps, or sweep the speed in a study")
@@ -67,7 +164,7 @@ def operating_points(
 
 
 def _speeds(table: OperatingPointTable, stroke: float | None, where: str) -> tuple[float, ...]:
-    """One speed, or equal steps over a range that share the weight."""
+    """Return a single speed, or equal steps over a range [rad/s]."""
     one_of(table, where, "speed", "mean_piston_speed")
     if table.speed is None and stroke is None:
         raise Refused(f"{where}.mean_piston_speed", None, "means nothing without pistons", "give the speed")
@@ -87,7 +184,7 @@ def _speeds(table: OperatingPointTable, stroke: float | None, where: str) -> tup
 def _loads(
     table: OperatingPointTable, speed: float, brake: Brake | None, where: str, name: str
 ) -> list[tuple[str, float | None]]:  # fmt: skip
-    """What the load adds to the name, and the indicated mean pressure: of one at the brake as friction may be."""
+    """Return suffixes of the name with indicated mean pressures [Pa]: three of a load at the brake."""
     given = [key for key in ("imep", "bmep", "brake_torque") if getattr(table, key) is not None]
     if len(given) > 1 or (table.motored and given[1:]):
         raise Refused(f"{where}.{given[0]}", None, f"is given beside {given[1]}", "keep one")

@@ -1,4 +1,4 @@
-"""[phasing] of a problem file: its table, and what it makes of open throws, firing orders, angles and shafts."""
+"""[phasing] of a problem file, and open throws, firing orders, bank angles and shafts."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from laufruhe import units
 from laufruhe.errors import ModelError
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused
-from laufruhe.files.engine import EngineTable, check_order, cycle_of, layout_of, told_cylinders
+from laufruhe.files.engine import EngineTable, check_order, cycle_of, cylinder_counts, layout_of
 from laufruhe.files.fields import Open, Table
 from laufruhe.files.rotors import BalancerShaftTable
 from laufruhe.machine import Cycle
@@ -33,7 +33,7 @@ from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, Method, Orde
 from laufruhe.problem.problem import Phasing, Problem
 
 Assemble = Callable[[EngineTable, bool], Problem]
-"""The problem with another [engine], and whether gas is left out of it."""
+"""Function that returns the problem of another [engine], without gas if its second argument is True."""
 _OPENABLE = ("throws", "firing_order", "bank_angle", "split_pin_angle")
 
 
@@ -71,26 +71,41 @@ class PhasingTable(Table):
 
 
 def is_open(engine: EngineTable, shafts: Sequence[BalancerShaftTable]) -> bool:
-    """Whether anything but unbalances and mounts is left open."""
+    """Return True if throws, firing order, bank angles or shafts are open."""
     return any(_has_open(engine.own(key)) for key in _OPENABLE) or any(shaft.optional for shaft in shafts)
 
 
 def opened(
     engine: EngineTable, shafts: Sequence[BalancerShaftTable], table: PhasingTable | None, assemble: Assemble
 ) -> Problem:
-    """The problem with the first design that its phasing allows, and the phasing."""
+    """Return the problem with the first design that its phasing allows, and with the phasing."""
     table = table or PhasingTable()
-    _check_openable(engine)
-    cycle, count, bounds = cycle_of(engine), _cylinders(engine), _throw_bounds(engine)
+    for key in _OPENABLE:
+        if key not in engine.kind.openable and _has_open(engine.own(key)):
+            others = " or ".join(name for name, other in LAYOUTS.items() if key in other.openable)
+            raise Refused(f"engine.{key}", None, f"cannot be open in layout '{engine.layout}'", f"use layout {others}")
+    counts = [count for _, count in cylinder_counts(engine)]
+    counts += [len(engine.slider_cranks)] if engine.kind.is_free else []
+    if not counts:
+        raise Refused("engine.cylinders", None, "is missing, and open throws do not say how many", "add it")
+    cycle, count, bounds = cycle_of(engine), counts[0], None
+    if isinstance(engine.throws, list) and engine.given_throws is None:
+        bounds = tuple(Open.of(angle).bounds for angle in engine.throws)
     # a layout that leaves its throws no choice
     fixed = None if engine.kind.is_free or engine.kind.takes("throws") else layout_of(_closed(engine, count))
     given = fixed.throws if fixed else engine.given_throws
 
     def realise(candidate: Candidate) -> Problem:
+        built = engine
+        if engine.kind.openable:
+            order = None if candidate.firing_order is None else list(candidate.firing_order)
+            throws = list(candidate.throws) if engine.kind.takes("throws") else None
+            bank, split = candidate.bank_angle, candidate.split_pin
+            built = _closed(engine, count, bank, split, throws=throws, firing_order=order)
         try:
-            return without_shafts(assemble(_with(engine, count, candidate), candidate.without_gas), candidate.left_out)
+            return without_shafts(assemble(built, candidate.without_gas), candidate.left_out)
         except Refused as refusal:
-            # a design that a search proposes, and nothing that the file says
+            # a design of a search is no fault of the file
             raise ModelError(str(refusal)) from refusal
 
     phasing = Phasing(
@@ -102,7 +117,7 @@ def opened(
         firing_order=_order_of(engine, cycle, count),
         bank=_bounds(engine.own("bank_angle")),
         split=_bounds(engine.own("split_pin_angle")),
-        intervals=_intervals(table.intervals, cycle, count, _fires_as_given(engine), fixed.spread if fixed else 0.0),
+        intervals=_intervals(table.intervals, engine, cycle, count, fixed.spread if fixed else 0.0),
         realise=realise,
         steps=table.phases,
         shafts=_shaft_choice(shafts, table),
@@ -116,15 +131,7 @@ def opened(
         problem = replace(phasing.realise(_first(phasing)), phasing=phasing)
     except ModelError as error:
         raise (error.__cause__ if isinstance(error.__cause__, Refused) else error) from None
-    _check_physics(problem, phasing, engine)
-    return problem
-
-
-def _check_physics(problem: Problem, phasing: Phasing, engine: EngineTable) -> None:
-    """The smooth program of uneven throws knows a crank that turns evenly (S19).
-
-    Rows of geared cranks are told apart by what the block feels of them.
-    """
+    # the smooth program of uneven throws needs an even speed (S19)
     if phasing.continuous and problem.fidelity.is_uneven:
         inertia = f"{problem.fidelity.crank_inertia:g} kg m^2"
         rule = "makes the crank's speed uneven, and throws that leave the even steps are decided at an even one"
@@ -132,45 +139,20 @@ def _check_physics(problem: Problem, phasing: Phasing, engine: EngineTable) -> N
     if engine.kind.fires_evenly and problem.feels_order:
         rule = f"is open in layout '{engine.layout}', and something is asked of what happens inside the crankcase"
         raise Refused("engine.throws", None, rule, "fix the throws, or ask for loads on the block")
+    return problem
 
 
 def _has_open(value: object) -> bool:
-    """Whether a key of [engine] is left open, or an entry of its list."""
+    # a key of [engine], or an entry of its list
     return any(part == "open" or isinstance(part, Open) for part in (value if isinstance(value, list) else [value]))
-
-
-def _check_openable(engine: EngineTable) -> None:
-    for key in _OPENABLE:
-        if key not in engine.kind.openable and _has_open(engine.own(key)):
-            others = " or ".join(name for name, other in LAYOUTS.items() if key in other.openable)
-            raise Refused(f"engine.{key}", None, f"cannot be open in layout '{engine.layout}'", f"use layout {others}")
-
-
-def _cylinders(engine: EngineTable) -> int:
-    told = [count for _, count in told_cylinders(engine)]
-    told += [len(engine.slider_cranks)] if engine.kind.is_free else []
-    if not told:
-        raise Refused("engine.cylinders", None, "is missing, and open throws do not say how many", "add it")
-    return told[0]
-
-
-def _throw_bounds(engine: EngineTable) -> tuple[tuple[float, float], ...] | None:
-    if not isinstance(engine.throws, list) or engine.given_throws is not None:
-        return None
-    return tuple(Open.of(angle).bounds for angle in engine.throws)
 
 
 def _bounds(value: float | Open | None) -> tuple[float, float] | None:
     return None if value is None else Open.of(value).bounds
 
 
-def _fires_as_given(engine: EngineTable) -> bool:
-    """Tell if throws with angles or bounds of their own, and no open order, need no limits of firing intervals."""
-    return isinstance(engine.throws, list) and (_has_open(engine.throws) or engine.firing_order != "open")
-
-
 def _order_of(engine: EngineTable, cycle: Cycle, count: int) -> tuple[int, ...] | None:
-    """Return the order given, or that of the first dead centres of throws where no order is open."""
+    """Return the given order, or that of the first dead centres of given throws."""
     if engine.given_order is not None:
         return tuple(engine.given_order)
     throws = engine.given_throws
@@ -178,14 +160,16 @@ def _order_of(engine: EngineTable, cycle: Cycle, count: int) -> tuple[int, ...] 
         return None
     layout = layout_of(_closed(engine, count, engine.own("bank_angle"), engine.own("split_pin_angle")))
     order = next(lap_orders(cycle, layout, throws), None)
-    # a later turn is chosen where two come at once
+    # one of two cylinders at one angle fires in a later turn
     return order if order is not None and max(firing_turns(layout, throws, order)) < 1.0 else None
 
 
-def _intervals(given: IntervalsTable | None, cycle: Cycle, count: int, as_given: bool, spread: float) -> Intervals:
+def _intervals(given: IntervalsTable | None, engine: EngineTable, cycle: Cycle, count: int, spread: float) -> Intervals:
     even = cycle.angle / count
     if given is None:
-        return Intervals(0.0, cycle.angle) if as_given else Intervals(even - spread, even + spread)
+        # throws with angles or bounds of their own need no limits of intervals
+        is_free = isinstance(engine.throws, list) and (_has_open(engine.throws) or engine.firing_order != "open")
+        return Intervals(0.0, cycle.angle) if is_free else Intervals(even - spread, even + spread)
     low = given.min if given.min is not None else 0.0
     high = given.max if given.max is not None else cycle.angle
     away = given.largest_deviation
@@ -205,8 +189,11 @@ def _shaft_choice(tables: Sequence[BalancerShaftTable], table: PhasingTable) -> 
     for k, shaft in enumerate(tables):
         where = f"balancer_shafts[{k + 1}]"
         leaders = {u.coupled.to.split(".")[0] for u in shaft.unbalances if u.coupled is not None} - {shaft.name}
-        if shaft.optional:
-            _check_sizes(shaft, where)
+        for j, unbalance in enumerate(shaft.unbalances if shaft.optional else (), 1):
+            size = unbalance.unbalance if unbalance.unbalance is not None else unbalance.mass
+            if unbalance.coupled is None and not isinstance(size, Open):
+                rule, remedy = "is fixed on an optional shaft", "leave its size open, or make the shaft fixed"
+                raise Refused(f"{where}.unbalances[{j}]", None, rule, remedy)
         if any((leader in optional) != shaft.optional for leader in leaders):
             rule = f"follows a shaft that is {'not ' if shaft.optional else ''}optional"
             raise Refused(f"{where}.optional", None, rule, "make both optional")
@@ -227,17 +214,8 @@ def _shaft_choice(tables: Sequence[BalancerShaftTable], table: PhasingTable) -> 
     )
 
 
-def _check_sizes(shaft: BalancerShaftTable, where: str) -> None:
-    """An optional shaft that is not built needs sizes that may be anything."""
-    for j, unbalance in enumerate(shaft.unbalances):
-        size = unbalance.unbalance if unbalance.unbalance is not None else unbalance.mass
-        if unbalance.coupled is None and not isinstance(size, Open):
-            at = f"{where}.unbalances[{j + 1}]"
-            raise Refused(at, None, "is fixed on an optional shaft", "leave its size open, or make the shaft fixed")
-
-
 def _check(phasing: Phasing, engine: EngineTable) -> None:
-    """What no solver needs to be asked: keys that do not go together."""
+    """Refuse keys that exclude each other."""
     kind, count = engine.kind, phasing.cylinders
     if kind.fires_evenly and phasing.continuous:
         where = "engine.throws" if phasing.throw_bounds is not None else "phasing.intervals"
@@ -251,9 +229,8 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
     both = all(isinstance(engine.own(key), Open) for key in ("bank_angle", "split_pin_angle"))
     if not phasing.continuous and both:
         rule = "is open beside bank_angle, and even firing binds only their sum"
-        remedy = (
-            'fix one of the two, or let the firing be uneven: intervals = { min = "...", max = "..." } in [phasing]'
-        )
+        uneven = 'intervals = { min = "...", max = "..." } in [phasing]'
+        remedy = f"fix one of the two, or let the firing be uneven: {uneven}"
         raise Refused("engine.split_pin_angle", None, rule, remedy)
     throws, rest = divmod(count, kind.cylinders_per_throw)
     if rest:
@@ -270,7 +247,7 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
 
 
 def _first(phasing: Phasing) -> Candidate:
-    """The design that stands for the problem as given: throws in the order of their cylinders."""
+    """Return the design as given: throws in the order of their cylinders."""
     lowest = (phasing.bank and phasing.bank[0], phasing.split and phasing.split[0])
     for geometry in phasing.geometries or (lowest,):
         layout = phasing.layout(*geometry)
@@ -295,36 +272,27 @@ def _first(phasing: Phasing) -> Candidate:
 
 
 def _most_even(phasing: Phasing, layout: Layout, throws: tuple[float, ...]) -> tuple[int, ...] | None:
-    """The firing order given, or that of the most even intervals; None if these throws cannot fire so."""
+    """Return the given firing order, or that of the most even intervals; None if these throws cannot fire so."""
     given = phasing.firing_order
     orders = lap_orders(phasing.cycle, layout, throws) if given is None else [given]
-    found = []
+    allowed = []
     for order in itertools.islice(orders, MOST_ORDERS):
         intervals = intervals_of(phasing.cycle, firing_turns(layout, throws, order))
         if min(intervals) > SOONEST:
-            found.append((round(max(intervals) - min(intervals), 9), order))
-    return min(found)[1] if found else None
+            allowed.append((round(max(intervals) - min(intervals), 9), order))
+    return min(allowed)[1] if allowed else None
 
 
 def _closed(
-    engine: EngineTable, count: int, bank: float | None = None, split: float | None = None, **told: list[Any] | None
+    engine: EngineTable, count: int, bank: float | None = None, split: float | None = None, **keys: list[Any] | None
 ) -> EngineTable:
-    """[engine] with these numbers, and nothing told of throws and firing order but this."""
+    """Return [engine] with these numbers only of throws, firing order and angles."""
     update = {"cylinders": count, "throws": None, "firing_order": None, "bank_angle": bank, "split_pin_angle": split}
-    return engine.model_copy(update=update | told)
-
-
-def _with(engine: EngineTable, count: int, candidate: Candidate) -> EngineTable:
-    """[engine] with a candidate's numbers in place of what is open."""
-    if not engine.kind.openable:
-        return engine
-    order = None if candidate.firing_order is None else list(candidate.firing_order)
-    throws = list(candidate.throws) if engine.kind.takes("throws") else None
-    return _closed(engine, count, candidate.bank_angle, candidate.split_pin, throws=throws, firing_order=order)
+    return engine.model_copy(update=update | keys)
 
 
 def without_shafts(problem: Problem, shafts: Collection[str]) -> Problem:
-    """The problem without some shafts: their rotors and what decides on them."""
+    """Return the problem without some shafts, their rotors and decisions."""
     if not shafts:
         return problem
     gone = {rotor.name for rotor in problem.engine.rotors if rotor.shaft.name in shafts}

@@ -1,4 +1,4 @@
-"""A whole problem file (docs/reference/problem-files.md)."""
+"""Model of a problem file (docs/reference/problem-files.md)."""
 
 from __future__ import annotations
 
@@ -16,15 +16,12 @@ from laufruhe.files.bearings import MainBearingTable
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fidelity import FidelityTable
 from laufruhe.files.fields import Table
-from laufruhe.files.flywheel import FlywheelTable
-from laufruhe.files.friction import FrictionTable
+from laufruhe.files.flywheel import FlywheelTable, GearedInertiaTable
 from laufruhe.files.gas import GasTable
-from laufruhe.files.geared import GearedInertiaTable
-from laufruhe.files.load_cases import LoadCaseTable
 from laufruhe.files.measures import ConstraintTable, ObjectiveTable
-from laufruhe.files.mounts import BlockTable, MountsTable
+from laufruhe.files.mounts import BlockTable, LoadCaseTable, MountsTable
 from laufruhe.files.nested import Place
-from laufruhe.files.operating_points import OperatingPointTable
+from laufruhe.files.operating_points import FrictionTable, OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
 from laufruhe.files.quantities import QuantitiesTable
 from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
@@ -37,16 +34,16 @@ SCHEMA = "laufruhe.schema.json"
 
 @dataclass(frozen=True)
 class Given:
-    """Parts of a problem file that the table of an extension is read with.
+    """Context in which the table of an extension is read.
 
     Attributes
     ----------
     file
-        All its tables.
+        Tables of the file.
     throws
         Throws of the crank.
     folder
-        Where the file stands.
+        Folder of the file.
     """
 
     file: ProblemFile
@@ -56,7 +53,7 @@ class Given:
 
 @dataclass(frozen=True)
 class Key:
-    """A table of a problem file that an extension adds.
+    """Table of a problem file that an extension adds.
 
     Attributes
     ----------
@@ -65,12 +62,12 @@ class Key:
     annotation
         Type of its value: a subclass of `Table`, or a list of one.
     read
-        Return the problem with what the table adds. Engine, operating points and decisions of the core are in it;
-        objective and limits follow.
+        Function that adds the table to a problem, which has engine, operating points and decisions, but no objective
+        and limits yet.
     numbers
-        Return the labels of parts of the table in results, and the places of these parts in the file.
+        Function that returns the labels of parts of the table in results, and their places in the file.
     single
-        Whether it needs a single objective.
+        True if it requires a single objective.
     """
 
     name: str
@@ -82,16 +79,16 @@ class Key:
 
 @dataclass(frozen=True)
 class Note:
-    """A note that a file may write at any of its numbers.
+    """Note that a file may write at any number.
 
     Attributes
     ----------
     name
-        In words.
+        Name in words.
     part
-        Return tables without such notes, and the notes; nothing where there are none.
+        Function that returns tables without such notes, and the notes, false if there are none.
     put
-        Return the problem with what notes say: of these, of the problem, of the file and of its tables without notes.
+        Function of notes, problem, file and tables without notes, that returns the problem with the notes.
     """
 
     name: str
@@ -145,14 +142,13 @@ class ProblemFile(Table):
 
     @property
     def single(self) -> list[str]:
-        """What stands here that needs a single objective only."""
-        keys = EXTENSION_KEYS.values()
-        given = [key.name for key in keys if key.single and getattr(self, key.name) is not None]
-        return [*given, *(["fidelity.kinematics"] if self.fidelity.kinematics == "auto" else [])]
+        """Keys of the file that require a single objective."""
+        keys = [key.name for key in EXTENSION_KEYS.values() if key.single and getattr(self, key.name) is not None]
+        return [*keys, *(["fidelity.kinematics"] if self.fidelity.kinematics == "auto" else [])]
 
 
 EXTENSION_KEYS: Mapping[str, Key] = extended("keys", Key, ())
-"""Tables that extensions add, by their names."""
+"""Tables of extensions by their names."""
 
 
 @cache

@@ -1,7 +1,7 @@
-"""Numbers that several numbers of a file follow: a table [quantities], one class each.
+"""[quantities] of a problem file: numbers that several numbers of the file follow, one class each.
 
-A quantity is read after the file and before the engine is put together: it sets the numbers that follow it. Left open
-it is a decision like any number of the file.
+A quantity sets the numbers that follow it before the engine is assembled. An open quantity is a decision like any
+number of the file.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from laufruhe.problem.decision import AddressDrive
 
 
 class Quantity(ABC):
-    """A number that several numbers of the file follow.
+    """Number that several numbers of the file follow.
 
     Attributes
     ----------
@@ -79,18 +79,17 @@ def followed(tables: Mapping[str, Any]) -> Mapping[str, Any]:
     Refused
         If a number that has to follow is not given, or cannot be read.
     """
-    asked = tables.get("quantities")
-    if not isinstance(asked, Mapping):
+    quantities = tables.get("quantities")
+    if not isinstance(quantities, Mapping):
         return tables
-    found = tables
-    for name, one in QUANTITIES.items():
-        if name in asked:
-            value = number_read(_NUMBERS[name], ("quantities", name), asked[name])
+    for name, quantity in QUANTITIES.items():
+        if name in quantities:
+            value = number_read(_NUMBERS[name], ("quantities", name), quantities[name])
             assert isinstance(value, float)
-            given = {place: _given(found, place, unit, name) for place, unit in one.follow.items()}
-            for place, own in one.values(value, given).items():
-                found = put(found, place, AddressDrive(place, one.follow[place]).written(own))
-    return found
+            given = {place: _given(tables, place, unit, name) for place, unit in quantity.follow.items()}
+            for place, number in quantity.values(value, given).items():
+                tables = put(tables, place, AddressDrive(place, quantity.follow[place]).written(number))
+    return tables
 
 
 def _given(tables: Mapping[str, Any], place: Place, unit: str, name: str) -> float:

@@ -1,4 +1,4 @@
-"""Reading a problem file: TOML, keys, geometry, and what is asked of it."""
+"""Reader of problem files: TOML, keys, engine, objective and limits."""
 
 from __future__ import annotations
 
@@ -18,48 +18,40 @@ from pydantic import ValidationError
 from laufruhe.errors import Complaint, InputError, ModelError, printed, refused, wrong_call
 from laufruhe.extension import extended
 from laufruhe.files import edits, open_numbers
-from laufruhe.files.bearings import MainBearingTable, bearings_of, one_by_one
+from laufruhe.files.bearings import bearings_of, one_by_one
 from laufruhe.files.catalogue import with_catalogue
 from laufruhe.files.complaints import Refused, beside, complaints_of, in_file, key_path
-from laufruhe.files.engine import EngineTable, cycle_of, moving_parts
+from laufruhe.files.engine import EngineTable, cycle_of, leads_of, moving_parts, piston_masses
 from laufruhe.files.fidelity import at_fidelity
-from laufruhe.files.flywheel import flywheel_of
-from laufruhe.files.friction import Brake
+from laufruhe.files.flywheel import flywheel_of, geared_of
 from laufruhe.files.gas import gas_of, needs_bore
-from laufruhe.files.geared import geared_of
-from laufruhe.files.load_cases import load_cases_of
 from laufruhe.files.measures import Scene, limits_of, objectives_of
-from laufruhe.files.mounts import mounts_of
+from laufruhe.files.mounts import load_cases_of, mounts_of
 from laufruhe.files.nested import inside, plain, put
-from laufruhe.files.open_parts import check_factors, leads_of, piston_masses
-from laufruhe.files.operating_points import operating_points
+from laufruhe.files.operating_points import Brake, operating_points
 from laufruhe.files.phasing import is_open, opened
 from laufruhe.files.problem_file import EXTENSION_KEYS, Given, Note, ProblemFile, file_model
 from laufruhe.files.quantities import followed
-from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
+from laufruhe.files.rotors import RotorList, balancer_shafts, check_factors, counterweights
 from laufruhe.files.running_gear import size_decisions, weighed
-from laufruhe.files.toml_depth import line_deeper_than
-from laufruhe.files.toml_faults import toml_complaint
+from laufruhe.files.toml_text import line_deeper_than, toml_complaint
 from laufruhe.machine import Cycle, Engine, SliderCrank
-from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.layouts import throw_rotors
-from laufruhe.machine.running_gear import RunningGear
-from laufruhe.problem.decision import Decision
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Drawing, Problem, Search
 from laufruhe.problem.problem import Path as Place
 
 DEEPEST, MOST_ENTRIES, MOST_BYTES = 16, 1000, 1_000_000
-"""Of a file: tables within tables, entries of one list or table, and bytes."""
+"""Limits of a file: depth of nested tables, entries of one list or table, and bytes."""
 LARGEST = 2**63 - 1
 STDIN, UNNAMED = Path("-"), Path("problem")
 MOST_OPEN = 200
-# control characters but tab and line feed, and those that turn the direction of reading
+# control characters except tab and line feed, and marks of the direction of text
 _UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 
 
 def load(source: str | Path | Mapping[str, Any]) -> Problem:
-    """Read and check a problem: a file, its text, or its tables.
+    """Read and check a problem file, its text, or its tables.
 
     Raises
     ------
@@ -70,7 +62,7 @@ def load(source: str | Path | Mapping[str, Any]) -> Problem:
 
 
 def given(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Path]:
-    """Tables of a file, of a text or as they are, and by what name they are spoken of."""
+    """Return the tables of a file or text, and the path that messages name."""
     if isinstance(source, Mapping):
         return _whole(plain(source, DEEPEST + 1), UNNAMED), UNNAMED
     if isinstance(source, str) and ("\n" in source or "=" in source):
@@ -85,28 +77,31 @@ def given(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Path]
 
 
 def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
-    """A problem from the tables of its file, changed or not; complaints name the file (`InputError`)."""
+    """Return the problem of the tables of a file; an `InputError` names the file."""
     if "study" in tables:
         raise refused("study", "", "makes this a study file", "use laufruhe study", path)
     try:
         with in_file(path):
-            closed, found = dict(tables), {}
-            # a number that is open may have a note of an extension beside its bounds
+            closed, parts = dict(tables), {}
+            # an open number may have a note of an extension beside its bounds
             for note in reversed(notes()):
-                closed, found[note] = note.part(closed)
+                closed, parts[note] = note.part(closed)
             file = file_model().model_validate(followed(closed))
             problem = _of_file(file, path)
 
             def finished(own: Problem, candidate: Candidate | None) -> Problem:
                 own = replace(own, rebuild=_Rebuilt(closed, path, candidate))
                 for note in notes():
-                    own = note.put(found[note], own, file, closed) if found[note] else own
+                    own = note.put(parts[note], own, file, closed) if parts[note] else own
                 return own
 
-            if any(found.values()):
-                problem = _of_every_star(problem, finished)
-            _check_decided(problem.decisions, bool(problem.objective))
-            _check_followed(problem)
+            if any(parts.values()):
+                phasing = problem.phasing
+                problem = finished(problem, None)
+                if phasing is not None:
+                    realise = partial(_finished_star, finished, phasing.realise)
+                    problem = replace(problem, phasing=replace(phasing, realise=realise))
+            _check_decisions(problem)
             return replace(problem, origin=_Origin(tables, path))
     except ValidationError as error:
         raise InputError(str(path), complaints_of(error, file_model())) from None
@@ -116,30 +111,23 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
 
 @cache
 def notes() -> tuple[Note, ...]:
-    """Return what may stand at numbers of a file, in the order in which it is put into the problem."""
+    """Return the notes that numbers of a file may have, in the order in which they are applied."""
     return tuple(extended("notes", Note, (open_numbers.NOTE,)).values())
 
 
-def _of_every_star(problem: Problem, finished: Callable[[Problem, Candidate | None], Problem]) -> Problem:
-    """The problem with what a file adds to the engine, and every star that its phasing may choose with the same."""
-    phasing = problem.phasing
-    if phasing is None:
-        return finished(problem, None)
-    realise = phasing.realise
-
-    def star(candidate: Candidate) -> Problem:
-        return finished(realise(candidate), candidate)
-
-    return replace(finished(problem, None), phasing=replace(phasing, realise=star))
+def _finished_star(
+    finished: Callable[[Problem, Candidate | None], Problem], realise: Callable[[Candidate], Problem], star: Candidate
+) -> Problem:
+    return finished(realise(star), star)
 
 
 def shown_as(path: Path) -> Path:
-    """By what name a file is spoken of: `-` is standard input."""
+    """Return the path that messages name: `-` is standard input."""
     return Path("stdin") if path == STDIN else path
 
 
 def _of_file(file: ProblemFile, path: Path) -> Problem:
-    """The problem of a file, its tolerances left out."""
+    """Return the problem of a file without its notes."""
     if file.geared_inertias and file.engine.throws is not None and file.engine.given_throws is None:
         rule = "are known of throws that are given, and engine.throws is open"
         raise Refused("geared_inertias", None, rule, "fix the throws, or leave them out")
@@ -151,69 +139,60 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
 
 @dataclass(frozen=True)
 class _Origin:
-    """The file of a problem, for other problems that differ in some of its numbers."""
+    """File of a problem, for problems with other numbers."""
 
     tables: Mapping[str, Any]
     path: Path
 
     @property
     def file(self) -> tuple[Mapping[str, Any], Path]:
-        """Tables as they were read, and where they stand."""
+        """Tables as they were read, and the path of the file."""
         return self.tables, self.path
 
     def with_values(self, values: Mapping[str, Any]) -> Problem:
-        """Numbers at other values."""
-        return self._edited(partial(edits.with_values, values=plain(values, DEEPEST)))
+        """Return the problem with numbers at other values."""
+        return self._edited(edits.with_values, plain(values, DEEPEST))
 
     def opened(self, name: str, low: Any, high: Any, start: Any) -> Problem:
-        """A number left open."""
-        low, high, start = plain([low, high, start], DEEPEST)
-        return self._edited(partial(edits.opened, name=name, low=low, high=high, start=start))
+        """Return the problem with a number left open."""
+        return self._edited(edits.opened, name, *plain([low, high, start], DEEPEST))
 
     def fixed(self, name: str, value: Any) -> Problem:
-        """A number fixed."""
-        return self._edited(partial(edits.fixed, name=name, value=plain(value, DEEPEST)))
+        """Return the problem with a number fixed."""
+        return self._edited(edits.fixed, name, plain(value, DEEPEST))
 
-    def _edited(self, *each: Callable[[Mapping[str, Any]], dict[str, Any]]) -> Problem:
-        tables: Mapping[str, Any] = self.tables
+    def _edited(self, edit: Callable[..., dict[str, Any]], *arguments: Any) -> Problem:
         with in_file(self.path):
-            for edit in each:
-                tables = edit(tables)
+            tables = edit(self.tables, *arguments)
         return load_tables(tables, self.path)
 
 
 @dataclass(frozen=True)
 class _Rebuilt:
-    """A file with other numbers at some of its places.
-
-    Attributes
-    ----------
-    candidate
-        The star that it is of where stars are open; else None.
-    """
+    """Function that draws a file with other numbers, of one star where stars are open."""
 
     tables: Mapping[str, Any]
     path: Path
     candidate: Candidate | None = None
 
     def __call__(self, changes: Mapping[Place, str | float]) -> Drawing:
-        """As built."""
-        tables = self._plainly
+        """Return the drawing with these numbers."""
+        tables = self._without_auto
         for place, value in changes.items():
             tables = put(tables, place, value)
         try:
-            found = _of_file(file_model().model_validate(followed(tables)), self.path)
-            if self.candidate is not None and found.phasing is not None:
-                found = found.phasing.realise(self.candidate)
+            built = _of_file(file_model().model_validate(followed(tables)), self.path)
+            if self.candidate is not None and built.phasing is not None:
+                built = built.phasing.realise(self.candidate)
         except (ValidationError, Refused, ModelError) as error:
-            at = ", ".join(f"{key_path(place)} = {value}" for place, value in changes.items())
-            told = complaints_of(error, file_model()) if isinstance(error, ValidationError) else (error,)
-            why = " and ".join(map(str, told))
-            raise ModelError(f"this engine cannot be built, {at}: {why}; narrow its bounds or tolerances") from None
-        return Drawing(found.engine, found.points, found.decisions, found.mount_numbers)
+            values = ", ".join(f"{key_path(place)} = {value}" for place, value in changes.items())
+            faults = complaints_of(error, file_model()) if isinstance(error, ValidationError) else (error,)
+            why = " and ".join(map(str, faults))
+            raise ModelError(f"this engine cannot be built, {values}: {why}; narrow its bounds or tolerances") from None
+        return Drawing(built.engine, built.points, built.decisions, built.mount_numbers)
 
     @cached_property
-    def _plainly(self) -> Mapping[str, Any]:
+    def _without_auto(self) -> Mapping[str, Any]:
         if self.tables.get("fidelity", {}).get("kinematics") != "auto":
             return self.tables
         own = {key: value for key, value in self.tables["fidelity"].items() if key not in ("kinematics", "tolerance")}
@@ -221,52 +200,51 @@ class _Rebuilt:
 
 
 def tables_of(path: Path) -> dict[str, Any]:
-    """The tables of a TOML file, their keys not yet checked; `InputError` where it is none.
+    """Return the tables of a TOML file with unchecked keys; `InputError` if it is none.
 
-    `-` is read from standard input. An engine of the catalogue is written out in the tables.
+    `-` is standard input. An engine of the catalogue is written out in the tables.
     """
-    content, path = (_typed(), shown_as(path)) if path == STDIN else (_content(path), path)
-    return _whole(_parsed(content, path), path)
-
-
-def _whole(tables: dict[str, Any], path: Path) -> dict[str, Any]:
-    """Tables as a user gave them, looked through, an engine of the catalogue written out."""
-    _check_shape(tables, path)
-    with in_file(path):
-        return with_catalogue(tables)
-
-
-def _check_shape(tables: dict[str, Any], path: Path) -> None:
-    """Refuse texts that would command a screen, and tables without end."""
-    for at, node in inside(tables):
-        if len(at) > DEEPEST:
-            raise refused(key_path(at), "", f"is nested more than {DEEPEST} deep", "flatten it", path)
-        strange = _UNSEEN.search("".join(text for text in (*at[-1:], node) if isinstance(text, str)))
-        if strange is not None:
-            rule = f"holds U+{ord(strange.group()):04X}, which is no character to read"
-            raise refused(key_path(at), "", rule, "take it out; a path has / in place of \\", path)
-        if isinstance(node, dict | list) and len(node) > MOST_ENTRIES:
-            most = f"at most {MOST_ENTRIES} are read"
-            raise refused(key_path(at) or "file", "", f"has {len(node)} entries", most, path)
-        if isinstance(node, int) and not -LARGEST <= node <= LARGEST:
-            raise refused(key_path(at), "", "is a whole number of more than 64 bits", "write a smaller one", path)
-
-
-@cache
-def _typed() -> bytes:
-    return sys.stdin.buffer.read(MOST_BYTES + 1)
-
-
-def _content(path: Path) -> bytes:
+    if path == STDIN:
+        return _whole(_parsed(_standard_input(), shown_as(path)), shown_as(path))
     try:
         with path.open("rb") as stream:
-            return stream.read(MOST_BYTES + 1)
+            content = stream.read(MOST_BYTES + 1)
     except IsADirectoryError:
         raise _unreadable(path, "is a folder", "name a problem file in it") from None
     except FileNotFoundError:
         raise _unreadable(path, "does not exist", beside(path, "check the path")) from None
     except OSError as error:
         raise _unreadable(path, f"cannot be read ({error.strerror})", "check its permissions") from None
+    return _whole(_parsed(content, path), path)
+
+
+def _whole(tables: dict[str, Any], path: Path) -> dict[str, Any]:
+    # checked tables, an engine of the catalogue written out
+    _check_shape(tables, path)
+    with in_file(path):
+        return with_catalogue(tables)
+
+
+def _check_shape(tables: dict[str, Any], path: Path) -> None:
+    """Refuse texts with control characters, and tables that are too deep or too long."""
+    for place, node in inside(tables):
+        where = key_path(place)
+        if len(place) > DEEPEST:
+            raise refused(where, "", f"is nested more than {DEEPEST} deep", "flatten it", path)
+        strange = _UNSEEN.search("".join(text for text in (*place[-1:], node) if isinstance(text, str)))
+        if strange is not None:
+            rule = f"holds U+{ord(strange.group()):04X}, which is no character to read"
+            raise refused(where, "", rule, "take it out; a path has / in place of \\", path)
+        if isinstance(node, dict | list) and len(node) > MOST_ENTRIES:
+            most = f"at most {MOST_ENTRIES} are read"
+            raise refused(where or "file", "", f"has {len(node)} entries", most, path)
+        if isinstance(node, int) and not -LARGEST <= node <= LARGEST:
+            raise refused(where, "", "is a whole number of more than 64 bits", "write a smaller one", path)
+
+
+@cache
+def _standard_input() -> bytes:
+    return sys.stdin.buffer.read(MOST_BYTES + 1)
 
 
 def _parsed(content: bytes, path: Path) -> dict[str, Any]:
@@ -284,12 +262,12 @@ def _parsed(content: bytes, path: Path) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise InputError(str(path), (toml_complaint(content, error),)) from None
     except ValueError:
-        # the one that is no TOMLDecodeError
+        # the only error that is no TOMLDecodeError
         raise _unreadable(path, "holds a whole number of thousands of digits", "write it shorter") from None
 
 
 def is_study(path: Path) -> bool:
-    """Whether a file is one of a study, or means to be."""
+    """Return True for a study file."""
     return "study" in tables_of(path)
 
 
@@ -298,36 +276,38 @@ def _unreadable(path: Path, rule: str, remedy: str) -> InputError:
 
 
 def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False, *, path: Path) -> Problem:
-    """The problem of a file whose [engine] has this table in its place."""
-    told = [point.model_copy(update={"gas": point.gas and not without_gas}) for point in file.operating_points]
-    cylinders, throws = moving_parts(table, gas=needs_bore(file.gas) and any(point.gas for point in told))
-    told_bearings = one_by_one(file.main_bearings, throws)
-    bearings = bearings_of(told_bearings, cylinders)
+    """Return the problem of a file with this [engine]."""
+    loaded = [point.model_copy(update={"gas": point.gas and not without_gas}) for point in file.operating_points]
+    cylinders, throws = moving_parts(table, gas=needs_bore(file.gas) and any(point.gas for point in loaded))
+    bearing_tables = one_by_one(file.main_bearings, throws)
+    bearings = bearings_of(bearing_tables, cylinders)
     gear, cylinders, throws = weighed(file.running_gear, cylinders, throws, bearings)
     collected = RotorList(rotors=list(throw_rotors(throws)))
     counterweights(file.counterweights, cylinders, throws, collected)
     balancer_shafts(file.balancer_shafts, collected)
-    found, cycle = mounts_of(file.mounts, file.block, path.parent), cycle_of(table)
+    on_mounts, cycle = mounts_of(file.mounts, file.block, path.parent), cycle_of(table)
     rotors, (wheel, of_wheel) = tuple(collected.rotors), flywheel_of(file.flywheel, file.fidelity.own("crank_inertia"))
     brake = _brake(file, cylinders, cycle, path.parent)
-    points = operating_points(told, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)
+    points = operating_points(loaded, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)
     geared, of_geared = geared_of(file.geared_inertias)
     engine = Engine(
-        file.title, cycle, cylinders, rotors, found.mounts, found.block, bearings, wheel, gear, geared,
-        load_cases_of(file.load_cases, found.block),
+        file.title, cycle, cylinders, rotors, on_mounts.mounts, on_mounts.block, bearings, wheel, gear, geared,
+        load_cases_of(file.load_cases, on_mounts.block),
     )  # fmt: skip
-    of_sizes = _sizes(file, table, told_bearings, bearings, gear)
+    of_sizes = size_decisions(file.running_gear, table, bearing_tables, bearings)
+    if of_sizes and gear is not None and gear.density is not None:
+        check_factors(file.counterweights, "counts masses that follow from sizes, which are open")
     loads = (*piston_masses(table, cylinders, file.counterweights), *leads_of(table), *collected.decisions, *of_geared)
     problem = Problem(
         name=printed(path.stem),
         title=file.title,
         engine=engine,
         points=points,
-        decisions=(*loads, *found.decisions, *of_wheel, *of_sizes),
+        decisions=(*loads, *on_mounts.decisions, *of_wheel, *of_sizes),
         source=file.source,
         assumptions=(*file.assumptions, *(brake.said if brake else ())),
         tolerance=file.tolerance,
-        mount_numbers=found.numbers,
+        mount_numbers=on_mounts.numbers,
         search=Search(**file.search.model_dump()),
         fires_together=table.fires_together,
     )
@@ -347,53 +327,37 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     return at_fidelity(problem, file.fidelity)
 
 
-def _sizes(
-    file: ProblemFile, table: EngineTable, told: Sequence[MainBearingTable], bearings: Sequence[Bearing],
-    gear: RunningGear | None,
-) -> tuple[Decision, ...]:  # fmt: skip
-    """Open sizes of the running gear."""
-    found = tuple(size_decisions(file.running_gear, table, told, bearings))
-    if found and gear is not None and gear.density is not None:
-        check_factors(file.counterweights, "counts masses that follow from sizes, which are open")
-    return found
-
-
 def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, folder: Path) -> Brake | None:
-    """What makes indicated loads of those at the brake."""
+    """Return the conversion of loads at the brake; None without [friction]."""
     if file.friction is None:
         return None
     if not any(point.bmep is not None or point.brake_torque is not None for point in file.operating_points):
-        raise Refused(
-            "friction", None, "serves no operating point", "give one a bmep or a brake_torque, or leave it out"
-        )
+        remedy = "give one a bmep or a brake_torque, or leave it out"
+        raise Refused("friction", None, "serves no operating point", remedy)
     if any(part.swept.piston.bore is None for part in cylinders):
         raise Refused("engine.bore", None, "is missing, and a load at the brake is over the displacement", "add it")
     return Brake(file.friction, folder, sum(part.piston_area * part.stroke for part in cylinders), cycle)
 
 
-def _check_followed(problem: Problem) -> None:
-    """Refuse an open number of the file that nothing follows, and one that names operating points by their speed."""
-    given = problem.engine, problem.points, problem.mount_numbers
-    names = [point.name for point in problem.points]
-    for decision in problem.decisions:
-        drawn = list[Drawing]()
-        for bound in (decision.lower, decision.upper) if decision.address_drives else ():
-            with suppress(ModelError):
-                drawn.append(problem.rebuild({drive.path: drive.written(bound) for drive in decision.address_drives}))
-        if len(drawn) > 1 and all((own.engine, own.points, own.mount_numbers) == given for own in drawn):
-            raise Refused(decision.name, None, "is open, and nothing of this engine follows it", "fix or leave it out")
-        if any([point.name for point in own.points] != names for own in drawn):
-            rule = f"is open, and the speeds follow by which operating points are called, {', '.join(names)}"
-            raise Refused(decision.name, None, rule, "give each operating point a name, and leave up_to out")
-
-
-def _check_decided(decisions: Sequence[Decision], has_objective: bool) -> None:
-    """Refuse what is open and moves nothing, or for nothing, and more than is decided in minutes."""
+def _check_decisions(problem: Problem) -> None:
+    """Refuse open numbers without effect or objective, too many, and those that rename operating points."""
+    decisions, without_effect = problem.decisions, "is open, and nothing of this engine follows it"
     if len(decisions) > MOST_OPEN:
         remedy = "fix some, or let some follow others"
         raise Refused(decisions[MOST_OPEN].name, None, f"is open beside {MOST_OPEN} other numbers", remedy)
     for decision in decisions:
         if not any(drive.acts for drive in decision.drives):
-            raise Refused(decision.name, None, "is open, and nothing of this engine follows it", "fix or leave it out")
-    if decisions and not has_objective:
+            raise Refused(decision.name, None, without_effect, "fix or leave it out")
+    if decisions and not problem.objective:
         raise Refused("objective", None, "is missing while numbers are open", "say what is to be minimised")
+    given, names = (problem.engine, problem.points, problem.mount_numbers), [point.name for point in problem.points]
+    for decision in decisions:
+        drawn = list[Drawing]()
+        for bound in (decision.lower, decision.upper) if decision.address_drives else ():
+            with suppress(ModelError):
+                drawn.append(problem.rebuild({drive.path: drive.written(bound) for drive in decision.address_drives}))
+        if len(drawn) > 1 and all((own.engine, own.points, own.mount_numbers) == given for own in drawn):
+            raise Refused(decision.name, None, without_effect, "fix or leave it out")
+        if any([point.name for point in own.points] != names for own in drawn):
+            rule = f"is open, and the speeds follow by which operating points are called, {', '.join(names)}"
+            raise Refused(decision.name, None, rule, "give each operating point a name, and leave up_to out")

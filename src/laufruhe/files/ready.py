@@ -1,4 +1,4 @@
-"""Ready problems and studies that come with the package: listed by what they are for, and copied."""
+"""Ready problems and studies of the package."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ _LIST, _OTHER = "uses.csv", "other uses"
 
 @dataclass(frozen=True)
 class Ready:
-    """A ready problem or study.
+    """Ready problem or study.
 
     Attributes
     ----------
     use
-        What it is an example of.
+        Use that it is an example of.
     path
-        Of its file in the package.
+        File in the package.
     needs
-        Files beside it that it refers to, by their names there.
+        Names of files beside it that it refers to.
     """
 
     name: str
@@ -44,31 +44,38 @@ class Ready:
 
 @cache
 def folder() -> Path:
-    """Where they are: in the package, or beside its source in the repository."""
+    """Return the folder of the files: in the package, or in the repository beside the source."""
     return next(place for place in (_PACKAGE / "problems", _PACKAGE.parents[1] / "problems") if place.is_dir())
 
 
 @cache
 def ready() -> dict[str, Ready]:
-    """All of them by name, those of one use together."""
+    """Return ready problems and studies by name, grouped by use."""
     with (folder() / _LIST).open(encoding="utf-8", newline="") as stream:
         use_of = {row["problem"]: row["use"] for row in csv.DictReader(stream)}
     use_of |= {path.stem: _OTHER for path in sorted(folder().glob("*.toml")) if path.stem not in use_of}
     uses = list(dict.fromkeys(use_of.values()))
-    return {name: _found(name, use) for name, use in sorted(use_of.items(), key=lambda pair: uses.index(pair[1]))}
+    entries: dict[str, Ready] = {}
+    for name, use in sorted(use_of.items(), key=lambda pair: uses.index(pair[1])):
+        path = folder() / f"{name}.toml"
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+        texts = (text for _, text in texts_in(tables) if 0 < len(text) <= 80 and "/" not in text)
+        needs = sorted({text for text in texts if (folder() / text).is_file()})
+        entries[name] = Ready(name, tables["title"], use, path, "study" in tables, tuple(needs))
+    return entries
 
 
 def ready_named(name: str) -> Ready:
-    """One of them; `InputError` where there is none of that name."""
-    found = ready().get(name.removesuffix(".toml"))
-    if found is None:
+    """Return a ready problem by name; `InputError` if there is none."""
+    entry = ready().get(name.removesuffix(".toml"))
+    if entry is None:
         advice = nearest(name, list(ready()), "laufruhe examples lists them")
         raise refused("name", name, "is no ready problem", advice)
-    return found
+    return entry
 
 
 def copies(names: Iterable[str]) -> dict[str, str]:
-    """Texts of ready problems by file name, with all that they refer to and the schemas that editors check them by."""
+    """Return the texts of ready problems by file name, with the files that they need and the schemas for editors."""
     texts: dict[str, str] = {}
     left = [ready_named(name) for name in names]
     while left:
@@ -85,18 +92,11 @@ def copies(names: Iterable[str]) -> dict[str, str]:
 
 
 def schema_line(is_study: bool = False) -> str:
-    """The first line of a file, by which an editor finds its schema."""
+    """Return the first line of a file, which names its schema for editors."""
     return f"#:schema ./{STUDY_SCHEMA if is_study else SCHEMA}"
 
 
 def schema_file(is_study: bool = False) -> tuple[str, str]:
-    """Name and text of the schema that goes beside a file."""
+    """Return name and text of the schema beside a file."""
     name = STUDY_SCHEMA if is_study else SCHEMA
     return name, (Path(__file__).parent / name).read_text(encoding="utf-8")
-
-
-def _found(name: str, use: str) -> Ready:
-    path = folder() / f"{name}.toml"
-    tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    needs = sorted({t for _, t in texts_in(tables) if 0 < len(t) <= 80 and "/" not in t and (folder() / t).is_file()})
-    return Ready(name, tables["title"], use, path, "study" in tables, tuple(needs))

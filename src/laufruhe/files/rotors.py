@@ -1,4 +1,4 @@
-"""Counterweights and balancer shafts: their tables in a problem file, and the rotors and decisions they make."""
+"""[[counterweights]] and [[balancer_shafts]] of a problem file, and the rotors and decisions that they make."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _UNITS = {"unbalance": "kg m", "mass": "kg"}
 
 EVERY = "every"
 FACTORS = ("balance_factor", "balance_fraction")
-"""Names of the balance factor (C9), the earlier one last."""
+"""Keys of the balance factor (C9), the earlier name last."""
 
 
 class CounterweightTable(Table):
@@ -49,19 +49,19 @@ class CounterweightTable(Table):
 
     @property
     def factor_key(self) -> str | None:
-        """The name under which a balance factor is given; None without one."""
+        """Key under which a balance factor is given; None without one."""
         return next((key for key in FACTORS if getattr(self, key) is not None), None)
 
 
 class CoupledTable(Table):
-    """Follows another unbalance."""
+    """Unbalance that follows another one."""
 
     to: str
     how: Literal["equal", "opposite", "mirrored", "mirrored opposite"] = Field(alias="as")
 
 
 class UnbalanceTable(Table):
-    """One unbalance of a shaft."""
+    """Unbalance of a shaft."""
 
     name: Name | None = None
     x: f.OpenLength = 0.0
@@ -88,26 +88,26 @@ class BalancerShaftTable(Table):
 
 @dataclass
 class RotorList:
-    """Rotors and decisions as they are collected from a file."""
+    """Rotors and decisions collected from a file."""
 
     rotors: list[Rotor] = field(default_factory=list)
     decisions: list[Decision] = field(default_factory=list)
 
     def add(self, rotor: Rotor, where: str) -> None:
-        """A rotor whose name is not yet used."""
+        """Add a rotor with a new name."""
         if any(other.name == rotor.name for other in self.rotors):
             raise Refused(where, rotor.name, "is the name of another unbalance", "give each its own name")
         self.rotors.append(rotor)
 
     def move(self, name: str, rotors: Sequence[str], axis: int, place: float | Open | None) -> None:
-        """Let the place of rotors along an axis be decided, if it is open; nothing follows of those of no size."""
+        """Add a decision about the place of rotors along an axis if it is open; rotors without size do not follow."""
         sized = {rotor.name for rotor in self.rotors if rotor.unbalance != 0.0}
         sized |= {drive.rotor for decision in self.decisions for drive in decision.rotor_drives}
         drives = (PlaceDrive(rotor, axis) for rotor in rotors if rotor in sized)
         self.decisions += Open.of(place).decisions(name, "m", *drives)
 
     def drive(self, rotor: str, source: str, gain: float, mirrored: bool) -> None:
-        """Let a rotor follow whatever decides another one."""
+        """Let a rotor follow the decision about another one."""
         for k, decision in enumerate(self.decisions):
             for drive in decision.rotor_drives:
                 if drive.rotor == source:
@@ -120,11 +120,21 @@ class RotorList:
 def counterweights(
     tables: Sequence[CounterweightTable], cylinders: Sequence[SliderCrank], throws: Sequence[Throw], into: RotorList
 ) -> None:
-    """Counterweights on shafts with throws: opposite every throw, or one at a time."""
-    pins = [_pin_of(throw, cylinders) for throw in throws]
-    for k, table in enumerate(tables):
-        where = f"counterweights[{k + 1}]"
-        own = _pins_on(table, pins, where)
+    """Add counterweights on shafts with throws: opposite every throw, or single ones."""
+    pins = []
+    for throw in throws:
+        parts = [cylinders[k] for k in throw.cylinders]
+        rods = sum(part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)) for part in parts)
+        reciprocating = sum(part.reciprocating_mass * part.crank_radius for part in parts)
+        pins.append(_Pin(throw.x, throw.angle, rods + throw.unbalance, reciprocating, throw.shaft))
+    for k, table in enumerate(tables, 1):
+        where = f"counterweights[{k}]"
+        own = [pin for pin in pins if pin.shaft.name == table.shaft]
+        if table.shaft == EVERY and table.factor_key is not None:
+            own = pins
+        elif not own and table.shaft != CRANKSHAFT.name:
+            names = list(dict.fromkeys(pin.shaft.name for pin in pins))
+            raise Refused(f"{where}.shaft", table.shaft, "is no shaft with throws", nearest(table.shaft, names))
         if table.factor_key is not None:
             if not all(part.is_balanced_by_share for part in cylinders):
                 rule = "is a share of a mass at a crank pin, and the ram of a swinging yoke does not move as one"
@@ -134,33 +144,23 @@ def counterweights(
             _single_counterweight(table, own, where, into)
 
 
-def _pins_on(table: CounterweightTable, pins: Sequence[_Pin], where: str) -> list[_Pin]:
-    """Throws of the shaft that a counterweight turns with."""
-    if table.shaft == EVERY and table.factor_key is not None:
-        return list(pins)
-    found = [pin for pin in pins if pin.shaft.name == table.shaft]
-    if not found and table.shaft != CRANKSHAFT.name:
-        names = list(dict.fromkeys(pin.shaft.name for pin in pins))
-        raise Refused(f"{where}.shaft", table.shaft, "is no shaft with throws", nearest(table.shaft, names))
-    return found
+def check_factors(weights: Sequence[CounterweightTable], rule: str) -> None:
+    """Refuse balance factors that follow from open masses."""
+    for k, weight in enumerate(weights, 1):
+        if weight.factor_key is not None:
+            remedy = "give the counterweights a mass, or fix the other"
+            raise Refused(f"counterweights[{k}].{weight.factor_key}", None, rule, remedy)
 
 
 @dataclass(frozen=True)
 class _Pin:
-    """What a counterweight opposite one throw has to balance (eq. 13)."""
+    """Unbalances that a counterweight opposite one throw has to balance [kg m] (eq. 13)."""
 
     x: float
     angle: float
     rotating: complex
     reciprocating: float
     shaft: Shaft
-
-
-def _pin_of(throw: Throw, cylinders: Sequence[SliderCrank]) -> _Pin:
-    parts = [cylinders[k] for k in throw.cylinders]
-    rods = sum(part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)) for part in parts)
-    reciprocating = sum(part.reciprocating_mass * part.crank_radius for part in parts)
-    return _Pin(throw.x, throw.angle, rods + throw.unbalance, reciprocating, throw.shaft)
 
 
 def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
@@ -201,7 +201,7 @@ def _single_counterweight(table: CounterweightTable, pins: Sequence[_Pin], where
 
 
 def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> None:
-    """Balancer shafts and their unbalances; coupled ones follow those named before them."""
+    """Add balancer shafts and their unbalances; coupled ones follow earlier ones."""
     names = [table.name for table in tables]
     for k, table in enumerate(tables):
         where = f"balancer_shafts[{k + 1}]"
@@ -224,7 +224,7 @@ def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> No
 
 
 def name_of_unbalance(shaft: str, names: Sequence[str | None], j: int) -> str:
-    """By which results show the j-th unbalance of a shaft; one without a name of its own has that of the shaft."""
+    """Return the name of the j-th unbalance of a shaft in results; a single unnamed one has that of the shaft."""
     return shaft if len(names) == 1 and names[0] is None else f"{shaft}.{names[j] or j + 1}"
 
 
@@ -245,40 +245,24 @@ def _follow(name: str, table: UnbalanceTable, coupled: CoupledTable, shaft: Shaf
 
 
 def _place(rotor: Rotor, table: SizedTable, reference: float, where: str, into: RotorList) -> None:
-    """One rotor with its size and angle, and the decision about it if one of them is open."""
-    key, size, gain = _size(table, where)
+    """Add a rotor with its size and angle, and the decision about it if these are open."""
+    one_of(table, where, "unbalance", "mass")
+    key, size, gain = "unbalance", Open.of(table.unbalance), 1.0
+    if table.mass is not None:
+        if table.radius is None:
+            raise Refused(f"{where}.radius", None, "is missing, and a mass needs one", "add it")
+        key, size, gain = "mass", Open.of(table.mass), table.radius
     angle, direction = Open.of(table.angle), gain * cis(as_turn(reference))
-    _check_convex(key, size, angle, where)
     start = size.start * cis(as_turn(angle.start))
+    allowed: Set = _sector(key, size, angle, where) if angle.is_open else Interval(*size.bounds, angle.lower)
     into.add(replace(rotor, unbalance=direction * start), f"{where}.name")
     if size.is_open:
         drive = RotorDrive(rotor.name, direction)
-        into.decisions.append(Decision(f"{rotor.name}.{key}", _UNITS[key], _set(size, angle), start, (drive,)))
+        into.decisions.append(Decision(f"{rotor.name}.{key}", _UNITS[key], allowed, start, (drive,)))
 
 
-def _size(table: SizedTable, where: str) -> tuple[str, Open, float]:
-    """The key of a size, its value, and what one of it makes [kg m]."""
-    one_of(table, where, "unbalance", "mass")
-    if table.mass is None:
-        return "unbalance", Open.of(table.unbalance), 1.0
-    if table.radius is None:
-        raise Refused(f"{where}.radius", None, "is missing, and a mass needs one", "add it")
-    return "mass", Open.of(table.mass), table.radius
-
-
-def _set(size: Open, angle: Open) -> Set:
-    if not angle.is_open:
-        return Interval(*size.bounds, angle.lower)
-    return Sector(size.upper, (angle.lower, angle.lower + math.tau if _is_whole_turn(angle) else angle.upper))
-
-
-def _is_whole_turn(angle: Open) -> bool:
-    return angle.upper - angle.lower >= math.tau * (1.0 - 1e-9)
-
-
-def _check_convex(key: str, size: Open, angle: Open, where: str) -> None:
-    if not angle.is_open:
-        return
+def _sector(key: str, size: Open, angle: Open, where: str) -> Sector:
+    """Return the convex set of an unbalance with an open angle."""
     if not size.is_open:
         rule, remedy = "is open while the size is fixed", "leave the size open too, or fix the angle"
         raise Refused(f"{where}.angle", None, rule, remedy)
@@ -286,9 +270,10 @@ def _check_convex(key: str, size: Open, angle: Open, where: str) -> None:
         least, rule = units.shown(size.lower, _UNITS[key]), "is a least size above zero while the angle is open"
         raise Refused(f"{where}.{key}", least, rule, "let the size start at zero, or fix the angle")
     low, high = angle.bounds
-    if high - low > math.pi * (1.0 + 1e-9) and not _is_whole_turn(angle):
-        shown, rule = (
-            f"{math.degrees(low):g} to {math.degrees(high):g} deg",
-            "leaves out a sector of less than half a turn",
-        )
-        raise Refused(f"{where}.angle", shown, rule, "open it by at most 180 deg, or wholly")
+    if high - low >= math.tau * (1.0 - 1e-9):
+        return Sector(size.upper, (low, low + math.tau))
+    if high - low > math.pi * (1.0 + 1e-9):
+        shown = f"{math.degrees(low):g} to {math.degrees(high):g} deg"
+        rule, remedy = "leaves out a sector of less than half a turn", "open it by at most 180 deg, or wholly"
+        raise Refused(f"{where}.angle", shown, rule, remedy)
+    return Sector(size.upper, (low, high))

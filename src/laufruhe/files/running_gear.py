@@ -1,4 +1,4 @@
-"""[running_gear] of a problem file: sizes of webs, rods, piston pins and bolts, and what of all sizes is decided."""
+"""[running_gear] of a problem file: sizes of webs, rods, piston pins and bolts, and decisions about sizes."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def weighed(
     table: RunningGearTable | None, parts: tuple[SliderCrank, ...], throws: tuple[Throw, ...],
     bearings: tuple[Bearing, ...],
 ) -> tuple[RunningGear | None, tuple[SliderCrank, ...], tuple[Throw, ...]]:  # fmt: skip
-    """Sizes at the start of what is open, and slider-cranks and throws with their masses (Z2)."""
+    """Return sizes with open ones at their start, and slider-cranks and throws with their masses (Z2)."""
     if table is None:
         return None, parts, throws
     others = tuple(throw for throw in throws if throw.shaft != CRANKSHAFT)
@@ -120,7 +120,7 @@ def _piston_pin(table: PistonPinTable) -> PistonPin:
 def _opened(
     table: RunningGearTable | None, engine: EngineTable, bearings: Sequence[MainBearingTable], built: Sequence[Bearing]
 ) -> Iterator[tuple[str, Size, Any]]:
-    """Every size that may be open: its name, the number of the engine that it is, and what stands in the file."""
+    """Yield every size that may be open: name, number of the engine, and value in the file."""
     yield "engine.rod_length", ROD_LENGTH, engine.rod_length
     for key in ("diameter", "width"):
         if engine.big_end is not None:
@@ -136,21 +136,17 @@ def _opened(
 def size_decisions(
     table: RunningGearTable | None, engine: EngineTable, bearings: Sequence[MainBearingTable], built: Sequence[Bearing]
 ) -> list[Decision]:
-    """The decisions about sizes that are open."""
-    found = list[Decision]()
+    """Return the decisions about open sizes."""
+    decisions = list[Decision]()
     for name, size, value in _opened(table, engine, bearings, built):
-        found += Open.of(value).decisions(name, "m", NumberDrive(Kind.SIZE, size))
-    if found and engine.rod is not None and isinstance(engine.rod_length, Open):
+        decisions += Open.of(value).decisions(name, "m", NumberDrive(Kind.SIZE, size))
+    if decisions and engine.rod is not None and isinstance(engine.rod_length, Open):
         raise Refused("engine.rod_length", None, "is open, and [engine.rod] is of one length", "fix it")
-    if any(decision.name == "engine.rod_length" for decision in found):
-        _check_rod(engine)
-    return found
-
-
-def _check_rod(engine: EngineTable) -> None:
-    shortest = Open.of(engine.rod_length or math.inf).lower
-    if engine.kind.is_free or engine.offset:
-        raise Refused("engine.rod_length", None, "is decided in layouts without offset", "fix it, or take a layout")
-    if engine.stroke is not None and shortest <= 0.5 * engine.stroke:
-        shown = units.shown(shortest, "m")
-        raise Refused("engine.rod_length", shown, "does not let the crank turn", "raise its lower bound")
+    if any(decision.name == "engine.rod_length" for decision in decisions):
+        shortest = Open.of(engine.rod_length or math.inf).lower
+        if engine.kind.is_free or engine.offset:
+            raise Refused("engine.rod_length", None, "is decided in layouts without offset", "fix it, or take a layout")
+        if engine.stroke is not None and shortest <= 0.5 * engine.stroke:
+            shown = units.shown(shortest, "m")
+            raise Refused("engine.rod_length", shown, "does not let the crank turn", "raise its lower bound")
+    return decisions

@@ -1,4 +1,4 @@
-"""Scenes of a study file: cases, what is swept, and paths into the tables of a problem file."""
+"""Tables of study files: cases and swept quantities, and paths into the tables of a problem file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from laufruhe.files import nested
 from laufruhe.files.complaints import Refused, measured, nearest
 from laufruhe.files.fields import Name, Table, refusal
 from laufruhe.files.measures import SIDES, limit_name
-from laufruhe.files.model_walk import number_at
+from laufruhe.files.nested import number_at
 from laufruhe.files.problem_file import file_model
 
 MOST_POINTS = 100_000
@@ -30,17 +30,19 @@ def _single(given: object) -> object:
     return given
 
 
-def _settled(given: object) -> object:
+def _single_each(given: object) -> object:
     return [_single(each) for each in given] if isinstance(given, list) else _single(given)
 
 
 Value: TypeAlias = Annotated[bool | int | float | str, BeforeValidator(_single)]
-Setting: TypeAlias = Annotated[bool | int | float | str | list[bool | int | float | str], BeforeValidator(_settled)]
+Setting: TypeAlias = Annotated[
+    bool | int | float | str | list[bool | int | float | str], BeforeValidator(_single_each)
+]
 End: TypeAlias = Annotated[int | float | str | None, BeforeValidator(_single)]
 
 
 class SweepTable(Table):
-    """One quantity of the problem and the values that it takes: listed, or spaced between two ends."""
+    """Swept quantity of the problem and its values: listed, or spaced between two ends."""
 
     quantity: str = f.needed("Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
     values: list[Value] | None = None
@@ -51,12 +53,12 @@ class SweepTable(Table):
 
     @property
     def count(self) -> int:
-        """Values that it takes."""
+        """Number of its values."""
         return (self.points or 0) if self.values is None else len(self.values)
 
 
 class DrawnTable(Table):
-    """One quantity of the problem that is drawn at random, evenly between two ends."""
+    """Quantity of the problem that is drawn at random, evenly between two ends."""
 
     quantity: str = f.needed("Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
     first: int | float | str = Field(alias="from")
@@ -65,7 +67,7 @@ class DrawnTable(Table):
 
 
 class CaseTable(Table):
-    """One case: a problem file, and what is changed of it."""
+    """Case of a study: a problem file with changes."""
 
     name: Name
     problem: str
@@ -77,23 +79,23 @@ class CaseTable(Table):
 
 
 def at(tables: dict[str, Any], where: str) -> Any:
-    """What stands at a path such as counterweights.web.balance_factor; `Refused` where it leads nowhere."""
+    """Return the value at a path such as counterweights.web.balance_factor; `Refused` if there is none."""
     return nested.at(tables, keys_of(tables, where))
 
 
 def changed(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
-    """Tables with another value at a path, `Refused` where it leads nowhere; the rest is shared with those given."""
+    """Return tables with another value at a path, `Refused` if there is none; the rest is shared."""
     return nested.put(tables, keys_of(tables, where), value)
 
 
 def joined(tables: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
-    """Tables with others upon them: a table within is joined in turn, anything else is replaced."""
+    """Return tables updated by others: nested tables are joined in turn, anything else is replaced."""
     both = [key for key, one in own.items() if isinstance(one, dict) and isinstance(tables.get(key), dict)]
     return {**tables, **own, **{key: joined(tables[key], own[key]) for key in both}}
 
 
 def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
-    """The keys and places that a path goes through; `Refused` where the problem has no such quantity."""
+    """Return the keys and indices of a path; `Refused` if the problem has no such quantity."""
     here: Any = tables
     keys = []
     parts = parts_of(where)
@@ -108,7 +110,7 @@ def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
 
 
 def _remedy(tables: dict[str, Any], here: Any, parts: Sequence[str], k: int) -> str:
-    """What to do where a path leads nowhere from its part `k` on."""
+    """Return the remedy for a path that fails at its part `k`."""
     for path in _paths(tables):
         rest = iter(path)
         if path[-1] == parts[-1] and all(part in rest for part in parts):
@@ -120,14 +122,14 @@ def _remedy(tables: dict[str, Any], here: Any, parts: Sequence[str], k: int) -> 
 
 
 def _paths(node: Any, above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
-    """Paths of all that tables hold, entries of lists by their names."""
+    # entries of lists by their names
     for key, name in {key: name for name, key in _options(node).items()}.items():
         yield (*above, name)
         yield from _paths(node[key], (*above, name))
 
 
 def parts_of(where: str) -> list[str]:
-    """The parts of a path; the name of a limit may have points of its own, as that of order 0.5."""
+    """Return the parts of a path; the name of a limit may contain points, as that of order 0.5."""
     parts = where.split(".")
     if parts[0] == "constraints" and parts[-1] in SIDES and len(parts) > 3:
         return [parts[0], ".".join(parts[1:-1]), parts[-1]]
@@ -135,11 +137,11 @@ def parts_of(where: str) -> list[str]:
 
 
 def _options(here: Any) -> dict[str, Any]:
-    """Names of what a table or a list holds; a list's entries by their names, or counted from one."""
+    """Return the keys of a table or a list by name; entries of a list also counted from one."""
     if isinstance(here, dict):
         return {key: key for key in here}
     if isinstance(here, list):
-        # limits have a name, told or not
+        # limits have a name, given or not
         tables = [entry if isinstance(entry, dict) else {} for entry in here]
         names = [one.get("name") or (limit_name(one) if "limit" in one else None) for one in tables]
         named = {name: k for k, name in enumerate(names) if isinstance(name, str) and names.count(name) == 1}
@@ -148,15 +150,15 @@ def _options(here: Any) -> dict[str, Any]:
 
 
 def field_at(where: str) -> f.Number | None:
-    """How the number at a path is read; None where text, a list or a choice stands there."""
+    """Return the field that reads the number at a path; None for a text, a list or a choice."""
     return number_at(file_model(), parts_of(where))
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One swept quantity: its path and values as the problem file has them, and as numbers, unless these are labels.
+    """Swept quantity: its path, its values as in the problem file, and these as numbers unless they are labels.
 
-    The unit is that of the study file; "1" of plain numbers, "" of labels.
+    The unit is that of the study file; "1" for plain numbers, "" for labels.
     """
 
     quantity: str
@@ -166,7 +168,7 @@ class Axis:
 
     @property
     def name(self) -> str:
-        """The end of the path, as a reader says it: a place goes with its list, a side with its limit."""
+        """Name in reports: the end of the path; an index goes with its list, a side with its limit."""
         *before, last = parts_of(self.quantity.replace("_", " "))
         if before and last.isdigit():
             return f"{before[-1]} {last}"
@@ -176,12 +178,12 @@ class Axis:
         return last
 
     def by_value(self) -> dict[Value, float]:
-        """Numbers of the values; none where these are labels."""
+        """Return the numbers of the values; empty for labels."""
         return dict(zip(self.values, self.numbers, strict=True)) if self.numbers is not None else {}
 
 
 def axis_of(sweep: SweepTable) -> Axis:
-    """The values of a sweep and their unit; `Refused` where it has fewer than two, one twice, or what does not fit."""
+    """Return the values of a sweep with their unit; `Refused` if there are fewer than two, or equal ones."""
     spaced = (sweep.first, sweep.last, sweep.points)
     if sweep.values is None:
         values, given = _spaced(sweep), "points"
@@ -194,15 +196,14 @@ def axis_of(sweep: SweepTable) -> Axis:
         raise Refused(given, list(values), rule, "give two values or more, or leave the sweep out")
     unit, numbers = _measured(sweep.quantity, values, given)
     # 1 and true are equal in Python, and 6 m/s is 6000 mm/s
-    told_apart = numbers if numbers is not None else tuple(str(value) for value in values)
-    if len(set(told_apart)) < len(values):
+    if len(set(numbers if numbers is not None else map(str, values))) < len(values):
         raise Refused(given, list(values), "names a value twice", "name each once")
     return Axis(sweep.quantity, values, unit, numbers)
 
 
 @dataclass(frozen=True)
 class Span:
-    """What a quantity is drawn from, in the unit of the study file."""
+    """Range from which a quantity is drawn, in the unit of the study file."""
 
     quantity: str
     unit: str
@@ -212,19 +213,19 @@ class Span:
     is_text: bool
 
     def numbers(self, shares: Any) -> Any:
-        """From shares of the way, 0 to 1."""
+        """Return numbers at fractions of the range, 0 to 1."""
         low, high = self.low, self.high
         return low * (high / low) ** shares if self.is_log else low + (high - low) * shares
 
     def value(self, number: float) -> Value:
-        """A number as a problem file has it."""
+        """Return a number as a problem file has it."""
         if not self.is_text:
             return float(number)
         return f"{float(number)!r}" if self.unit == "1" else f"{float(number)!r} {self.unit}"
 
 
 def span_of(drawn: DrawnTable) -> Span:
-    """The ends between which a quantity is drawn; `Refused` where they do not fit."""
+    """Return the range from which a quantity is drawn; `Refused` if its ends do not fit."""
     unit, (low, high) = _ends(drawn.quantity, drawn.first, drawn.last)
     if low >= high:
         raise Refused("from", drawn.first, "does not lie below to", "write the smaller end first")
@@ -266,7 +267,7 @@ def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
 
 def _ends(quantity: str, first: Value, last: Value) -> tuple[str, tuple[float, ...]]:
     for key, end in (("from", first), ("to", last)):
-        # of each alone, so that the right one is named
+        # one by one, so that the wrong one is named
         _measured(quantity, (end,), key)
     unit, numbers = _measured(quantity, (first, last), "from")
     if numbers is None and isinstance(first, str) and units.dimension_of(first) is not None:
@@ -278,11 +279,11 @@ def _ends(quantity: str, first: Value, last: Value) -> tuple[str, tuple[float, .
 
 
 def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str, tuple[float, ...] | None]:
-    """Unit of the first value, and all values in it; no numbers where they are labels."""
+    """Return the unit of the first value, and all values in it; None for labels."""
     field = field_at(quantity)
-    bare = [value for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
+    numbers = [value for value in values if isinstance(value, int | float) and not isinstance(value, bool)]
     # a whole number may be beyond all floats
-    plain = [float(value) if abs(value) <= sys.float_info.max else math.inf for value in bare]
+    plain = [float(value) if abs(value) <= sys.float_info.max else math.inf for value in numbers]
     if not all(map(math.isfinite, plain)):
         raise Refused(given, list(values), "is not finite", "give numbers")
     texts = [value for value in values if isinstance(value, str)]
@@ -292,15 +293,15 @@ def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str
         return ("1", tuple(plain)) if len(plain) == len(values) else ("", None)
     if not texts:
         return "deg" if field is not None and field.plain is not None else "1", tuple(plain)
-    numbers = tuple(measured(text, wanted, given) for text in texts)
+    si = [measured(text, wanted, given) for text in texts]
     if plain:
         raise Refused(given, list(values), "mixes numbers with and without a unit", "write all alike")
     unit = units.unit_of(texts[0])
     one = units.parse(f"1 {unit}", wanted)
-    return unit or "1", tuple(float(f"{number / one:.{_DIGITS}g}") for number in numbers)
+    return unit or "1", tuple(float(f"{number / one:.{_DIGITS}g}") for number in si)
 
 
 def _is_limit(quantity: str) -> bool:
-    """Whether a path is that of a side of a limit, whose dimension is told by its text alone."""
+    # the dimension of a side of a limit follows from its text alone
     parts = parts_of(quantity)
     return parts[0] == "constraints" and parts[-1] in SIDES
