@@ -1,4 +1,4 @@
-"""Laufruhe: the balance of piston engines, designed by optimisation and proven (docs/reference/python.md).
+"""Laufruhe: optimisation-driven balance design of piston engines, with proofs (docs/reference/python.md).
 
 >>> import laufruhe
 >>> problem = laufruhe.load("problems/tractor-four-lanchester.toml")
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from laufruhe.report.saved_result import SavedResult, read_result, write_result
     from laufruhe.solvers.result import Result
 
-# loaded when they are asked for: import laufruhe is quick
+# imported at first use, so that import laufruhe is quick
 _ELSEWHERE = {
     "Problem": "laufruhe.problem.problem",
     "Result": "laufruhe.solvers.result",
@@ -49,11 +49,11 @@ __all__ = [
 ]
 
 Source: TypeAlias = Union[str, Path, Mapping[str, Any]]  # noqa: UP007
-"""A file, its text, or its tables."""
+"""Path of a file, its text, or its tables."""
 
 
 if not TYPE_CHECKING:
-    # to a type checker a misspelt name stays one
+    # type checkers should still find misspelt names
     def __getattr__(name: str) -> Any:
         if name in _ROOMS:
             return import_module(f"laufruhe.{name}")
@@ -63,7 +63,7 @@ if not TYPE_CHECKING:
 
 
 def __dir__() -> list[str]:
-    """What is for users."""
+    """Return the public names."""
     return sorted(__all__)
 
 
@@ -86,14 +86,14 @@ def load(source: Source) -> Problem:
 
 
 def solve(problem: Problem | Source, time_limit: float | None = None) -> Result:
-    """Decide what a problem leaves open; the result says what of it is proven.
+    """Solve a problem; the result includes its proof.
 
     Parameters
     ----------
     problem
-        As `load` reads it, or what `load` takes.
+        Problem, or an argument of `load`.
     time_limit
-        Seconds after which the search ends with the best design that it has, and with its bound.
+        Seconds after which the search ends with its best design and bound.
 
     Raises
     ------
@@ -102,7 +102,7 @@ def solve(problem: Problem | Source, time_limit: float | None = None) -> Result:
     ModelError
         If the engine cannot be evaluated as given.
     SolverError
-        If a solver stops without an answer.
+        If a solver stops without a result.
     """
     from dataclasses import replace
     from numbers import Real
@@ -120,9 +120,9 @@ def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint]
     Parameters
     ----------
     design
-        A problem, what `load` takes, or an engine with the operating points beside it.
+        Problem, argument of `load`, or engine.
     points
-        Of an engine that stands in no problem.
+        Operating points; required when `design` is an Engine.
 
     Raises
     ------
@@ -135,40 +135,39 @@ def evaluate(design: Problem | Engine | Source, points: Sequence[OperatingPoint]
     from laufruhe.solvers import state
 
     if isinstance(design, Engine):
-        return state(_of_engine(design, points))
+        return state(_engine_problem(design, points))
     if len(points):
         rule, remedy = "stand beside a problem, which has its own", "leave them out, or give the problem's engine"
         raise wrong_call("points", points, rule, remedy)
     return state(_problem(design))
 
 
-def _of_engine(design: Engine, points: Sequence[OperatingPoint]) -> Problem:
-    """The problem of an engine that stands in none: forces on its mounts, or on its block where it has none."""
+def _engine_problem(design: Engine, points: Sequence[OperatingPoint]) -> Problem:
+    """Return a problem of the mount forces of an engine, or of its shaking force without mounts."""
     from laufruhe.machine import OperatingPoint
     from laufruhe.problem import channels
     from laufruhe.problem.measure import Measure, Term
     from laufruhe.problem.problem import Problem
 
-    listed: Sequence[object] = points
-    strange = next((point for point in listed if not isinstance(point, OperatingPoint)), None)
+    given: Sequence[object] = points
+    strange = next((point for point in given if not isinstance(point, OperatingPoint)), None)
     if strange is not None:
         raise wrong_call("points", strange, "is no operating point", "give a list of laufruhe.machine.OperatingPoint")
     if not points:
         raise ModelError(f"'{design.name}' has no operating point; give points")
     channel = channels.MOUNT_FORCE if design.mounts else channels.SHAKING_FORCE
-    wanted = (Term(Measure(channel)),)
-    return Problem(design.name, design.name, design, tuple(points), objective=wanted)
+    return Problem(design.name, design.name, design, tuple(points), objective=(Term(Measure(channel)),))
 
 
 def study(source: Source, jobs: int = 1) -> dict[str, xr.Dataset]:
-    """Run the sweeps and comparisons of a study; one dataset a part, by its name.
+    """Run the sweeps and comparisons of a study, and return one dataset a part by its name.
 
     Parameters
     ----------
     source
-        Path of a study file, its text, or its tables. Problems that it names lie beside it, or in the working folder.
+        Path of a study file, its text, or its tables. Its problems lie beside it, or in the working folder.
     jobs
-        Processes that may be used.
+        Largest number of processes.
 
     Raises
     ------

@@ -7,7 +7,7 @@ try:
     from laufruhe.cli import main
 except KeyboardInterrupt:
     sys.stderr.write("laufruhe: interrupted, nothing was written\n")
-    # after an interrupted import Python would kill itself by the signal in its place
+    # after an interrupted import Python would end by the signal
     os._exit(130)
 
 __all__ = ["main"]

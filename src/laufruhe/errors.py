@@ -8,18 +8,18 @@ from numbers import Integral
 
 
 def printed(text: str, most: int = 2000) -> str:
-    """One line as any screen may show it: an escape in place of what is not printed, cut where it is long."""
+    """Return one line with escapes for characters that are not printed, cut if it is long."""
     shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text[:most])
     return shown if len(text) <= most and len(shown) <= most else shown[: most - 3] + "..."
 
 
 def plural(name: str, count: int) -> str:
-    """A noun as it stands behind a number."""
+    """Return a noun in the form that follows a number."""
     return name if count == 1 else f"{name}s"
 
 
 def counted(count: int, name: str) -> str:
-    """So many of them: 1 cylinder, 4 cylinders."""
+    """Return a number with its noun: 1 cylinder, 4 cylinders."""
     return f"{count} {plural(name, count)}"
 
 
@@ -28,7 +28,7 @@ class LaufruheError(Exception):
 
 
 class ModelError(LaufruheError, ValueError):
-    """A machine that cannot exist or cannot run as described; `where` is the key to blame, if one is known."""
+    """Machine that cannot exist or cannot run as described; `where` is the key to blame, if known."""
 
     def __init__(self, text: str, where: str = "") -> None:
         self.where = where
@@ -36,7 +36,7 @@ class ModelError(LaufruheError, ValueError):
 
 
 class KeyedError(ModelError):
-    """A machine that cannot exist, the key of [engine] to blame, and what stands there; a rule, a remedy after '; '."""
+    """Machine that cannot exist, with the key of [engine] to blame and its value; rule, and remedy after '; '."""
 
     def __init__(self, key: str, text: str, value: str = "") -> None:
         self.key, self.text, self.value = key, text, value
@@ -48,7 +48,7 @@ class KeyedError(ModelError):
 
 @dataclass(frozen=True)
 class Complaint:
-    """One thing wrong with an input, in the order in which a user reads it; whatever it quotes can be printed."""
+    """Fault of an input: place, value, rule and remedy; all text can be printed."""
 
     where: str
     value: str
@@ -62,7 +62,7 @@ class Complaint:
 
     @classmethod
     def of(cls, error: Exception, where: str, value: str = "", remedy: str = "") -> Complaint:
-        """Of an error whose text is a rule, and a remedy after '; '; `remedy` where it names none."""
+        """Return the complaint of an error, whose text is a rule and a remedy after '; '; `remedy` is the default."""
         text = str(error)
         if isinstance(error, KeyedError):
             where, value, text = error.where, error.value, error.text
@@ -71,7 +71,7 @@ class Complaint:
 
 
 class InputError(LaufruheError, ValueError):
-    """Bad input: one line a complaint, each led by the file it stands in."""
+    """Bad input: one line a complaint, each with the name of its file."""
 
     def __init__(self, source: str, complaints: tuple[Complaint, ...]) -> None:
         self.source = source
@@ -79,12 +79,12 @@ class InputError(LaufruheError, ValueError):
         super().__init__("\n".join(f"{printed(source, 400)}: {complaint}" for complaint in complaints))
 
     def __reduce__(self) -> tuple[type[InputError], tuple[str, tuple[Complaint, ...]]]:
-        # raised in a worker process, it has to reach the one that speaks to the user
+        # an error of a worker process has to reach its parent
         return InputError, (self.source, self.complaints)
 
 
 class LaufruheWarning(UserWarning):
-    """What a user should know of an answer that stands all the same."""
+    """Warning about a valid result."""
 
 
 class UncarriedLoadError(ModelError):
@@ -95,18 +95,18 @@ class UncarriedLoadError(ModelError):
 
 
 class SolverError(LaufruheError, RuntimeError):
-    """A solver stopped without an answer that can be used."""
+    """Solver that stopped without a usable result."""
 
 
 class BoundError(LaufruheError, RuntimeError):
-    """A bound and a known design contradict each other, so that one of the two is wrong.
+    """Contradiction of a bound and a known design, one of which is wrong.
 
     Attributes
     ----------
     what
-        Proof that the bound is part of, in words.
+        Name of the proof.
     bound, value
-        In SI.
+        Bound and value of the known design [SI].
     """
 
     def __init__(self, what: str, bound: float, value: float) -> None:
@@ -114,26 +114,22 @@ class BoundError(LaufruheError, RuntimeError):
         super().__init__(f"a bound of {self.bound!r} contradicts a known design of {self.value!r} ({what}) [SI]")
 
     def __reduce__(self) -> tuple[type[BoundError], tuple[str, float, float]]:
-        # raised in a worker process, it has to reach the one that speaks to the user
+        # an error of a worker process has to reach its parent
         return BoundError, (self.what, self.bound, self.value)
 
 
 def refused(where: str, value: str, rule: str, remedy: str, source: object = "laufruhe") -> InputError:
-    """One line of complaint, led by the file it stands in."""
+    """Return an error with one complaint about a file."""
     return InputError(str(source), (Complaint(where, value, rule, remedy),))
 
 
 def wrong_call(where: str, given: object, rule: str, remedy: str) -> InputError:
-    """What a call in Python is refused with: an argument, as it was given, the rule and the remedy."""
+    """Return the error of a wrong argument of a Python call."""
     return refused(where, printed(repr(given), 60), rule, remedy)
 
 
 def check_whole(where: str, given: object, least: int, most: float = math.inf) -> None:
     """Refuse an argument that is no whole number between two bounds."""
     if isinstance(given, bool) or not isinstance(given, Integral) or not least <= int(given) <= most:
-        rule = (
-            f"must be a whole number, {least} or more"
-            if most == math.inf
-            else f"must be a whole number, {least} to {most}"
-        )
-        raise wrong_call(where, given, rule, "give one")
+        span = f"{least} or more" if most == math.inf else f"{least} to {most}"
+        raise wrong_call(where, given, f"must be a whole number, {span}", "give one")

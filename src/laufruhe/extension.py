@@ -1,4 +1,4 @@
-"""Extensions: what they add to the tables of the core.
+"""Extensions: additions to the tables of the core.
 
 Those of this package are the folders of `laufruhe.extensions`; the core runs without each of them. Another installed
 package names an `Extension` as an entry point of the group `laufruhe.extensions`. Objects are imported when the table
@@ -32,7 +32,7 @@ class Extension:
     Attributes
     ----------
     name
-        Of the package, as messages say it.
+        Name of the package in messages.
     norms
         Subclasses of `laufruhe.numerics.norms.Norm`.
     channels
@@ -112,26 +112,23 @@ def lack(extension: str) -> tuple[str, str]:
 
 @cache
 def extensions() -> tuple[Extension, ...]:
-    """Return the extensions of this package, then those of others, each in the order of their names."""
-    found = []
-    for name, address in (*_in_house(), *sorted((point.name, point.value) for point in entry_points(group=GROUP))):
+    """Return the extensions of this package, then those of other packages, each in the order of their names."""
+    folders = iter_modules([str(Path(__file__).with_name("extensions"))])
+    addresses = [(one.name, f"laufruhe.extensions.{one.name}:EXTENSION") for one in folders]
+    addresses += sorted((point.name, point.value) for point in entry_points(group=GROUP))
+    loaded = []
+    for name, address in addresses:
         one = _imported(name, address)
         if not isinstance(one, Extension):
             raise ModelError(f"extension '{name}': {address} is no laufruhe.extension.Extension; mend it")
-        found.append(one)
-    return tuple(found)
-
-
-def _in_house() -> list[tuple[str, str]]:
-    """Return name and address of every folder of `laufruhe.extensions`."""
-    home = Path(__file__).with_name("extensions")
-    return [(one.name, f"laufruhe.extensions.{one.name}:EXTENSION") for one in iter_modules([str(home)])]
+        loaded.append(one)
+    return tuple(loaded)
 
 
 class Table(Mapping[str, Any]):
-    """Objects by their names, put together when the first of them is asked for.
+    """Objects by their names, filled at first use.
 
-    So a module of an extension may import the room of its table, whichever of the two is imported first.
+    A module of an extension may import the room of its table, whichever of the two is imported first.
     """
 
     def __init__(self, fill: Callable[[], Mapping[str, Any]]) -> None:
@@ -150,35 +147,36 @@ class Table(Mapping[str, Any]):
 def extended(
     table: Tables, kind: Any, own: Iterable[Any], name_of: Callable[[Any], str] = lambda one: str(one.name)
 ) -> Table:
-    """Return a table by names: objects, or classes, of this package, then those that extensions add.
+    """Return a table by names: objects or classes of this package, then those of extensions.
 
     Parameters
     ----------
     kind
         Class of the objects, or base of the classes.
     own
-        Those of this package.
+        Objects of this package.
     name_of
-        Return the name of one in the table.
+        Function that returns the name of an object in the table.
 
     Raises
     ------
     ModelError
         At first use, if one cannot be imported, is of another kind, or has the name of another one.
     """
-    return Table(lambda: _filled(table, kind, own, name_of))
 
+    def filled() -> dict[str, Any]:
+        entries = {name_of(one): one for one in own}
+        for extension in extensions():
+            for address, one in objects(extension, table):
+                if not (issubclass(one, kind) if isinstance(one, type) else isinstance(one, kind)):
+                    raise ModelError(f"extension '{extension.name}': {address} is no {kind.__name__}; mend it")
+                if (name := name_of(one)) in entries:
+                    rule = f"{table} have '{name}' already; give it another name"
+                    raise ModelError(f"extension '{extension.name}': {rule}")
+                entries[name] = one
+        return entries
 
-def _filled(table: Tables, kind: Any, own: Iterable[Any], name_of: Callable[[Any], str]) -> dict[str, Any]:
-    found = {name_of(one): one for one in own}
-    for extension in extensions():
-        for address, one in objects(extension, table):
-            if not (issubclass(one, kind) if isinstance(one, type) else isinstance(one, kind)):
-                raise ModelError(f"extension '{extension.name}': {address} is no {kind.__name__}; mend it")
-            if (name := name_of(one)) in found:
-                raise ModelError(f"extension '{extension.name}': {table} have '{name}' already; give it another name")
-            found[name] = one
-    return found
+    return Table(filled)
 
 
 def objects(extension: Extension, table: Tables) -> Iterator[tuple[str, Any]]:
@@ -188,20 +186,20 @@ def objects(extension: Extension, table: Tables) -> Iterator[tuple[str, Any]]:
 
 
 def in_order(table: Tables, kind: Any, own: Sequence[Any]) -> tuple[Any, ...]:
-    """Return a table in its order: an object of an extension stands before the one that it names, else last.
+    """Return a table as a list: an object of an extension comes before the one that it names, else last.
 
     Raises
     ------
     ModelError
-        If it names one that is not there.
+        If it names a missing one.
     """
-    found = list(own)
+    entries = list(own)
     for one in [*extended(table, kind, own).values()][len(own) :]:
-        names = [other.name for other in found]
+        names = [other.name for other in entries]
         if one.before and one.before not in names:
             raise ModelError(f"{table}: '{one.name}' stands before '{one.before}', which is not there; mend it")
-        found.insert(names.index(one.before) if one.before else len(found), one)
-    return tuple(found)
+        entries.insert(names.index(one.before) if one.before else len(entries), one)
+    return tuple(entries)
 
 
 def _imported(name: str, address: str) -> Any:

@@ -1,4 +1,4 @@
-"""Units at the border (C1): text with a unit in, SI inside, readable text out."""
+"""Units of input and output (C1): text with a unit to SI, and SI to text."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ if TYPE_CHECKING:
     import pint
 
 LONGEST = 100
-"""Characters of a number with its unit."""
+"""Largest number of characters of a number with its unit."""
 MOST_FACTORS = 12
-"""Names in one unit."""
+"""Largest number of names in one unit."""
 _QUANTITY = re.compile(r"^\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:/(\d+))?\s*([A-Za-z°µ%][\w°µ%/*^ .-]*)?\s*$")
 DECIMAL_COMMA = re.compile(r"^\s*[+-]?\d*,\d+(?![\d,.])")
-"""What a number looks like where commas divide it."""
+"""Number with a decimal comma."""
 THOUSANDS = re.compile(r"^\s*[+-]?[1-9]\d{0,2},\d{3}(?!\d)")
-"""What it looks like where a comma may as well divide thousands."""
+"""Number with a comma that may also separate thousands."""
 # kp/cm2 as it is typed for kp/cm^2; H2O keeps its figure
 _POWER = re.compile(r"(?<=[a-z])([23])\b")
 _NAME = r"(?!\d)(?:(?![⁰¹²³⁴-⁹])[\w°%])+"
 _POWERED = rf"{_NAME}(?:⁻?[⁰¹²³⁴-⁹]| ?(?:\^|\*\*) ?-?[0-9](?:\.[0-9]{{1,3}})?)?"
 _PRODUCT = re.compile(rf"{_POWERED}(?:(?: ?[*/.] ?| +){_POWERED}){{,{MOST_FACTORS - 1}}}")
-"""What a unit looks like: names and powers below ten, one behind the other. The registry evaluates anything."""
+"""Unit as a product of names and powers below ten; the registry would evaluate any expression."""
 _OF_ANGLES = ("rad", "rad/s", "N m/rad", "N m s/rad")
-# full names that speak of an angle
+# full names of units with an angle
 _TURNING = re.compile("radian|degree|turn|revolution|arcminute|arcsecond|grad")
 _DEFINITIONS = (
     "@alias kilogram_force = kp = kilopond",
@@ -51,12 +51,12 @@ COMMON = {
     "s": {"s": 1.0},
     "": {"%": 1e-2},
 }
-"""SI values of units that problem files are full of, by what they measure: the registry takes long to load."""
+"""SI values of frequent units by dimension; the registry takes long to load."""
 _COMMON_UNITS = {unit for units in COMMON.values() for unit in units}
 
 
 class UnitError(ValueError):
-    """A text that is no number with the unit wanted: rule first, then remedy after '; '."""
+    """Text that is no number with a unit of the right dimension: rule, and remedy after '; '."""
 
 
 @cache
@@ -71,10 +71,10 @@ def _registry() -> pint.UnitRegistry[Any]:
 
 @cache
 def _factor(unit: str, wanted: str) -> float:
-    """SI value of one `unit` of the dimension of `wanted`."""
+    """Return the SI value of one `unit`, in the dimension of `wanted`."""
     unit = _POWER.sub(r"^\1", unit)
     if wanted == "Hz" and "Hz" not in unit:
-        # radians have no dimension, so rpm would be taken for a frequency 2 pi too high
+        # radians have no dimension, so rpm would pass for a frequency 2 pi too high
         raise UnitError(f"'{unit}' is no frequency in Hz; {advice(wanted)}")
     other = UnitError(f"'{unit}' is not a unit of {dimension_name(wanted)}; {_in_units(wanted)}")
     if wanted in COMMON and unit in _COMMON_UNITS:
@@ -96,7 +96,7 @@ def _by_registry(unit: str, wanted: str, other: UnitError) -> float:
         ratio = float(one.to(target).magnitude)
         doubled = float((2.0 * one).to(target).magnitude)
     except Exception as error:
-        # the registry and the tokenizer below it raise a dozen kinds for what is no unit
+        # the registry and its tokenizer raise a dozen kinds of errors
         if type(error).__name__ == "DimensionalityError":
             raise other from None
         raise unknown from None
@@ -134,27 +134,26 @@ _EXAMPLES = {
 
 
 def dimension_name(unit: str) -> str:
-    """What a unit measures, in words."""
+    """Return the name of a unit's dimension."""
     return _EXAMPLES.get(unit, (f"the dimension of {unit}", ""))[0]
 
 
 def example(unit: str) -> str:
-    """A value as a user would write it."""
+    """Return an example of a value with this unit."""
     return _EXAMPLES.get(unit, ("", f"1 {unit}"))[1]
 
 
 def advice(unit: str) -> str:
-    """How to write a value of this dimension."""
+    """Return the advice on how to write a value with this unit."""
     return f"write for example {_written(example(unit), unit)}"
 
 
 def _written(text: str, unit: str) -> str:
-    """As a file has it: text with a unit in quotes, a plain number without."""
     return f'"{text}"' if unit else text
 
 
 def usual(unit: str) -> str:
-    """Units that values of this dimension are mostly written in; others may do as well."""
+    """Return frequent units of this dimension."""
     return ", ".join(COMMON.get(unit) or [example(unit).partition(" ")[2]])
 
 
@@ -163,7 +162,7 @@ def _in_units(unit: str) -> str:
 
 
 def parse(text: str, unit: str) -> float:
-    """SI value of a text such as '120 mm' in the dimension of `unit`; `UnitError` where it has none."""
+    """Return the SI value of a text such as '120 mm' in the dimension of `unit`; `UnitError` if it has none."""
     match = _QUANTITY.match(text) if len(text) <= LONGEST else None
     if match is None and DECIMAL_COMMA.match(text[:LONGEST]):
         point, whole = (text.replace(",", mark, 1).strip() for mark in (".", ""))
@@ -186,13 +185,13 @@ def parse(text: str, unit: str) -> float:
 
 
 def unit_of(text: str) -> str:
-    """The unit that a number is written in; empty where there is none."""
+    """Return the unit of a number in a text; empty if there is none."""
     match = _QUANTITY.match(text)
     return (match.group(3) or "").strip() if match else ""
 
 
 def dimension_of(text: str) -> str | None:
-    """SI unit of what a text such as '12 Hz' measures; None where it is no number with a unit known here."""
+    """Return the SI unit of a text such as '12 Hz'; None if it is no number with a known unit."""
     for unit in _EXAMPLES:
         with suppress(UnitError):
             parse(text, unit)
@@ -228,7 +227,7 @@ _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?(?:/[0-9]+)?"
 
 
 def pattern(unit: str) -> str:
-    """What a number of this dimension looks like, as an editor checks it: units as they are usually written."""
+    """Return the pattern of a number with a usual unit of this dimension, for editors."""
     return f"^ *{_NUMBER} *(?:{_WRITTEN[unit]}) *$"
 
 
@@ -242,12 +241,12 @@ _SHOWN = {
 
 
 def readable(unit: str) -> tuple[str, float]:
-    """The unit that a report shows, as it is printed, and its factor on an SI value."""
+    """Return the printed unit of reports, and its factor on an SI value."""
     name, factor = _SHOWN.get(unit, (unit, 1.0))
     return name.replace("^2", "²").replace("^3", "³"), factor
 
 
 def shown(value: float, unit: str, digits: int = 4) -> str:
-    """Value and unit as a message tells them, and as they may be typed: degrees, mm, rpm, N/mm^2."""
+    """Return value and unit for messages, as they may be typed: degrees, mm, rpm, N/mm^2."""
     name, factor = _SHOWN.get(unit, (unit, 1.0))
     return f"{value * factor:.{digits}g} {name}".rstrip()

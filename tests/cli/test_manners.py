@@ -194,15 +194,15 @@ def test_other_options_before_the_command_are_told_where_they_stand(here: Path) 
 
 @pytest.mark.parametrize("words", [["check"], ["evaluate", "--no-plots"]], ids=["check", "evaluate"])
 def test_a_problem_may_come_from_standard_input(here: Path, words: list[str]) -> None:
-    reader._typed.cache_clear()
+    reader._standard_input.cache_clear()
     found = run.invoke(app, [*words, "-"], input=SINGLE.read_bytes())
     assert found.exit_code == 0, found.output
     assert (here / "results" / "stdin-as-given").is_dir() == (words[0] == "evaluate")
-    reader._typed.cache_clear()
+    reader._standard_input.cache_clear()
     found = run.invoke(app, [*words, "-"], input=b"title = 5")
     assert found.exit_code == 2
     assert "stdin: title = 5" in found.output
-    reader._typed.cache_clear()
+    reader._standard_input.cache_clear()
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

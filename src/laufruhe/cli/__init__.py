@@ -1,4 +1,4 @@
-"""The command line: `commands` is what is typed, one module for what each family of commands does."""
+"""Command line: `commands` and their options, and one module for the work of each family of commands."""
 
 from laufruhe.cli.commands import app, main
 

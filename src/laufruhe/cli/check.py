@@ -1,7 +1,6 @@
-"""Say of a problem whether the design as given can be evaluated, and what is open.
+"""Check of a problem file: evaluate the design as given, and list what is open.
 
-Nothing that reports, and no library that solves, is loaded unless its JSON is asked for: an editor may call this on
-every save. What no method decides is said as `solve` says it.
+An editor may call this on every save, so libraries of reports and solvers are loaded for JSON only.
 """
 
 from __future__ import annotations
@@ -18,29 +17,29 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers.methods import refuse
 
 
-def checked(path: Path) -> tuple[str, Callable[[], str]]:
-    """What a problem leaves open, and what makes JSON of the design as given."""
+def check_problem(path: Path) -> tuple[str, Callable[[], str]]:
+    """Return the summary of a problem, and a function that makes JSON of the design as given."""
     problem = load(path)
-    doubt(problem, path)
+    warn(problem, path)
     drawing = problem.drawing
-    # a load that no mount carries, or a gas cycle that cannot be met, shows only here
+    # the evaluation finds loads that no mount carries, and gas cycles that cannot be met
     given = evaluate_start(drawing)
     objective_value(drawing, given)
     if not given.resonance:
         given.excess(drawing.limits)
-    # what solve refuses is not ok
+    # a problem that no method solves is not ok
     refuse(problem)
-    return f"ok: {problem.summary}\n", lambda: _as_given(problem)
+
+    def as_given() -> str:
+        from laufruhe.report.json_result import as_json
+        from laufruhe.solvers import state
+
+        return as_json(state(problem, to_start_from=True))
+
+    return f"ok: {problem.summary}\n", as_given
 
 
-def doubt(problem: Problem, path: Path) -> None:
-    """Ask of numbers that no usual engine has; nothing stops for them."""
+def warn(problem: Problem, path: Path) -> None:
+    """Print plausibility warnings."""
     for one in () if is_quiet() else problem.doubts:
         complain(printed(f"{path}: warning: {one}"))
-
-
-def _as_given(problem: Problem) -> str:
-    from laufruhe.report.json_result import as_json
-    from laufruhe.solvers import state
-
-    return as_json(state(problem, to_start_from=True))

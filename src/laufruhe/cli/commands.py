@@ -1,4 +1,4 @@
-"""The command line: what is typed, where results go, and what the exit status says.
+"""Commands, their options, and the exit status.
 
 Heavy imports happen inside the commands, so that `laufruhe --help` answers at once.
 """
@@ -25,13 +25,13 @@ from laufruhe.cli.screen import (
     DONE,
     FAILED,
     INTERRUPTED,
-    at_work,
+    Request,
     complain,
     exit_statuses,
     handing_out,
-    in_time,
     open_closed_streams,
     progress,
+    resources,
     share_below_one,
     spoken,
     warn_plainly,
@@ -69,7 +69,7 @@ class _Commands(TyperGroup):
         return super().resolve_command(ctx, args)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """As typer, which knows such an option before the command as none at all."""
+        """Parse as typer, but explain an option that belongs behind the command."""
         before = [arg.partition("=")[0] for arg in takewhile(lambda arg: arg.startswith("-"), args)]
         own = {option for param in self.get_params(ctx) for option in param.opts}
         for option in (option for option in before if option not in own):
@@ -83,12 +83,12 @@ class _Commands(TyperGroup):
         return super().parse_args(ctx, args)
 
     def make_context(self, *args: Any, **kwargs: Any) -> Any:
-        """As typer, which says nothing of an interrupt while it reads what was typed."""
+        """Make a context as typer, but report an interrupt."""
         with exit_statuses(Path("laufruhe")):
             return super().make_context(*args, **kwargs)
 
     def invoke(self, ctx: Any) -> Any:
-        """As typer, which says nothing of an interrupt before the command has begun."""
+        """Invoke as typer, but report an interrupt."""
         with exit_statuses(Path("laufruhe")):
             return super().invoke(ctx)
 
@@ -120,9 +120,9 @@ def init(
     Asks about the engine, unless --from names one. The schema that editors use comes with it.
     """
     with exit_statuses(file):
-        from laufruhe.cli.begin import begun
+        from laufruhe.cli.begin import write_draft
 
-        typer.echo(begun(file, name), nl=False)
+        typer.echo(write_draft(file, name), nl=False)
 
 
 @app.command(epilog=o.examples("laufruhe examples", "laufruhe examples tractor-single tractor-sweeps --to mine"))
@@ -132,9 +132,9 @@ def examples(
 ) -> None:
     """List the ready problems by use, or copy some of them."""
     with exit_statuses(to):
-        from laufruhe.cli.begin import copied, listed
+        from laufruhe.cli.begin import copy_ready, ready_list
 
-        typer.echo(copied(names, to) if names else listed(), nl=False)
+        typer.echo(copy_ready(names, to) if names else ready_list(), nl=False)
 
 
 @app.command(epilog=o.examples("laufruhe engines", "laufruhe engines bmw-b48"))
@@ -143,9 +143,9 @@ def engines(
 ) -> None:
     """List the engines of the catalogue, or show some."""
     with exit_statuses(Path("laufruhe")):
-        from laufruhe.cli.begin import catalogue, shown
+        from laufruhe.cli.begin import engine_details, engine_list
 
-        typer.echo(shown(names) if names else catalogue(), nl=False)
+        typer.echo(engine_details(names) if names else engine_list(), nl=False)
 
 
 @app.command(
@@ -170,13 +170,10 @@ def solve(
     What the problem leaves open is decided; results, pictures and proof go into a folder.
     """
     kinds = () if no_plots else kind.kinds
-    with (
-        exit_statuses(problem), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler), artist(kinds) as ask
-    ):  # fmt: skip
-        from laufruhe.cli.request import Request
-        from laufruhe.cli.solve import run, solved
+    with exit_statuses(problem), spoken(quiet, verbose), resources(time_limit, scheduler), artist(kinds) as ask:
+        from laufruhe.cli.solve import run, solve
 
-        run(Request("solve", problem, json, out, kinds, ask, animate, tolerance, series), solved)
+        run(Request("solve", problem, json, out, kinds, ask, animate, tolerance, series), solve)
 
 
 @app.command(epilog=o.examples("laufruhe evaluate problem.toml --series --json -"))
@@ -197,10 +194,9 @@ def evaluate(
     """
     kinds = () if no_plots else kind.kinds
     with exit_statuses(problem), spoken(quiet, verbose), artist(kinds) as ask:
-        from laufruhe.cli.request import Request
-        from laufruhe.cli.solve import run, stated
+        from laufruhe.cli.solve import evaluate, run
 
-        run(Request("evaluate", problem, json, out, kinds, ask, animate, series=series), stated)
+        run(Request("evaluate", problem, json, out, kinds, ask, animate, series=series), evaluate)
 
 
 @app.command(epilog=o.examples("laufruhe study tractor-sweeps.toml --jobs 4"))
@@ -221,14 +217,14 @@ def study(
     """
     kept = "interrupted; finished points are kept, the same command goes on"
     with (
-        exit_statuses(problem, kept), spoken(quiet, verbose), in_time(time_limit),
-        handing_out(json, problem) as hand_out, at_work(scheduler), artist(kind.kinds) as ask,
+        exit_statuses(problem, kept), spoken(quiet, verbose), handing_out(json, problem) as hand_out,
+        resources(time_limit, scheduler), artist(kind.kinds) as ask,
     ):  # fmt: skip
-        from laufruhe.cli.study import studied
+        from laufruhe.cli.study import run_study
 
         with progress() as say:
-            found = studied(problem, out, jobs, say, ask, kind.kinds)
-        hand_out(*found)
+            text, data = run_study(problem, out, jobs, say, ask, kind.kinds)
+        hand_out(text, data)
 
 
 @app.command(epilog=o.examples("laufruhe check problem.toml"))
@@ -246,10 +242,13 @@ def check(
         from laufruhe.files.reader import is_study
 
         if is_study(problem):
-            from laufruhe.cli.study import checked
+            from laufruhe.cli.study import check_study
+
+            hand_out(*check_study(problem))
         else:
-            from laufruhe.cli.check import checked
-        hand_out(*checked(problem))
+            from laufruhe.cli.check import check_problem
+
+            hand_out(*check_problem(problem))
 
 
 @app.command(epilog=o.examples("laufruhe explain problem.toml --tolerance 1e-2"))
@@ -281,7 +280,7 @@ def trade(
 
     Each fidelity, that is each choice of how exactly the physics is computed, is tried on these problems.
     """
-    with exit_statuses(problems[0]), spoken(quiet, verbose), in_time(time_limit), at_work(scheduler):
+    with exit_statuses(problems[0]), spoken(quiet, verbose), resources(time_limit, scheduler):
         from laufruhe.cli.fidelity import traded
         from laufruhe.report.screen import show_document
 
@@ -313,16 +312,16 @@ def _options(
 
 def main() -> None:
     """Entry point of the `laufruhe` command; ends the process."""
-    # classes of models and marks of pictures are many, and none of them is garbage
+    # classes of models and marks of pictures are many, and little of them is garbage
     gc.set_threshold(SELDOM)
     if not ONE_THREAD.keys() & os.environ.keys():
         os.environ.update(ONE_THREAD)
-    # pictures are made without a backend, and a name that is none ends the import of matplotlib
+    # an unknown backend would end the import of matplotlib
     os.environ.pop("MPLBACKEND", None)
     open_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
-            # a terminal that knows no Greek gets an escape in place of a traceback
+            # a terminal without Greek gets an escape in place of a traceback
             stream.reconfigure(errors="backslashreplace")
     warn_plainly()
     supervised(_run)
@@ -335,7 +334,7 @@ def _run() -> NoReturn:
     except SystemExit as end:
         _leave(end.code if isinstance(end.code, int) else DONE)
     except BaseException:
-        # a library may make something else of it
+        # a library may turn an interrupt into another error
         if not is_interrupted():
             raise
         complain("laufruhe: interrupted, nothing was written")
@@ -344,10 +343,9 @@ def _run() -> NoReturn:
 
 
 def _leave(status: int) -> NoReturn:
-    """End at once: taking the imported solvers apart would cost a fifth of the whole run.
+    """End at once: taking imported solvers apart would cost a fifth of the whole run.
 
-    It also keeps the status. After an interrupted import Python would kill itself by the
-    signal in its place.
+    After an interrupted import Python would end by the signal, and lose the status.
     """
     try:
         sys.stdout.flush()

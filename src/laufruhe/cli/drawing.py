@@ -1,21 +1,18 @@
-"""Pictures, drawn by a process that gets ready while the problem is read and solved.
-
-What draws takes as long to import as what solves; neither waits for the other.
-"""
+"""Pictures, drawn by a process that imports matplotlib while the problem is read and solved."""
 
 from __future__ import annotations
 
 import gc
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Future
+from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeAlias
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from laufruhe.cli.screen import loudness, speak
+from laufruhe.cli.screen import Ask, loudness, speak
 from laufruhe.numerics.cores import processors
 from laufruhe.numerics.processes import Copy, Processes, called
 
@@ -23,62 +20,57 @@ if TYPE_CHECKING:
     from laufruhe.solvers.result import Result
 
 MOST = 3
-"""Processes that draw the pictures of a result: what one has imported, its twins need not."""
+"""Largest number of processes that draw the pictures of a result."""
 SELDOM = 200_000
-"""New objects after which a process looks for garbage: marks of pictures are many, and none of them is."""
-
-Ask: TypeAlias = Callable[..., Callable[[], Any]]
-"""Asks for a call by the name of what is called; gives what waits for its answer."""
+"""Number of new objects after which a process collects garbage: pictures have many, and little of it."""
 
 
 @contextmanager
 def artist(kinds: Sequence[str]) -> Iterator[Ask]:
-    """Who draws pictures as files of these kinds: another process, or this one where that can have no other."""
+    """Yield the function that requests pictures of these kinds: from another process, or this one if it is alone."""
     is_other = bool(kinds) and processors() > 1
-    with Processes(1, _copy() if is_other else ()) as workers:
+    copies: tuple[Copy, ...] = ()
+    if is_other and Copy.can_be():
+        # a fork has imported the libraries that solving and drawing share
+        import_module("laufruhe.solvers.conclusion")
+        copies = (Copy(),)
+    with Processes(1, copies) as workers:
         if is_other:
             workers.submit(gc.set_threshold, SELDOM)
             workers.submit(speak, loudness())
             workers.submit(called, "laufruhe.plots:get_ready")
-        yield partial(_asked, workers if is_other else None)
+        yield partial(_request, workers if is_other else None)
 
 
-def _copy() -> tuple[Copy, ...]:
-    """A process that has imported what deciding and drawing both need; none where this one cannot be copied."""
-    if not Copy.can_be():
-        return ()
-    import_module("laufruhe.solvers.conclusion")
-    return (Copy(),)
-
-
-def _asked(workers: Processes | None, name: str, *args: Any) -> Callable[[], Any]:
+def _request(workers: Processes | None, name: str, *args: Any) -> Callable[[], Any]:
     here = partial(called, name, *args)
-    # an engine of somebody's own making may not be told to another process
-    with suppress(AttributeError, TypeError, ValueError):
-        return here if workers is None else partial(_answered, workers.submit(called, name, *args), here)
-    return here
+    if workers is None:
+        return here
+    try:
+        future = workers.submit(called, name, *args)
+    except (AttributeError, TypeError, ValueError):
+        # classes of a user may have no pickle
+        return here
 
+    def result() -> Any:
+        with suppress(BrokenExecutor):
+            return future.result()
+        return here()
 
-def _answered(there: Future[Any], here: Callable[[], Any]) -> Any:
-    with suppress(BrokenExecutor):
-        return there.result()
-    return here()
+    return result
 
 
 def drawing(ask: Ask, result: Result, folder: Path, kinds: Sequence[str]) -> Callable[[], dict[str, str]]:
-    """Have a result drawn into a folder; gives what waits for the pictures, SVG by their names."""
+    """Request the pictures of a result in a folder; return a function that waits for SVG by their names."""
     if not kinds:
         return dict
-    return ask("laufruhe.plots:draw_in_shares", _bare(result), folder, kinds, min(MOST, processors() - 1))
-
-
-def _bare(result: Result) -> Result:
-    """Without what only reading and solving need of the problem."""
+    # functions that read and solve have no pickle
     problem = replace(result.problem, origin=None)
     if problem.phasing is not None:
-        problem = replace(problem, phasing=replace(problem.phasing, layout=_untold, realise=_untold))
-    return replace(result, problem=problem, error=float)
+        problem = replace(problem, phasing=replace(problem.phasing, layout=_no_design, realise=_no_design))
+    drawn = replace(result, problem=problem, error=float)
+    return ask("laufruhe.plots:draw_in_shares", drawn, folder, kinds, min(MOST, processors() - 1))
 
 
-def _untold(*_: Any) -> NoReturn:
+def _no_design(*_: Any) -> NoReturn:
     raise NotImplementedError("a problem that is drawn makes no other designs")

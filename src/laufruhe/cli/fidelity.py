@@ -1,4 +1,4 @@
-"""The two commands on speed and accuracy: what they compute and what they write."""
+"""Commands `explain` and `trade` on speed and accuracy of models."""
 
 from __future__ import annotations
 
@@ -30,26 +30,23 @@ from laufruhe.report.web_page import as_html
 from laufruhe.studies.trade import Trade, effort, seconds, trade, traded_part
 
 Pages = dict[str, bytes]
-"""What is written, by the names of the files."""
+"""Contents of files by their names."""
 
 
 def explained(path: Path, tolerance: float) -> tuple[str, Callable[[], str]]:
-    """Text of what a scene needs, and what makes JSON of it."""
+    """Return the text on the fidelity that a problem needs, and a function that makes JSON of it."""
     problem = _with_objective(path)
-    if problem.load_terms:
-        choice, times = choose(problem, tolerance), _load_times
-    else:
-        choice, times = needs(problem), _mount_times
-    both = times(problem, choice)
+    choice = choose(problem, tolerance) if problem.load_terms else needs(problem)
+    both = _load_times(problem, choice) if problem.load_terms else _mount_times(problem, choice)
     return explain.as_text(problem, choice, tolerance, both), lambda: explain.as_json(problem, choice, tolerance, both)
 
 
 def _load_times(problem: Problem, choice: Choice) -> tuple[float, float]:
-    """Milliseconds of another design, as chosen and exact over the whole cycle."""
+    """Return the milliseconds of one design at the chosen fidelity, and exactly over the whole cycle."""
     whole = Fidelity(samples=problem.fidelity.samples, crank_inertia=problem.fidelity.crank_inertia)
     times = []
     for fidelity, prune in ((choice.fidelity, True), (whole, False)):
-        # the rest as given: what it costs to evaluate does not change with it
+        # the time does not depend on the other decisions
         fixed = replace(problem, fidelity=fidelity, decisions=problem.unbalances, phasing=None)
         designs = prepare(fixed, prune)
         start = np.zeros((1, 1 + designs.columns))
@@ -58,14 +55,17 @@ def _load_times(problem: Problem, choice: Choice) -> tuple[float, float]:
 
 
 def _mount_times(problem: Problem, choice: Choice) -> tuple[float, float]:
-    """Milliseconds of what is asked of mounts, with the loads that it needs and with all."""
+    # milliseconds of mount measures with the loads that they need, and with all loads
     needed = problem if choice.numbers[0] else replace(problem, points=())
     times = [1e3 * seconds(lambda p=p: objective_value(p, evaluate(p))) for p in (needed, problem)]  # type: ignore[misc]
     return times[0], times[1]
 
 
 def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> tuple[Document, str, Callable[[], str]]:
-    """Pages and pictures of every problem, an index of several; what is to be shown, the page of it, and JSON."""
+    """Write pages and pictures of every problem, and an index of several.
+
+    Return the document to show, the name of its page, and a function that makes JSON.
+    """
     read = [(path, _with_objective(path)) for path in paths]
     of_wheels = [(path, problem.name) for path, problem in read if Kind.FLYWHEEL in kinds_of(problem)]
     if len(of_wheels) == len(read):
@@ -74,44 +74,43 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     paths, problems = zip(
         *((path, problem) for path, problem in read if Kind.FLYWHEEL not in kinds_of(problem)), strict=True
     )
-    found: dict[int, Trade] = {}
+    trades: dict[int, Trade] = {}
     for k, one, pages in _measured(paths, problems, say):
-        found[k] = one
+        trades[k] = one
         names = [f"{problems[k].name}.{end}" for end in ("md", "png", "html")]
         with files.staged(files.Set(folder, "--out", "trade", names, adds=True)) as stage:
             for name, page in pages.items():
                 (stage / name).write_bytes(page)
-    if len(found) < len(problems):
-        what = f"{len(found)} of {len(problems)} problems are measured, with pages in {folder}"
+    if len(trades) < len(problems):
+        what = f"{len(trades)} of {len(problems)} problems are measured, with pages in {folder}"
         raise SolverError(f"the time limit is over: {what}; raise it")
-    trades = [found[k] for k in range(len(problems))]
+    ordered = [trades[k] for k in range(len(problems))]
+
+    def as_json() -> str:
+        return "[" + ",\n".join(report.as_json(one).strip() for one in ordered) + "]\n"
+
     if len(read) == 1:
-        return _page(paths[0], trades[0]), f"{problems[0].name}.html", lambda: _together(trades)
-    index = report.index(trades, [name for _, name in of_wheels])
+        return _page(paths[0], ordered[0]), f"{problems[0].name}.html", as_json
+    index = report.index(ordered, [name for _, name in of_wheels])
     with files.staged(files.Set(folder, "--out", "trade", ["README.md"], adds=True)) as stage:
         files.write(stage / "README.md", index.as_markdown(""))
-    return index, "README.md", lambda: _together(trades)
-
-
-def _together(trades: Sequence[Trade]) -> str:
-    """JSON of them all."""
-    return "[" + ",\n".join(report.as_json(one).strip() for one in trades) + "]\n"
+    return index, "README.md", as_json
 
 
 def _measured(
     paths: Sequence[Path], problems: Sequence[Problem], say: Callable[[str], None]
 ) -> Iterator[tuple[int, Trade, Pages]]:
-    """One problem measured here, several side by side, as they come; with its pages."""
+    """Yield index, measurements and pages of every problem; several are measured in parallel."""
     if len(problems) == 1 and given() is None:
         one = trade(problems[0], lambda text: say(f"{problems[0].name}: {text}"))
         yield 0, one, _pages(paths[0], one)
         return
-    # what takes long comes first, so that the last to end are short
+    # longest first, so that all end at about the same time
     order = sorted(range(len(problems)), key=lambda k: effort(problems[k]), reverse=True)
     pieces = [(paths[k], tables_of(paths[k])) for k in order]
     with (
         executor_for(min(len(pieces), count_of())) as executor,
-        closing(each(_measured_there, pieces, executor, patient=True)) as answers,
+        closing(each(_measured_by_worker, pieces, executor, patient=True)) as answers,
     ):
         for place, answer in answers:
             if answer is not None:
@@ -120,8 +119,8 @@ def _measured(
                 yield k, replace(one, problem=traded_part(problems[k])), pages
 
 
-def _measured_there(piece: tuple[Path, dict[str, Any]]) -> tuple[Trade, Pages] | None:
-    """By a worker, which has no use for the file; what of the problem is no number stays there. None out of time."""
+def _measured_by_worker(piece: tuple[Path, dict[str, Any]]) -> tuple[Trade, Pages] | None:
+    """Return measurements without functions, which have no pickle, and pages; None if time is over."""
     path, tables = piece
     try:
         one = trade(load_tables(tables, path))
@@ -133,7 +132,7 @@ def _measured_there(piece: tuple[Path, dict[str, Any]]) -> tuple[Trade, Pages] |
 
 
 def _pages(path: Path, one: Trade) -> Pages:
-    """What is written of a problem: its page, in two forms, and the picture where there is one."""
+    """Return the page of a problem as Markdown and HTML, and its picture if there is one."""
     from laufruhe.plots.style import as_png, as_svg
     from laufruhe.plots.trade import figure, has_picture
 
@@ -147,7 +146,6 @@ def _pages(path: Path, one: Trade) -> Pages:
 
 
 def _page(path: Path, one: Trade, picture: str | None = None) -> Document:
-    """The page of a problem; a picture by its name."""
     return report.trade_document(one, picture, typed("laufruhe", "trade", str(path)))
 
 

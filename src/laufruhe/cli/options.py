@@ -1,4 +1,4 @@
-"""What may be typed beside a command: arguments and options, each with its words."""
+"""Arguments and options of commands, with their help."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ import typer
 
 
 def examples(*lines: str) -> str:
-    """Return what stands at the end of a command's help."""
+    """Return the examples at the end of a command's help."""
     return "\b\n" + "\n".join([f"Example{'s' * (len(lines) > 1)}:", *(f"  {line}" for line in lines)])
 
 
 def _completed(kinds: str) -> Callable[[str], list[str]]:
-    """Names that a shell may complete: of engines, of ready problems, or both."""
+    """Return a function that completes names of engines, ready problems, or both."""
 
     def names(incomplete: str) -> list[str]:
         from laufruhe.files.catalogue import engines

@@ -1,4 +1,4 @@
-"""Questions about an engine of the user's own: each answer is tried before the next question is asked."""
+"""Questions about an engine that the user describes; each answer is checked before the next question."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from laufruhe.machine.layouts import LAYOUTS
 
 Answers: TypeAlias = Mapping[str, Any]
 _LAYOUTS = ("inline", "vee", "boxer")
-# of answers that are lists, which may be empty
+# separators of answers that are lists, which may be empty
 _SEPARATORS = {"firing_order": r"[-,;\s]+", "throws": r"[,;\s]+"}
 
 
 @dataclass(frozen=True)
 class _Question:
-    """One key of [engine].
+    """Question about a key of [engine].
 
     Attributes
     ----------
     usual
-        Answer that Enter alone gives.
+        Default answer.
     among
-        All answers there are, where they are few.
+        All possible answers; empty if there are many.
     """
 
     key: str
@@ -62,28 +62,22 @@ _QUESTIONS = (
 
 
 def described() -> tuple[str, dict[str, Any]]:
-    """Title and [engine] of an engine that the user describes."""
+    """Return title and [engine] of an engine that the user describes."""
     title: str = asked("Title", "My engine", str)
     answers: dict[str, Any] = {}
     for question in _QUESTIONS:
         if _is_asked(question.key, answers):
-            words = f"{question.words}{_hint(question, answers)}"
-            usual = _order(answers) if question.key == "firing_order" else question.usual
-            answers[question.key] = asked(words, usual, partial(_tried, question, dict(answers)))
+            hint, usual = f" ({', '.join(question.among)})" if question.among else "", question.usual
+            if question.key == "firing_order":
+                usual = _usual_order(answers)
+                if LAYOUTS[answers["layout"]].takes("bank_stagger"):
+                    hint = f" (1 to {answers['cylinders'] // 2} are the left bank, front to rear)"
+            answers[question.key] = asked(f"{question.words}{hint}", usual, partial(_read, question, dict(answers)))
     return title, {key: value for key, value in answers.items() if value != []}
 
 
-def _hint(question: _Question, answers: Answers) -> str:
-    if question.among:
-        return f" ({', '.join(question.among)})"
-    if question.key == "firing_order" and LAYOUTS[answers["layout"]].takes("bank_stagger"):
-        half = answers["cylinders"] // 2
-        return f" (1 to {half} are the left bank, front to rear)"
-    return ""
-
-
 def asked(words: str, usual: str, read: Callable[[str], Any]) -> Any:
-    """What `read` makes of an answer; asked again, with what was wrong, where it raises `InputError`."""
+    """Ask until `read` accepts the answer without `InputError`, and return its result."""
 
     def typed(text: str) -> Any:
         if not text.isprintable():
@@ -98,7 +92,7 @@ def asked(words: str, usual: str, read: Callable[[str], Any]) -> Any:
 
 
 def _is_asked(key: str, answers: Answers) -> bool:
-    """Whether a key means anything for what is described so far."""
+    """Return True if a key applies to the engine described so far."""
     count = answers.get("cylinders")
     if not isinstance(count, int):
         return True
@@ -108,7 +102,7 @@ def _is_asked(key: str, answers: Answers) -> bool:
     return {
         "bank_angle": kind.takes(key),
         "split_pin_angle": kind.takes(key),
-        # banks on common throws may stand in one plane
+        # banks on common throws may lie in one plane
         "bank_stagger": kind.takes(key) and kind.cylinders_per_throw == 1,
         "firing_order": several and ("firing_order" not in answers or (unordered and "throws" in answers)),
         "throws": several and unordered,
@@ -116,13 +110,13 @@ def _is_asked(key: str, answers: Answers) -> bool:
     }.get(key, True)
 
 
-def _tried(question: _Question, before: Answers, text: str) -> Any:
-    """An answer as a file has it; `InputError` where no engine has it beside those before."""
+def _read(question: _Question, before: Answers, text: str) -> Any:
+    # the answer as a file has it
     if question.among and text not in question.among:
         raise refused(question.key, text, "is none of these", nearest(text, question.among))
     between = _SEPARATORS.get(question.key)
     value = _value(text) if between is None else [_value(part) for part in re.split(between, text) if part]
-    _try({**before, question.key: value})
+    _check({**before, question.key: value})
     return value
 
 
@@ -133,8 +127,8 @@ def _value(text: str) -> int | float | str:
     return text
 
 
-def _try(answers: Answers) -> None:
-    """`InputError` where one of the answers cannot be, all that is not yet answered as usual."""
+def _check(answers: Answers) -> None:
+    """Raise `InputError` for impossible answers; later questions have their default answers."""
     table = dict(answers)
     for question in _QUESTIONS:
         if question.usual and question.key not in table and _is_asked(question.key, table):
@@ -142,19 +136,19 @@ def _try(answers: Answers) -> None:
     try:
         engine_of_table("an engine", {key: value for key, value in table.items() if value != []}, Path("laufruhe"))
     except InputError as error:
-        # what is missing may be answered later
+        # missing keys may be answered later
         later = {f"engine.{question.key}" for question in _QUESTIONS if question.key not in answers}
         blamed = [one for one in error.complaints if one.where not in later]
         if blamed:
             raise InputError(error.source, tuple(blamed)) from None
 
 
-def _order(answers: Answers) -> str:
-    """Firing order of an engine of the catalogue that can be that of this one; empty where there is none."""
+def _usual_order(answers: Answers) -> str:
+    # firing order of the first possible engine of the catalogue
     for one in engines().values():
         order = one.engine.get("firing_order", ())
         if one.engine["layout"] == answers["layout"] and len(order) == answers["cylinders"]:
             with suppress(InputError):
-                _try({**answers, "firing_order": order})
+                _check({**answers, "firing_order": order})
                 return written(order)
     return ""

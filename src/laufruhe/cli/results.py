@@ -1,4 +1,4 @@
-"""The files of a result, and what of it is shown; imported while its pictures are drawn."""
+"""Files of a result, and its tables on the screen; imported while its pictures are drawn."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
 
-from laufruhe.cli.request import Request, timed
-from laufruhe.cli.screen import complain, is_quiet
+from laufruhe.cli.screen import Request, complain, is_quiet, timed
 from laufruhe.live import live_model
 from laufruhe.present.pictures import PICTURES
 from laufruhe.report import files
@@ -21,19 +20,15 @@ from laufruhe.solvers.result import Result, Status
 
 
 def write_results(
-    request: Request,
-    result: Result,
-    stage: Path,
-    copy: Path | None,
-    drawn: Callable[[], dict[str, str]],
+    request: Request, result: Result, stage: Path, copy: Path | None, drawn: Callable[[], dict[str, str]],
     say: Callable[[str], None],
-) -> None:
-    """All files of a result into a folder that exists, and into a copy of the JSON; its times are those of all parts.
+) -> None:  # fmt: skip
+    """Write all files of a result into a folder, and a copy of its JSON.
 
     Parameters
     ----------
     drawn
-        Waits for the pictures: SVG by their names.
+        Function that waits for the pictures: SVG by their names.
     """
     if request.animated:
         from laufruhe.plots.motion import animate
@@ -49,7 +44,10 @@ def write_results(
         if request.kinds:
             say("drawing")
         with timed(result.timing, "plots"):
-            _get_ready()
+            # imports of the page and the screen run while pictures are drawn
+            template()
+            if not is_quiet():
+                import_module("laufruhe.report.screen")
             pictures = drawn()
         document = document.showing(pictures)
         files.write(stage / files.REPORT, document.as_markdown(f".{request.kinds[0]}" if request.kinds else ""))
@@ -60,15 +58,8 @@ def write_results(
         files.write(place, as_json(result, request.series))
 
 
-def _get_ready() -> None:
-    """Load what makes the page and the tables on the screen, while pictures are drawn."""
-    template()
-    if not is_quiet():
-        import_module("laufruhe.report.screen")
-
-
 def show(request: Request, result: Result, folder: Path) -> None:
-    """Tables on the screen, or JSON there and tables beside it."""
+    """Print tables, or JSON with the tables on standard error."""
     text = as_json(result, request.series) if request.json == "-" else None
     if text is not None:
         sys.stdout.write(text)

@@ -1,4 +1,4 @@
-"""What every command says and how it ends: complaints, exit statuses, progress, and data on the screen."""
+"""Output and end of every command: complaints, exit statuses, progress, and data on the screen."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TextIO, TypeAlias
+from typing import Any, TextIO, TypeAlias
 
 import typer
 
@@ -25,16 +26,49 @@ _loudness: ContextVar[int] = ContextVar("loudness", default=PLAIN)
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 LONGEST = 10_000
-"""Characters of a command that is shown."""
+"""Largest number of characters of a printed command."""
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 Shown: TypeAlias = str | Callable[[TextIO], None]
-"""What a command shows: a text, or what writes one to a screen."""
+"""Output of a command: a text, or a function that writes one to a stream."""
+
+
+Ask: TypeAlias = Callable[..., Callable[[], Any]]
+"""Function that requests a call by name, and returns a function that waits for the result."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """Arguments of `solve` and `evaluate`."""
+
+    verb: str
+    problem: Path
+    json: str | None
+    out: Path | None
+    kinds: tuple[str, ...]
+    ask: Ask
+    animated: bool = False
+    tolerance: float | None = None
+    series: bool = False
+
+    @property
+    def command(self) -> str:
+        """Command line that makes the same result again."""
+        words = ["laufruhe", self.verb, str(self.problem), *(("--series",) if self.series else ())]
+        return typed(*words, *([] if self.tolerance is None else ["--tolerance", f"{self.tolerance:g}"]))
+
+
+@contextmanager
+def timed(seconds: dict[str, float], what: str) -> Iterator[None]:
+    """Add the seconds of a part."""
+    started = time.perf_counter()
+    yield
+    seconds[what] = seconds.get(what, 0.0) + time.perf_counter() - started
 
 
 @contextmanager
 def handing_out(json: str | None, *problems: Path) -> Iterator[Callable[[Shown, Callable[[], str]], None]]:
-    """Text on the screen, data made where they were asked for; whether that can be written is found out on entry."""
+    """Yield a function that prints text and writes JSON; a file that cannot be written is refused on entry."""
     from laufruhe.report import files
 
     with ExitStack() as places:
@@ -47,7 +81,7 @@ def handing_out(json: str | None, *problems: Path) -> Iterator[Callable[[Shown, 
                     stream.write(shown)
                 else:
                     shown(stream)
-                # what cannot be written is told here
+                # errors of writing are raised here
                 stream.flush()
             if json == "-":
                 typer.echo(data(), nl=False)
@@ -58,7 +92,7 @@ def handing_out(json: str | None, *problems: Path) -> Iterator[Callable[[Shown, 
 
 
 def json_file(json: str | None, problems: Iterable[Path], places: ExitStack) -> Path | None:
-    """Where a copy of the data goes, if one is wanted as a file."""
+    """Return the staged path of the JSON file, if one is requested."""
     from laufruhe.report import files
 
     if json is None or json == "-":
@@ -70,7 +104,7 @@ def json_file(json: str | None, problems: Iterable[Path], places: ExitStack) -> 
 
 
 def above_zero(option: str, value: float, example: str, below: float = math.inf) -> float:
-    """Refuse a value that is no number above zero, or none below another."""
+    """Return an option's value, refused unless it is above zero and below another number."""
     if not 0.0 < value < below:
         most = "" if math.isinf(below) else f" and below {below:g}"
         raise refused(option, f"{value:g}", f"must be a number above zero{most}", f"try {example}")
@@ -78,45 +112,38 @@ def above_zero(option: str, value: float, example: str, below: float = math.inf)
 
 
 def share_below_one(option: str, value: float) -> float:
-    """Refuse a tolerance that is no share of the objective: all of it or more would mean nothing."""
+    """Return a relative tolerance, refused unless it is between zero and one."""
     return above_zero(option, value, "1e-3", below=1.0)
 
 
 @contextmanager
-def in_time(seconds: float | None) -> Iterator[None]:
-    """What is typed as --time-limit: searches within end then, with the best that they have."""
+def resources(seconds: float | None, scheduler: str | None) -> Iterator[None]:
+    """Apply --time-limit to searches, and --scheduler to parallel work."""
     from laufruhe.numerics.budget import limited
 
-    with limited(seconds if seconds is None else above_zero("--time-limit", seconds, "60")):
-        yield
+    with ExitStack() as stack:
+        stack.enter_context(limited(seconds if seconds is None else above_zero("--time-limit", seconds, "60")))
+        if scheduler is not None:
+            from laufruhe.numerics.cluster import cluster
+            from laufruhe.numerics.workers import working_on
 
-
-@contextmanager
-def at_work(scheduler: str | None) -> Iterator[None]:
-    """What is typed as --scheduler: whoever works there does what can be done side by side."""
-    if scheduler is None:
-        yield
-        return
-    from laufruhe.numerics.cluster import cluster
-    from laufruhe.numerics.workers import working_on
-
-    with cluster(scheduler) as workers, working_on(workers):
+            stack.enter_context(working_on(stack.enter_context(cluster(scheduler))))
         yield
 
 
 def typed(*words: str) -> str:
-    """Return a command as it is typed, with escapes in place of what no screen should be sent."""
+    """Return a command as it is typed, with escapes for characters that are not printed."""
     return printed(shlex.join(words), LONGEST)
 
 
 def complain(lines: str) -> None:
-    """To standard error."""
+    """Print lines on standard error."""
     typer.echo(lines, err=True)
 
 
 @contextmanager
 def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was written") -> Iterator[None]:
-    """What went wrong as one line a complaint, and as an exit status."""
+    """Turn errors into one line each and an exit status."""
     try:
         yield
     except InputError as error:
@@ -129,17 +156,17 @@ def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was writt
         complain(printed(f"{path}: {error}"))
         raise typer.Exit(FAILED) from None
     except (KeyboardInterrupt, typer.Abort) as end:
-        # the latter at a question, which stands on the line before
+        # an abort at a question leaves the cursor behind it
         complain("\n" * isinstance(end, typer.Abort) + f"laufruhe: {interrupted}")
         raise typer.Exit(INTERRUPTED) from None
     except MemoryError:
         complain(f"{printed(str(path))}: needs more memory than there is; ask for less at once")
         raise typer.Exit(FAILED) from None
     except BrokenPipeError:
-        # whoever read the output has gone; click ends quietly
+        # the reader of the output has gone; click ends quietly
         raise
     except OSError as error:
-        # what has no name of its own goes to the screen, or to where that was sent
+        # output without a file name goes to the screen, or where that is redirected
         what = f"'{printed(str(error.filename))}'" if error.filename else "the output"
         remedy = "make room, or name another place" if error.errno in _FULL else "name another place"
         complain(f"laufruhe: {what} cannot be written ({error.strerror or error}); {remedy}")
@@ -148,7 +175,7 @@ def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was writt
 
 @contextmanager
 def spoken(quiet: bool, verbose: bool) -> Iterator[None]:
-    """What is typed as -q and -v, before a command or behind it: nothing but errors is said within, or every step."""
+    """Apply -q and -v, before a command or behind it."""
     if quiet and verbose:
         raise refused("-q", "", "is given beside -v", "give one of them")
     before = _loudness.set(QUIET if quiet else VERBOSE if verbose else _loudness.get())
@@ -159,26 +186,25 @@ def spoken(quiet: bool, verbose: bool) -> Iterator[None]:
 
 
 def is_quiet() -> bool:
-    """Whether nothing but errors is wanted, and data where they are asked for."""
+    """Return True if -q is given: errors and requested data only."""
     return _loudness.get() == QUIET
 
 
 def loudness() -> int:
-    """What is typed as -q and -v."""
+    """Return the level of -q and -v."""
     return _loudness.get()
 
 
 def speak(loud: int) -> None:
-    """In a process that a command has made: be as loud as it."""
+    """Set the level of -q and -v in a worker process."""
     _loudness.set(loud)
     warn_plainly()
 
 
 def open_closed_streams() -> None:
-    """Give the command the standard streams that its caller closed, so that no file of results takes their numbers.
+    """Open standard streams that the caller closed, so that no file of results gets their numbers.
 
-    Nothing comes from such an input, and what is said to such an error stream is lost. An output refuses what is
-    written, as a full device does: the answer was asked for there.
+    Input is empty and errors are lost; output refuses to be written, as a full device does.
     """
     for name, access in (("stdin", os.O_RDONLY), ("stdout", os.O_RDONLY), ("stderr", os.O_WRONLY)):
         if getattr(sys, name) is None:
@@ -187,7 +213,7 @@ def open_closed_streams() -> None:
 
 
 def warn_plainly() -> None:
-    """Warnings of this package as lines of the command; none with -q."""
+    """Print warnings of this package as single lines; none with -q."""
     usual = warnings.formatwarning
 
     def format_of(
@@ -202,7 +228,7 @@ def warn_plainly() -> None:
 
 @contextmanager
 def progress() -> Iterator[Callable[[str], None]]:
-    """Says what is going on: in place on a terminal, line by line with -v; silent in a pipe, and with -q."""
+    """Yield a function that reports progress: in place on a terminal, in lines with -v, not in a pipe or with -q."""
     if _loudness.get() == VERBOSE:
         begun = time.monotonic()
         yield lambda text: typer.echo(f"{time.monotonic() - begun:7.1f} s  {text}", err=True)
@@ -216,14 +242,14 @@ def progress() -> Iterator[Callable[[str], None]]:
 
 
 def pace() -> float:
-    """Seconds between two words of one search: in place more often than as lines."""
+    """Return the seconds between two reports of a search: lines are less frequent."""
     return 2.0 if _loudness.get() == VERBOSE else 0.1
 
 
 class Watched:
-    """Listens to searches: says how far they are, with the best value so far, its bound, and the gap.
+    """Listener that reports progress of searches, with the best value, its bound and the gap.
 
-    Of searches within each other, the value is that of the outermost one that has one.
+    For nested searches, the value is that of the outermost search with a value.
     """
 
     def __init__(self, say: Callable[[str], None], unit: str) -> None:
@@ -232,20 +258,16 @@ class Watched:
         self._next = 0.0
 
     def __call__(self, step: Step) -> None:
-        """One step; few of many are said."""
+        """Report a step, unless the last report was a moment ago."""
         depth = len(step.within)
         self._known = {at: known for at, known in self._known.items() if at < depth} | {depth: step}
         if time.monotonic() >= self._next:
             self._next = time.monotonic() + pace()
             valued = next((known for known in self._known.values() if math.isfinite(known.value)), step)
-            self._say(", ".join([*step.within, self._counted(step), *self._standing(valued)]))
+            count = f"{step.done} of {step.whole}" if step.whole else f"{step.done}" if step.done else ""
+            self._say(", ".join([*step.within, f"{step.what}: {count}" if count else step.what, *self._values(valued)]))
 
-    def _counted(self, step: Step) -> str:
-        if step.whole:
-            return f"{step.what}: {step.done} of {step.whole}"
-        return f"{step.what}: {step.done}" if step.done else step.what
-
-    def _standing(self, step: Step) -> Iterator[str]:
+    def _values(self, step: Step) -> Iterator[str]:
         from laufruhe.present.numbers import figure
         from laufruhe.prove.certificate import USELESS
 

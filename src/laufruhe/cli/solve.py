@@ -1,4 +1,4 @@
-"""What solve, evaluate and check do with what was typed: problem in, result out, files in their place."""
+"""Commands `solve` and `evaluate`: read a problem, write and show its result."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from pathlib import Path
 
 import typer
 
-from laufruhe.cli.check import doubt
+from laufruhe.cli.check import warn
 from laufruhe.cli.drawing import drawing
-from laufruhe.cli.request import Request, timed
-from laufruhe.cli.screen import DONE, FAILED, Watched, json_file, progress, share_below_one
+from laufruhe.cli.screen import DONE, FAILED, Request, Watched, json_file, progress, share_below_one, timed
 from laufruhe.errors import SolverError, counted
 from laufruhe.files.reader import load
 from laufruhe.numerics.progress import Listener
@@ -21,46 +20,46 @@ from laufruhe.problem.problem import Problem
 from laufruhe.report import files
 from laufruhe.solvers.result import Result, Status
 
-# each has a folder of its own
+# endings of their folders
 _SUFFIX = {"solve": "", "evaluate": "-as-given"}
 
 Answer = Callable[[Problem, Listener], Result]
 
 
 def run(request: Request, answer: Answer) -> None:
-    """Read, answer, write and show; leaves with the exit status of the result."""
+    """Read a problem, write and show its result, and exit with its status."""
     with progress() as say:
-        result, show = _written(request, answer, say)
+        result, show = _write(request, answer, say)
     show()
     raise typer.Exit(DONE if result.status.has_design else FAILED)
 
 
-def stated(problem: Problem, _: Listener) -> Result:
-    """The design as given."""
+def evaluate(problem: Problem, _: Listener) -> Result:
+    """Return the result of the design as given."""
     from laufruhe.solvers import state
 
     return state(problem)
 
 
-def solved(problem: Problem, listener: Listener) -> Result:
-    """The solver's result, or a result that says why there is none."""
-    from laufruhe.solvers import solve, state
+def solve(problem: Problem, listener: Listener) -> Result:
+    """Return the solver's result, or a failed result with its message."""
+    import laufruhe.solvers as solvers
 
     try:
-        return solve(replace(problem, sharply=True), listener, further=True)
+        return solvers.solve(replace(problem, sharply=True), listener, further=True)
     except SolverError as error:
-        return replace(state(problem, to_start_from=True), status=Status.FAILED, message=str(error))
+        return replace(solvers.state(problem, to_start_from=True), status=Status.FAILED, message=str(error))
 
 
-def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tuple[Result, Callable[[], None]]:
-    """The result, its files in place, and what shows it."""
+def _write(request: Request, answer: Answer, say: Callable[[str], None]) -> tuple[Result, Callable[[], None]]:
+    """Return the result after writing its files, and a function that shows it."""
     say("reading the problem")
     seconds: dict[str, float] = {}
     with timed(seconds, "load"):
         problem = load(request.problem)
         if request.tolerance is not None:
             problem = replace(problem, tolerance=share_below_one("--tolerance", request.tolerance))
-    doubt(problem, request.problem)
+    warn(problem, request.problem)
     with ExitStack() as places:
         # a file called '...toml' would name the folder above
         name = (problem.name.strip(".") or "problem") + _SUFFIX[request.verb]
@@ -73,7 +72,7 @@ def _written(request: Request, answer: Answer, say: Callable[[str], None]) -> tu
         say(f"deciding {what}" if problem.open_names else "evaluating")
         result = answer(problem, Watched(say, problem.objective_unit or ""))
         drawn = drawing(request.ask, result, stage, request.kinds)
-        # what writes is imported while pictures are drawn
+        # imported while pictures are drawn
         from laufruhe.cli.results import show, write_results
 
         result = replace(result, timing={**result.timing, **seconds})

@@ -1,4 +1,4 @@
-"""The study command: points, files, and what is said while they are made."""
+"""Command `study`: run the parts of a study and write their files."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from laufruhe.cli.drawing import Ask
-from laufruhe.cli.screen import pace, typed
+from laufruhe.cli.screen import Ask, pace, typed
 from laufruhe.errors import printed, refused
 from laufruhe.files.reader import shown_as
 from laufruhe.numerics.cores import processors
@@ -21,10 +20,10 @@ from laufruhe.studies.runner import run
 from laufruhe.studies.scenes import Scenes
 
 
-def studied(
+def run_study(
     path: Path, out: Path | None, jobs: int | None, say: Callable[[str], None], ask: Ask, kinds: Sequence[str]
 ) -> tuple[str, Callable[[], str]]:
-    """Files of a study in their folder; what to say of them, and what makes JSON of all parts."""
+    """Write the files of a study; return the message about them, and a function that makes JSON of all parts."""
     if jobs is not None and jobs < 1:
         raise refused("--jobs", str(jobs), "must be one or more", "leave it out to use every core")
     started = time.perf_counter()
@@ -33,7 +32,7 @@ def studied(
     kept = folder / KEPT
     option, names = "--out" if out is not None else "results", file_names(study)
     with files.staged(files.Set(folder, option, "study", names, beside=[KEPT])) as stage:
-        datasets, seconds = run(study, path.parent, kept, _Teller(say), jobs or processors())
+        datasets, seconds = run(study, path.parent, kept, _Progress(say), jobs or processors())
         command = typed("laufruhe", "study", str(path))
 
         def draw(picture: Picture, place: Path) -> Callable[[], str]:
@@ -46,16 +45,16 @@ def studied(
     return text, lambda: as_json(study, datasets, seconds)
 
 
-def checked(path: Path) -> tuple[str, Callable[[], str]]:
-    """How many points the parts of a study have, as text, and what makes JSON of it."""
+def check_study(path: Path) -> tuple[str, Callable[[], str]]:
+    """Return the number of points of a study as text, and a function that makes JSON of it."""
     study, scenes = load_study(path), Scenes(path.parent)
     points = {part.name: len(part.points(scenes)) for part in study.study.parts}
-    told = f"ok: {printed(study.title)}, {sum(points.values())} points\n"
-    return told, lambda: strict({"title": study.title, "points": points})
+    text = f"ok: {printed(study.title)}, {sum(points.values())} points\n"
+    return text, lambda: strict({"title": study.title, "points": points})
 
 
-class _Teller:
-    """How many points are done and how long the others will take, not more often than can be read."""
+class _Progress:
+    """Reports the number of finished points and the remaining time, at a readable pace."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self._say = say
@@ -68,12 +67,9 @@ class _Teller:
             self._first = (now, done)
         elif now - self._last < pace() and done < whole:
             return
-        self._last = now
-        self._say(f"{done} of {whole} points{self._left(now, done, whole)}")
-
-    def _left(self, now: float, done: int, whole: int) -> str:
-        began, before = self._first or (now, done)
-        if done <= before or done == whole:
-            return ""
-        seconds = (now - began) / (done - before) * (whole - done)
-        return f", about {seconds / 60.0:.0f} min left" if seconds >= 100.0 else f", about {seconds:.0f} s left"
+        self._last, left = now, ""
+        began, before = self._first
+        if before < done < whole:
+            seconds = (now - began) / (done - before) * (whole - done)
+            left = f", about {seconds / 60.0:.0f} min left" if seconds >= 100.0 else f", about {seconds:.0f} s left"
+        self._say(f"{done} of {whole} points{left}")

@@ -360,14 +360,14 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
         own = {key: getattr(part, key) for key in _INHERITED if getattr(part, key) is not None}
         if part.rod_ratio is not None or part.rod_length is not None:
             own |= {"rod_ratio": part.rod_ratio, "rod_length": part.rod_length}
-        shaft, rotating = shafts[part.shaft], part.rotating_mass
+        own_shaft, rotating = shafts[part.shaft], part.rotating_mass
         if rotating is None:
             rotating = table.rotating_mass / pins.count((part.shaft, part.x, direction(part.throw)))
         with blamed_on(where):
             mechanism, _ = _mechanism(table.model_copy(update=own))
-            first = (part.bank_angle - part.throw) / shaft.ratio % (math.tau / abs(shaft.ratio))
+            first = (part.bank_angle - part.throw) / own_shaft.ratio % (math.tau / abs(own_shaft.ratio))
             fires = part.firing_angle if part.firing_angle is not None else first
-            parts.append(mechanism.cylinder(k, part.x, part.throw, part.bank_angle, fires, rotating, shaft))
+            parts.append(mechanism.cylinder(k, part.x, part.throw, part.bank_angle, fires, rotating, own_shaft))
     return led_parts(parts, {shaft.name: Open.of(shaft.lead).start for shaft in table.shafts})
 
 

@@ -35,9 +35,7 @@ def _single_each(given: object) -> object:
 
 
 Value: TypeAlias = Annotated[bool | int | float | str, BeforeValidator(_single)]
-Setting: TypeAlias = Annotated[
-    bool | int | float | str | list[bool | int | float | str], BeforeValidator(_single_each)
-]
+Setting: TypeAlias = Annotated[bool | int | float | str | list[bool | int | float | str], BeforeValidator(_single_each)]
 End: TypeAlias = Annotated[int | float | str | None, BeforeValidator(_single)]
 
 
