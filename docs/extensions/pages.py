@@ -129,7 +129,7 @@ means that it does not.
 SHORT = {
     "NONE": "-",
     "AFFINE": "affine",
-    "BIAFFINE": "affine while unbalances are held",
+    "BIAFFINE": "affine while unbalances are fixed",
     "BENT": "the same between bearings",
     "MASSES": "affine in masses that follow",
     "SHIFT": "sum of shifted parts",

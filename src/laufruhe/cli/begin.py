@@ -9,7 +9,7 @@ from pathlib import Path
 
 import typer
 
-from laufruhe.cli.questions import asked, described
+from laufruhe.cli.questions import ask, ask_engine
 from laufruhe.cli.screen import typed
 from laufruhe.errors import printed, refused
 from laufruhe.files import drafts, ready
@@ -23,7 +23,7 @@ _TAKEN = ("exists already and is another", "name another place")
 
 def write_draft(file: Path, name: str | None) -> str:
     """Write a problem file with its schema beside it, and return the message about it."""
-    source = _checked_source(name) if name is not None else _asked_source(file)
+    source = _checked_source(name) if name is not None else _requested_source(file)
     command = "solve"
     if source is not None and source not in engines():
         entry = ready.ready_named(source)
@@ -31,7 +31,7 @@ def write_draft(file: Path, name: str | None) -> str:
         copies = ready.copies([source]).items()
         texts = {file.name if other == entry.path.name else other: text for other, text in copies}
     else:
-        draft = drafts.draft_of_table(*described(), file) if source is None else drafts.draft_of_engine(source)
+        draft = drafts.draft_of_table(*ask_engine(), file) if source is None else drafts.draft_of_engine(source)
         texts = {file.name: draft, **dict([ready.schema_file()])}
     _write({file.parent / other: text for other, text in texts.items()})
     return f"{printed(str(file))}: ready to be changed; then: {typed('laufruhe', command, str(file))}\n"
@@ -41,7 +41,7 @@ def _someone_answers() -> bool:
     return sys.stdin.isatty()
 
 
-def _asked_source(file: Path) -> str | None:
+def _requested_source(file: Path) -> str | None:
     """Ask for an engine or a ready problem; None for an engine that the user describes."""
     if not _someone_answers():
         rule, remedy = "asks questions, and nobody is there to answer", "add --from with an engine or a ready problem"
@@ -49,7 +49,7 @@ def _asked_source(file: Path) -> str | None:
     if file.exists():
         raise refused("file", str(file), *_TAKEN)
     typer.echo("An engine of the catalogue (laufruhe engines), a ready problem (laufruhe examples),")
-    source: str | None = asked(
+    source: str | None = ask(
         "or nothing, to describe your own", "", lambda text: _checked_source(text) if text else None
     )
     return source

@@ -215,9 +215,9 @@ def study(
 
     Finished points are kept; a study that was interrupted goes on where it stopped.
     """
-    kept = "interrupted; finished points are kept, the same command goes on"
+    interrupted = "interrupted; finished points are kept, the same command goes on"
     with (
-        exit_statuses(problem, kept), spoken(quiet, verbose), handing_out(json, problem) as hand_out,
+        exit_statuses(problem, interrupted), spoken(quiet, verbose), handing_out(json, problem) as hand_out,
         resources(time_limit, scheduler), artist(kind.kinds) as ask,
     ):  # fmt: skip
         from laufruhe.cli.study import run_study

@@ -61,22 +61,22 @@ _QUESTIONS = (
 )
 
 
-def described() -> tuple[str, dict[str, Any]]:
+def ask_engine() -> tuple[str, dict[str, Any]]:
     """Return title and [engine] of an engine that the user describes."""
-    title: str = asked("Title", "My engine", str)
+    title: str = ask("Title", "My engine", str)
     answers: dict[str, Any] = {}
     for question in _QUESTIONS:
-        if _is_asked(question.key, answers):
+        if _applies(question.key, answers):
             hint, usual = f" ({', '.join(question.among)})" if question.among else "", question.usual
             if question.key == "firing_order":
                 usual = _usual_order(answers)
                 if LAYOUTS[answers["layout"]].takes("bank_stagger"):
                     hint = f" (1 to {answers['cylinders'] // 2} are the left bank, front to rear)"
-            answers[question.key] = asked(f"{question.words}{hint}", usual, partial(_read, question, dict(answers)))
+            answers[question.key] = ask(f"{question.words}{hint}", usual, partial(_read, question, dict(answers)))
     return title, {key: value for key, value in answers.items() if value != []}
 
 
-def asked(words: str, usual: str, read: Callable[[str], Any]) -> Any:
+def ask(words: str, usual: str, read: Callable[[str], Any]) -> Any:
     """Ask until `read` accepts the answer without `InputError`, and return its result."""
 
     def typed(text: str) -> Any:
@@ -91,7 +91,7 @@ def asked(words: str, usual: str, read: Callable[[str], Any]) -> Any:
     return typer.prompt(words, default=usual, show_default=bool(usual), value_proc=typed)
 
 
-def _is_asked(key: str, answers: Answers) -> bool:
+def _applies(key: str, answers: Answers) -> bool:
     """Return True if a key applies to the engine described so far."""
     count = answers.get("cylinders")
     if not isinstance(count, int):
@@ -131,7 +131,7 @@ def _check(answers: Answers) -> None:
     """Raise `InputError` for impossible answers; later questions have their default answers."""
     table = dict(answers)
     for question in _QUESTIONS:
-        if question.usual and question.key not in table and _is_asked(question.key, table):
+        if question.usual and question.key not in table and _applies(question.key, table):
             table[question.key] = _value(question.usual)
     try:
         engine_of_table("an engine", {key: value for key, value in table.items() if value != []}, Path("laufruhe"))

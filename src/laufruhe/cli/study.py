@@ -29,17 +29,17 @@ def run_study(
     started = time.perf_counter()
     study = load_study(path)
     folder = out if out is not None else Path("results") / shown_as(path).stem
-    kept = folder / KEPT
+    points = folder / KEPT
     option, names = "--out" if out is not None else "results", file_names(study)
     with files.staged(files.Set(folder, option, "study", names, beside=[KEPT])) as stage:
-        datasets, seconds = run(study, path.parent, kept, _Progress(say), jobs or processors())
+        datasets, seconds = run(study, path.parent, points, _Progress(say), jobs or processors())
         command = typed("laufruhe", "study", str(path))
 
         def draw(picture: Picture, place: Path) -> Callable[[], str]:
             return ask("laufruhe.plots.picture:save_picture", picture, place, kinds)
 
         write_study(study, datasets, seconds, stage, command, say, draw, f".{kinds[0]}")
-    kept.unlink(missing_ok=True)
+    points.unlink(missing_ok=True)
     spent = "".join(f"{duration:8.1f} s on one core  {name}\n" for name, duration in seconds.items())
     text = f"{spent}done in {time.perf_counter() - started:.1f} s\n{files.placed(folder, files.PAGE)}\n"
     return text, lambda: as_json(study, datasets, seconds)

@@ -121,7 +121,7 @@ def nearest(word: str, words: Sequence[str], otherwise: str = "") -> str:
     return "use one of: " + ", ".join(holding) if holding else otherwise or "use one of: " + ", ".join(sorted(words))
 
 
-def beside(path: Path, otherwise: str) -> str:
+def nearest_file(path: Path, otherwise: str) -> str:
     """Return a remedy that names the file closest to a missing one."""
     names = [other.stem for other in path.parent.glob("*.toml")] if path.parent.is_dir() else []
     close = difflib.get_close_matches(path.stem, names, n=1, cutoff=_CLOSE)
@@ -208,10 +208,10 @@ def measured(text: str | float, unit: str, where: str, given: str | None = None)
     try:
         return units.parse(str(text), unit)
     except units.UnitError as error:
-        found = Complaint.of(error, where)
+        complaint = Complaint.of(error, where)
         # a key for units has no number
-        remedy = f"use {units.usual(unit)} ..." if given else found.remedy
-        raise Refused(where, given or text, found.rule, remedy) from None
+        remedy = f"use {units.usual(unit)} ..." if given else complaint.remedy
+        raise Refused(where, given or text, complaint.rule, remedy) from None
 
 
 @contextmanager
@@ -220,8 +220,8 @@ def blamed_on(where: str, value: str = "") -> Iterator[None]:
     try:
         yield
     except ModelError as error:
-        found = Complaint.of(error, where, value, remedy="correct it")
-        raise Refused(found.where, found.value or None, found.rule, found.remedy) from None
+        complaint = Complaint.of(error, where, value, remedy="correct it")
+        raise Refused(complaint.where, complaint.value or None, complaint.rule, complaint.remedy) from None
 
 
 def one_of(table: BaseModel, where: str, key: str, other: str, shown: Any = None, named: str = "") -> None:

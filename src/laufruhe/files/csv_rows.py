@@ -15,10 +15,10 @@ def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[t
     Columns are separated by commas, semicolons or tabs; with the latter two a comma may be the decimal sign. The first
     row may be a heading; rows that begin with # are skipped.
     """
-    beside, many = "give a CSV file beside the problem", "pair" if len(columns) == 2 else "row"
+    remedy, row_name = "give a CSV file beside the problem", "pair" if len(columns) == 2 else "row"
     try:
         if path.exists() and not path.is_file():
-            raise Refused(key, file, "is no file", beside)
+            raise Refused(key, file, "is no file", remedy)
         with path.open("rb") as stream:
             content = stream.read(MOST_BYTES + 1)
         if len(content) > MOST_BYTES:
@@ -26,7 +26,7 @@ def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[t
         text = content.decode("utf-8-sig")
     except (OSError, ValueError) as error:
         why = error.strerror or "error" if isinstance(error, OSError) else "it is no UTF-8 text"
-        raise Refused(key, file, f"cannot be read ({why})", beside) from None
+        raise Refused(key, file, f"cannot be read ({why})", remedy) from None
     separator = next((sign for sign in ";\t" if sign in text), ",")
     rows: list[tuple[float, ...]] = []
     heading = True
@@ -39,7 +39,7 @@ def rows_of(file: str, path: Path, key: str, columns: tuple[str, ...]) -> list[t
             rows.append(tuple(map(float, numbers)))
         except (ValueError, IndexError):
             if not heading:
-                rule = f"line {number} is no {many} of numbers"
+                rule = f"line {number} is no {row_name} of numbers"
                 raise Refused(key, file, rule, "write: " + ", ".join(columns)) from None
         heading = False
         if len(rows) > MOST_ROWS:

@@ -208,7 +208,6 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
 
 
 def _sharing_chambers(table: EngineTable, parts: Sequence[SliderCrank], gas: bool) -> tuple[SliderCrank, ...]:
-    """Return slider-cranks whose facing pistons have room between them and, with gas, share a chamber."""
     for k, part in enumerate(parts):
         for other in parts[:k]:
             if part.faces(other) and least_room(part, other) <= 0.0:

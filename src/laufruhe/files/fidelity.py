@@ -19,7 +19,6 @@ T = TypeVar("T", bound=BaseModel)
 
 
 def _with_knobs(table: type[T]) -> type[T]:
-    """Return the table with a key for every other fidelity option."""
     keys: dict[str, Any] = {}
     for knob in KNOBS:
         if knob.key not in table.model_fields:
@@ -30,7 +29,7 @@ def _with_knobs(table: type[T]) -> type[T]:
 
 @_with_knobs
 class FidelityTable(Table):
-    """How exactly the physics is computed; exact by default."""
+    """Fidelity of the physics; exact by default."""
 
     closed: ClassVar[str] = "says how exactly things are computed, not what the engine is"
 

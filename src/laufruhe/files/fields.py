@@ -362,11 +362,11 @@ class Table(BaseModel):
         cls, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         """Return the schema, without open numbers for a closed table."""
-        found = handler(schema)
+        reference = handler(schema)
         if cls.closed:
-            own = handler.resolve_ref_schema(found)
-            own |= without_open(own)
-        return found
+            resolved = handler.resolve_ref_schema(reference)
+            resolved |= without_open(resolved)
+        return reference
 
 
 def needed(text: str) -> Any:

@@ -68,8 +68,8 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
         numbers = [(key, "m", Open.of(getattr(table.rim, key))) for key in _SECTION]
         wheel, first = Flywheel(table.crankshaft_inertia or 0.0, _rim(table.rim)), 1
     if crank_inertia is not None:
-        rule, told = "is given by [flywheel] too", units.shown(crank_inertia, "kg m^2")
-        raise Refused("fidelity.crank_inertia", told, rule, "keep one: with this one loads feel the uneven speed")
+        rule, shown = "is given by [flywheel] too", units.shown(crank_inertia, "kg m^2")
+        raise Refused("fidelity.crank_inertia", shown, rule, "keep one: with this one loads feel the uneven speed")
     return wheel, [
         decision
         for k, (key, unit, number) in enumerate(numbers, first)

@@ -53,7 +53,7 @@ _ROUNDING = 1e-9
 
 
 class QuantityTable(Table):
-    """What part of a quantity counts."""
+    """Part of a quantity that counts."""
 
     closed: ClassVar[str] = "says what is asked of a design, and a search would ask for what is easiest"
 
@@ -81,14 +81,14 @@ class QuantityTable(Table):
 
 
 class TermTable(QuantityTable):
-    """One part of a weighted objective."""
+    """Term of a weighted objective."""
 
     quantity: QuantityName
     weight: f.Positive = 1.0
 
 
 class ObjectiveTable(QuantityTable):
-    """What is minimised: one quantity, or a weighted sum of terms."""
+    """Objective: one quantity, or a weighted sum of terms."""
 
     minimise: QuantityName | None = None
     terms: list[TermTable] = Field(default_factory=list)
@@ -336,8 +336,8 @@ def _check_unique(limits: Sequence[Limit]) -> None:
         for side in (side for side, is_given in sides if is_given):
             other = first.setdefault((limit.measure, limit.name, side, limit.outside if side == "outside" else None), k)
             if other != k:
-                beside = f"beside constraints[{other + 1}] ('{limits[other].name}')"
-                rule, remedy = f"limits '{limit.name}' once more, {beside}", "keep the tighter one, or give each a name"
+                rule = f"limits '{limit.name}' once more, beside constraints[{other + 1}] ('{limits[other].name}')"
+                remedy = "keep the tighter one, or give each a name"
                 raise Refused(f"constraints[{k + 1}].{side}", None, rule, remedy)
 
 

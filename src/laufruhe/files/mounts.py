@@ -139,7 +139,7 @@ class MountsTable(Table):
 
 
 class LoadCaseTable(Table):
-    """A load that is held: weight, a bump, a torque. Travel counts from where the engine stands without it."""
+    """Static load: weight, a bump, a torque. Travel counts from the position of the engine without it."""
 
     name: Name
     times_weight: f.Three[f.Factor] | None = f.told("The weight of the block, so many times along x, y and z.")

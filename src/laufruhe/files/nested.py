@@ -94,7 +94,7 @@ def _inside(annotation: Any, part: str | int) -> list[Any]:
 
 
 def _leaves(annotation: Any) -> Iterator[Any]:
-    """Yield the members of a union, and the notes of annotated types, without entries of lists."""
+    # members of a union and notes of annotated types, without entries of lists
     if isinstance(annotation, f.OneOrEach):
         yield from _leaves(annotation.inner)
     elif get_origin(annotation) is not list:

@@ -48,7 +48,7 @@ class IntervalsTable(Table):
 
 
 class PhasingTable(Table):
-    """How open throws, firing orders and shafts are decided."""
+    """Search of open throws, firing orders and shafts."""
 
     closed: ClassVar[str] = "is a limit, or says how a search goes"
 
@@ -286,7 +286,7 @@ def _most_even(phasing: Phasing, layout: Layout, throws: tuple[float, ...]) -> t
 def _closed(
     engine: EngineTable, count: int, bank: float | None = None, split: float | None = None, **keys: list[Any] | None
 ) -> EngineTable:
-    """Return [engine] with these numbers only of throws, firing order and angles."""
+    # of throws, firing order and angles, these alone are given
     update = {"cylinders": count, "throws": None, "firing_order": None, "bank_angle": bank, "split_pin_angle": split}
     return engine.model_copy(update=update | keys)
 

@@ -97,7 +97,7 @@ class Note:
 
 
 class SearchTable(Table):
-    """How far a search goes where the problem is not convex."""
+    """Extent of a search if the problem is not convex."""
 
     closed: ClassVar[str] = "says how a search goes, not what the engine is"
 

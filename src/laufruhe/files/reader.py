@@ -20,7 +20,7 @@ from laufruhe.extension import extended
 from laufruhe.files import edits, open_numbers
 from laufruhe.files.bearings import bearings_of, one_by_one
 from laufruhe.files.catalogue import with_catalogue
-from laufruhe.files.complaints import Refused, beside, complaints_of, in_file, key_path
+from laufruhe.files.complaints import Refused, complaints_of, in_file, key_path, nearest_file
 from laufruhe.files.engine import EngineTable, cycle_of, leads_of, moving_parts, piston_masses
 from laufruhe.files.fidelity import at_fidelity
 from laufruhe.files.flywheel import flywheel_of, geared_of
@@ -127,7 +127,6 @@ def shown_as(path: Path) -> Path:
 
 
 def _of_file(file: ProblemFile, path: Path) -> Problem:
-    """Return the problem of a file without its notes."""
     if file.geared_inertias and file.engine.throws is not None and file.engine.given_throws is None:
         rule = "are known of throws that are given, and engine.throws is open"
         raise Refused("geared_inertias", None, rule, "fix the throws, or leave them out")
@@ -212,7 +211,7 @@ def tables_of(path: Path) -> dict[str, Any]:
     except IsADirectoryError:
         raise _unreadable(path, "is a folder", "name a problem file in it") from None
     except FileNotFoundError:
-        raise _unreadable(path, "does not exist", beside(path, "check the path")) from None
+        raise _unreadable(path, "does not exist", nearest_file(path, "check the path")) from None
     except OSError as error:
         raise _unreadable(path, f"cannot be read ({error.strerror})", "check its permissions") from None
     return _whole(_parsed(content, path), path)

@@ -144,9 +144,9 @@ def _fault(text: str, offset: int, message: str) -> tuple[int, str, str]:
             return offset, "a comma is missing between two entries", "add it"
         if message.startswith(("Unclosed", "Expected ']")) or (is_next and "\n" in text[opened:offset]):
             return opened, f"{text[opened]} is not closed", f"add {_CLOSING[text[opened]]}"
-    for start, told in _STATEMENTS.items():
+    for start, rule_and_remedy in _STATEMENTS.items():
         if message.startswith(start):
-            return offset, *told
+            return offset, *rule_and_remedy
     if message == "Invalid value":
         if not ahead or ahead.startswith("#"):
             return offset, "no value follows", "write one, or leave the key out"

@@ -24,8 +24,8 @@ class Dependence(StrEnum):
     """Constant."""
     AFFINE = "affine"
     """For masses: sums of lengths of vectors that are affine."""
-    BIAFFINE = "affine while unbalances are held"
-    BENT = "affine between bearings while unbalances are held"
+    BIAFFINE = "affine while unbalances are fixed"
+    BENT = "affine between bearings while unbalances are fixed"
     """Has a kink where a place passes a bearing of its shaft (B4)."""
     MASSES = "affine in masses that follow, times a factor that goes one way"
     """Masses follow from sizes; the factor of each place is monotone in each size (Z2)."""
@@ -163,23 +163,23 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
     """Return the dependence of a channel on one kind of decision of a problem; UNKNOWN by default."""
     if CHANNELS.get(channel.name) is not channel:
         return Dependence.UNKNOWN
-    found = TABLE.get(channel.name, {}).get(kind, Dependence.UNKNOWN)
-    if found in (Dependence.NONE, Dependence.UNKNOWN):
-        return found
+    entry = TABLE.get(channel.name, {}).get(kind, Dependence.UNKNOWN)
+    if entry in (Dependence.NONE, Dependence.UNKNOWN):
+        return entry
     if kind is Kind.PLACE and channel.name in _OF_BEARINGS and not _moves_carried(problem):
         return Dependence.NONE
-    if found is Dependence.BENT and problem.fidelity.crankshaft != "cut":
+    if entry is Dependence.BENT and problem.fidelity.crankshaft != "cut":
         # a beam hands loads on to farther bearings
         return Dependence.SMOOTH
     if kind is Kind.STIFFNESS and problem.engine.block is None and channel.is_load:
         # rigid mounts share a force by their places alone
         return Dependence.NONE
-    if kind is Kind.LEAD and found in (Dependence.SHIFT, Dependence.SWING) and shares_gas(problem):
+    if kind is Kind.LEAD and entry in (Dependence.SHIFT, Dependence.SWING) and shares_gas(problem):
         # a lead moves one piston against another that has the same gas
         return Dependence.SMOOTH
-    if problem.fidelity.is_uneven and found in _OF_EVEN_SPEED and kind is not Kind.STAR:
+    if problem.fidelity.is_uneven and entry in _OF_EVEN_SPEED and kind is not Kind.STAR:
         return Dependence.SMOOTH
-    return found
+    return entry
 
 
 def kinds_of(problem: Problem) -> frozenset[Kind]:

@@ -245,7 +245,7 @@ def measured(evaluation: Evaluation, k: int, channel: LoadChannel = MOUNT_FORCE)
 
 
 def _one_period(base: Fraction, signals: Sequence[Spectrum], samples: int) -> tuple[list[Spectrum], int]:
-    """Return signals over the period in which all repeat, and the samples of the cycle that fall into it."""
+    # signals over the period in which all repeat, and the samples of the cycle in it
     once = common_base([signal.repeats() for signal in signals])
     periods = times(once, base)
     if not periods or samples % periods:

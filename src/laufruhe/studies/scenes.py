@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from laufruhe.errors import Complaint, InputError, ModelError, refused
-from laufruhe.files.complaints import beside, in_file, nearest
+from laufruhe.files.complaints import in_file, nearest, nearest_file
 from laufruhe.files.nested import texts_in
 from laufruhe.files.phasing import without_shafts
 from laufruhe.files.reader import load_tables, tables_of
@@ -72,7 +72,7 @@ class Scenes:
         path = self.folder / name
         if path not in self._files:
             if not path.exists():
-                advice = beside(path, "paths begin in the folder of the study")
+                advice = nearest_file(path, "paths begin in the folder of the study")
                 raise refused("file", "", "is named by the study and does not exist", advice, path)
             self._files[path] = tables_of(path)
             if "study" in self._files[path]:
