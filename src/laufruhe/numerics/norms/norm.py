@@ -95,6 +95,8 @@ class Cones:
         Whether the rows of every signal are counted from a vector that is free.
     under
         Linear functions of the heads that are at most zero: their numbers, heads and factors, shapes (n,).
+    squares
+        Heads a, b, c with t_a^2 <= t_b t_c, shapes (n,): rotated cones of heads alone.
     """
 
     value: Array
@@ -103,6 +105,7 @@ class Cones:
     whole: bool = False
     centred: bool = False
     under: tuple[NDArray[np.intp], NDArray[np.intp], Array] | None = None
+    squares: tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]] | None = None
 
 
 class SmoothProgram(Protocol):

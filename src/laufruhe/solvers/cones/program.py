@@ -76,6 +76,17 @@ def program_of(
             at, heads, factors = block.cones.under
             rows.add(at, block.first + heads, factors, np.zeros(int(at.max()) + 1))
             rows.cones.append(clarabel.NonnegativeConeT(int(at.max()) + 1))
+        if block.cones.squares is not None:
+            # t_a^2 <= t_b t_c as |(t_b - t_c, 2 t_a)| <= t_b + t_c
+            square, left_factor, right_factor = (block.first + heads for heads in block.cones.squares)
+            top = 3 * np.arange(len(square))
+            rows.add(
+                np.concatenate([top, top, top + 1, top + 1, top + 2]),
+                np.concatenate([left_factor, right_factor, left_factor, right_factor, square]),
+                np.repeat([-1.0, -1.0, -1.0, 1.0, -2.0], len(square)),
+                np.zeros(3 * len(square)),
+            )
+            rows.cones += [clarabel.SecondOrderConeT(3)] * len(square)
     starts = [_add_norm(rows, block, problem) for block in blocks]
     return blocks, starts, rows, _cost(problem, blocks, rows)
 
