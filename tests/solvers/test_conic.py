@@ -45,6 +45,8 @@ def _stated(norm: AffineNorm, x: Any) -> Any:
         return cp.max(cp.hstack([weights[own] / weights[own].sum() @ cp.norm(rows[own], axis=1) for own in blocks]))
     if norm.norm is NORMS["rms"]:
         return cp.norm(cp.multiply(np.sqrt(weights)[:, None], rows), "fro")
+    if norm.norm is NORMS["rmq"]:
+        return cp.pnorm(cp.multiply(weights**0.25, cp.norm(rows, axis=1)), 4)
     if norm.norm is NORMS["peak to peak"]:
         centres = cp.Variable((k // steps, d))
         return 2.0 * cp.max(cp.norm(rows - np.repeat(np.eye(k // steps), steps, axis=0) @ centres, axis=1))
@@ -86,7 +88,9 @@ def test_same_optimum_and_bound_as_cvxpy(name: str, norm: Norm) -> None:
     assert solution.x is not None
     # an optimum of zero is found to the solver's share of what is balanced
     atol = 1e-7 * affine.objective(np.zeros(affine.size))
-    assert affine.objective(solution.x) == pytest.approx(value, rel=1e-6, abs=atol)
+    # cvxpy states a fourth power to fewer digits
+    digits = 5e-6 if norm is NORMS["rmq"] else 1e-6
+    assert affine.objective(solution.x) == pytest.approx(value, rel=digits, abs=atol)
     assert lower_bound(affine, solution.multipliers).value == pytest.approx(value, rel=1e-5, abs=atol)
 
 

@@ -1,0 +1,122 @@
+"""(sum_k w_k |v_k|^4)^(1/4): the root mean quad, by which vibration with peaks is rated (ISO 2631-1, eq. 4)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.norms.norm import (
+    Cones,
+    Grid,
+    Kinks,
+    Norm,
+    SmoothProgram,
+    amplitudes,
+    lengths,
+    mean_square,
+)
+from laufruhe.numerics.spectrum import Spectrum
+
+
+class RootMeanQuad(Norm):
+    """The fourth root of the mean of fourth powers."""
+
+    name = "rmq"
+    is_convex = of_row_lengths = is_pointwise = True
+
+    def value(self, grid: Grid, rows: Array) -> float:
+        """Return (sum_k w_k |v_k|^4)^(1/4)."""
+        size = np.where(grid.weights > 0.0, lengths(rows), 0.0)
+        longest = float(size.max(initial=0.0))
+        return longest and longest * float(grid.weights @ (size / longest) ** 4) ** 0.25
+
+    def subgradient(self, grid: Grid, rows: Array) -> Array:
+        """Return w_k |v_k|^2 v_k over the cube of the norm."""
+        value = self.value(grid, rows)
+        if value == 0.0:
+            return np.zeros_like(rows)
+        share = np.where(grid.weights > 0.0, lengths(rows) / value, 0.0)
+        return np.asarray((grid.weights * share**2)[:, None] * (rows / value))
+
+    def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks:
+        """Return the gradient: the norm is smooth but at zero."""
+        return Kinks(self.subgradient(grid, rows) if rows.any() else z)
+
+    def dual_norm(self, grid: Grid, z: Array) -> float:
+        """Return (sum_k w_k (|z_k| / w_k)^(4/3))^(3/4); infinite where a row without weight is used."""
+        size, weights = lengths(z), grid.weights
+        if np.any((weights == 0.0) & (size > 0.0)):
+            return math.inf
+        density = size / np.where(weights > 0.0, weights, 1.0)
+        longest = float(density.max(initial=0.0))
+        return longest and longest * float(weights @ (density / longest) ** (4.0 / 3.0)) ** 0.75
+
+    def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
+        """Return the gradient at the design."""
+        return self.subgradient(grid, rows)
+
+    def of_lengths(self, lengths: Array, weights: Array) -> Array:
+        """Return the norms of many designs."""
+        return np.asarray(np.sqrt(np.sqrt(np.dot(np.square(np.square(lengths)), weights))))
+
+    def cones(self, grid: Grid) -> Cones:
+        """Return the heads t_k, s_k, r_k, T: t_k^2 <= s_k T, s_k^2 <= r_k T, sum_k w_k r_k <= T."""
+        count = len(grid.weights)
+        length, top = np.arange(count), np.full(count, 3 * count)
+        value = np.zeros(3 * count + 1)
+        value[-1] = 1.0
+        return Cones(
+            value,
+            length,
+            np.ones(count),
+            under=(
+                np.zeros(count + 1, dtype=np.intp),
+                np.append(2 * count + length, 3 * count),
+                np.append(grid.weights, -1.0),
+            ),
+            squares=(
+                np.concatenate([length, count + length]),
+                np.concatenate([count + length, 2 * count + length]),
+                np.concatenate([top, top]),
+            ),
+        )
+
+    def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+        """Return the norm of the rows and of one length of the share of `unit`, less that length."""
+        import casadi as ca
+
+        squares = ca.sum2(rows * rows) / unit**2
+        return unit * (ca.sqrt(ca.sqrt(ca.dot(ca.DM(grid.weights), squares * squares) + share**4)) - share)
+
+    def limited(
+        self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
+    ) -> tuple[Any, float, float]:
+        """Return the mean of fourth powers, which is smooth at zero."""
+        import casadi as ca
+
+        squares = ca.sum2(rows * rows)
+        return ca.dot(ca.DM(grid.weights), squares * squares), most**4, 4.0 * most**3
+
+    def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
+        """Return a bound by Hölder's inequality: |v|^4 has at most the largest square times the mean square."""
+        fourth = [float((amplitudes(s) ** 2 * mean_square(s)).mean()) for s in signals]
+        return float(shares @ np.array(fourth)) ** 0.25
+
+    def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
+        """Return how far the means of samples and of orders differ, and what orders beyond these add at most.
+
+        |v|^4 has four times the orders of v, so that a mean of more samples than these is the integral.
+        """
+        sampled, exact, beyond = 0.0, 0.0, 0.0
+        for signal, share in zip(signals, shares, strict=True):
+            series = signal.series
+            sampled += share * float((lengths(series.sample(steps)) ** 4).mean())
+            exact += share * float((lengths(series.sample(4 * len(series.coefficients) + 1)) ** 4).mean())
+            if signal.corners is not None:
+                sums, roots = map(lengths, signal.corners.beyond(len(signal.coefficients), float(signal.base)))
+                beyond += share * float((sums**2 * roots**2).mean())
+        return float(abs(sampled**0.25 - exact**0.25) + beyond**0.25)
