@@ -67,6 +67,7 @@ roll moment                         a a a  b m >  >  0 0  0
 surging force                       a a a  b m >  >  0 0  0
 swaying couple                      a a a  b m >  >  0 0  0
 mount force                         a a a  b m >  >  s s  0
+resultant mount force               a a a  b m >  >  s s  0
 mount travel                        a a a  b m >  >  s s  0
 main-bearing force                  a a a  v m >  >  0 0  0
 main-bearing pressure               a a a  v m >  >  0 0  0

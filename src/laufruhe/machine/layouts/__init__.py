@@ -16,11 +16,12 @@ from laufruhe.machine.layouts.parts import Parts
 from laufruhe.machine.layouts.places import Layout, stations
 from laufruhe.machine.layouts.radial import Radial
 from laufruhe.machine.layouts.vee import Vee, vee
+from laufruhe.machine.layouts.x_engine import XEngine
 
 LAYOUTS: Mapping[str, LayoutKind] = extended(
     "layouts",
     LayoutKind,
-    (Inline(), Vee(), Boxer(), OpposedPiston(), Delta(), Radial(), Parts()),
+    (Inline(), Vee(), Boxer(), OpposedPiston(), Delta(), Radial(), XEngine(), Parts()),
 )
 
 __all__ = [

@@ -124,6 +124,12 @@ def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads],
     return LoadChannel(name, unit, AT_MOUNTS, needs, signal=found, places=_names_of_mounts, of_wrench=True)
 
 
+def _resultant(loads: PointLoads) -> Spectrum:
+    if loads.mount_forces is None:
+        raise ValueError("this mounting has no resultant mount force")
+    return loads.mount_forces.each(lambda values: values.sum(axis=1, keepdims=True))
+
+
 _ON_CRANK: Where = (ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",))
 
 
@@ -149,6 +155,7 @@ def _of_places(
 
 
 MOUNT_FORCE = _on_mounts("mount force", "N", Needs.MOUNTS, lambda loads: loads.mount_forces)
+RESULTANT_MOUNT_FORCE = LoadChannel("resultant mount force", "N", ON_BLOCK, Needs.MOUNTS, signal=_resultant)
 MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: loads.mount_travel)
 AT_EACH_MOUNT = frozenset({MOUNT_FORCE, MOUNT_TRAVEL})
 """What bounds of mounts have formulas for, of the loads."""
@@ -188,7 +195,7 @@ def is_at_mounts(channel: Channel) -> bool:
 
 
 CHANNELS: Mapping[str, Channel] = extended("channels", Channel, (
-    MOUNT_FORCE, MOUNT_TRAVEL, *OF_BLOCK,
+    MOUNT_FORCE, RESULTANT_MOUNT_FORCE, MOUNT_TRAVEL, *OF_BLOCK,
     HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,
     SIDE_FORCE, FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS,
     ADDED_MASS, *OF_MOUNTING, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES,

@@ -26,6 +26,3 @@ class XEngine(LayoutKind):
         places = stations(throws, asked.spacing(throws))
         banks = tuple(bank for bank in BANKS for _ in range(throws))
         return Layout("x", places * 4, banks, (*range(throws),) * 4, (0.0,) * asked.cylinders, places)
-
-
-X_ENGINE = XEngine()

@@ -1,13 +1,12 @@
-"""What a share of the cycle does not exceed."""
+"""Peak of a load over its root mean square."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
-from pydantic import Field
 
 from laufruhe.numerics.norms import lengths
 from laufruhe.present import picture as p
@@ -17,11 +16,10 @@ from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.text import Text, marked_table, number
 
 
-class PercentilePart(Part):
-    """A percentile over the cycle of the first load that each case minimises, as given."""
+class CrestFactorPart(Part):
+    """Crest factor of the first load that each case minimises, in the baseline design."""
 
-    kind: Literal["percentile"]
-    share: Annotated[float, Field(gt=0.0, lt=100.0)] = 95.0
+    kind: Literal["crest factor"]
 
     def points(self, scenes: Scenes) -> list[Point]:
         """Return a point for each case, whose objective has to be a load."""
@@ -31,35 +29,35 @@ class PercentilePart(Part):
         return [Point(case) for case in self.cases]
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """Return the percentile [SI]."""
+        """Return the crest factor."""
         problem = scenes.problem(point)
         measure = next(term.measure for term in problem.objective if term.measure.is_load)
         rows = evaluate(problem).rows(measure)
-        return {"value": float(np.percentile(lengths(rows.vectors), self.share)), "unit": measure.channel.unit}
+        size = lengths(rows.vectors)
+        return {"value": float(size.max() / np.sqrt(np.square(size).mean()))}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return one number for each case."""
         values = [record["value"] for record in records]
-        words = f"what {self.share:g} % of the cycle does not exceed"
-        found = {"percentile": variable("case", values, words, records[0]["unit"])}
+        found = {"crest_factor": variable("case", values, "crest factor", "1")}
         return xr.Dataset(found, {"case": [point.case.name for point in points]}, self.about())
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
         """Return a row for each case."""
-        about = data["percentile"].attrs
+        about = data["crest_factor"].attrs
         rows = [
             [str(case), number(float(value))]
-            for case, value in zip(data["case"].values, data["percentile"].values, strict=True)
+            for case, value in zip(data["case"].values, data["crest_factor"].values, strict=True)
         ]
         return [marked_table(["case", f"{about['long_name']} [{about['units']}]"], rows)]
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
         """Return a mark for each case."""
-        about = data["percentile"].attrs
+        about = data["crest_factor"].attrs
         places = np.arange(data.sizes["case"], dtype=float)
-        marks: list[p.Mark] = [p.Line(places, data["percentile"].values, p.colour(0, 1), width=0.0, marker="o")]
+        marks: list[p.Mark] = [p.Line(places, data["crest_factor"].values, p.colour(0, 1), width=0.0, marker="o")]
         names = list(zip(places.tolist(), map(str, data["case"].values), strict=True))
         panel = p.Panel(marks, p.Axis(ticks=names), p.Axis(f"load [{about['units']}]"))
         words = f"{about['long_name'][:1].upper()}{about['long_name'][1:]}, a dot for each case."

@@ -1,0 +1,66 @@
+"""What a share of the cycle does not exceed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from pydantic import Field
+
+from laufruhe.numerics.norms import lengths
+from laufruhe.present import picture as p
+from laufruhe.problem.evaluation import evaluate
+from laufruhe.studies.part import Part, Record, variable
+from laufruhe.studies.scenes import Point, Scenes
+from laufruhe.studies.text import Text, marked_table, number
+
+
+class PercentilePart(Part):
+    """A percentile over the cycle of the first load that each case minimises, as given."""
+
+    kind: Literal["percentile"]
+    share: float = Field(95.0, gt=0.0, lt=100.0, description="Share of the cycle in percent.")
+
+    def points(self, scenes: Scenes) -> list[Point]:
+        """Return a point for each case, whose objective has to be a load."""
+        for case in self.cases:
+            if not any(term.measure.is_load for term in scenes.problem(Point(case)).objective):
+                raise scenes.refused(case, "objective", "is no load over the cycle", "minimise one")
+        return [Point(case) for case in self.cases]
+
+    def answer(self, point: Point, scenes: Scenes) -> Record:
+        """Return the percentile [SI]."""
+        problem = scenes.problem(point)
+        measure = next(term.measure for term in problem.objective if term.measure.is_load)
+        rows = evaluate(problem).rows(measure)
+        return {"value": float(np.percentile(lengths(rows.vectors), self.share)), "unit": measure.channel.unit}
+
+    def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
+        """Return one number for each case."""
+        values = [record["value"] for record in records]
+        words = f"what {self.share:g} % of the cycle does not exceed"
+        found = {"percentile": variable("case", values, words, records[0]["unit"])}
+        return xr.Dataset(found, {"case": [point.case.name for point in points]}, self.about())
+
+    @staticmethod
+    def table(data: xr.Dataset) -> list[Text]:
+        """Return a row for each case."""
+        about = data["percentile"].attrs
+        rows = [
+            [str(case), number(float(value))]
+            for case, value in zip(data["case"].values, data["percentile"].values, strict=True)
+        ]
+        return [marked_table(["case", f"{about['long_name']} [{about['units']}]"], rows)]
+
+    @staticmethod
+    def picture(data: xr.Dataset) -> p.Picture:
+        """Return a mark for each case."""
+        about = data["percentile"].attrs
+        places = np.arange(data.sizes["case"], dtype=float)
+        marks: list[p.Mark] = [p.Line(places, data["percentile"].values, p.colour(0, 1), width=0.0, marker="o")]
+        names = list(zip(places.tolist(), map(str, data["case"].values), strict=True))
+        panel = p.Panel(marks, p.Axis(ticks=names), p.Axis(f"load [{about['units']}]"))
+        words = f"{about['long_name'][:1].upper()}{about['long_name'][1:]}, a dot for each case."
+        return p.Picture(data.attrs["title"], words, [panel], p.credit(data))
