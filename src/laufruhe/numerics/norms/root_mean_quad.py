@@ -104,7 +104,7 @@ class RootMeanQuad(Norm):
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Return a bound by Hölder's inequality: |v|^4 has at most the largest square times the mean square."""
         fourth = [float((amplitudes(s) ** 2 * mean_square(s)).mean()) for s in signals]
-        return float(shares @ np.array(fourth)) ** 0.25
+        return math.sqrt(math.sqrt(float(shares @ np.array(fourth))))
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
         """Return how far the means of samples and of orders differ, and what orders beyond these add at most.
