@@ -17,7 +17,7 @@ from studies.parts import part_of
 X_FOUR = """
 title = "X engine of four cylinders on one throw"
 [engine]
-layout = "x"
+layout = "x-engine"
 cycle = "four-stroke"
 cylinders = 4
 throws = [0]

@@ -14,7 +14,7 @@ BANKS = tuple(math.radians(angle) for angle in (45.0, -45.0, 135.0, -135.0))
 class XEngine(LayoutKind):
     """Four banks at right angles, a throw for four cylinders."""
 
-    name = "x"
+    name = "x-engine"
     cylinders_per_throw = 4
     banks = 4
 
@@ -25,4 +25,4 @@ class XEngine(LayoutKind):
         throws = asked.cylinders // 4
         places = stations(throws, asked.spacing(throws))
         banks = tuple(bank for bank in BANKS for _ in range(throws))
-        return Layout("x", places * 4, banks, (*range(throws),) * 4, (0.0,) * asked.cylinders, places)
+        return Layout("x-engine", places * 4, banks, (*range(throws),) * 4, (0.0,) * asked.cylinders, places)
