@@ -61,7 +61,7 @@ class Complaint:
         return f"{printed(self.where, 120)}{shown}: {printed(self.rule, 300)}{remedy}"
 
     @classmethod
-    def of(cls, error: Exception, where: str, value: str = "", remedy: str = "") -> Complaint:
+    def from_error(cls, error: Exception, where: str, value: str = "", remedy: str = "") -> Complaint:
         """Return the complaint of an error, whose text is a rule and a remedy after '; '; `remedy` is the default."""
         text = str(error)
         if isinstance(error, KeyedError):

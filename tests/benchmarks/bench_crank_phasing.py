@@ -32,7 +32,7 @@ from laufruhe.machine.layouts import inline
 from laufruhe.physics.crank_stars import score_stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.present.tables import Table
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.report.sections import stars
 from laufruhe.solvers import solve
@@ -154,7 +154,7 @@ def joint(n: int) -> tuple[str, ...]:
     phasing = problem.phasing
     assert phasing is not None
     (family,), _ = families_of(phasing)
-    floor = nothing_of(problem)
+    floor = numerical_zero(problem)
     start = time.process_time()
     model = StarModel(phasing, family.space, family.geometry)
     found = search_designs(model, family.stars, 1, problem.tolerance, 90.0, floor)

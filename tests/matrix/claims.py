@@ -16,7 +16,7 @@ import laufruhe
 from laufruhe.errors import InputError, ModelError
 from laufruhe.machine import Engine
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, gap_of, room_of
 from laufruhe.solvers import Result, Status
@@ -95,7 +95,7 @@ def _broken(document: Document, problem: Problem, result: Result, folder: Path) 
     yield from _own_claims(document, problem, result, folder)
     bound, value = result.certificate.lower_bound, _evaluated(problem, result.final.engine, _fine(result))[0]
     best = min((other for other, allowed in others if allowed), default=math.inf)
-    nothing = nothing_of(problem, result.final.engine)
+    nothing = numerical_zero(problem, result.final.engine)
     # the design told is measured at its own angles
     missed = 2.0 * result.error_estimate * value
     if best < bound - room_of(value, SAME, nothing) - missed:
@@ -125,7 +125,7 @@ def _own_claims(document: Document, problem: Problem, result: Result, folder: Pa
     objective, certificate = result.objective, result.certificate
     assert objective is not None
     assert certificate is not None
-    value, nothing = objective.value, nothing_of(problem, result.final.engine)
+    value, nothing = objective.value, numerical_zero(problem, result.final.engine)
     if certificate.lower_bound > value * (1.0 + 1e-12):
         yield "its bound lies above its value"
     gap = gap_of(value, certificate.lower_bound, nothing)

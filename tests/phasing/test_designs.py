@@ -12,7 +12,7 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import load_tables
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.prove.certificate import Multipliers, Proof, gap_of, lower_bound
 from laufruhe.prove.throws.star_cut import cut_of
 from laufruhe.solvers import solve
@@ -52,7 +52,7 @@ def test_search_equals_solving_every_design(tmp_path, cylinders, name):
     # averages about the angles, which bound means, come near these
     problem = problem.at(replace(problem.fidelity, samples=4 * problem.fidelity.samples))
     model, stars = model_of(problem)
-    nothing = nothing_of(problem)
+    nothing = numerical_zero(problem)
     every = search_designs(model, stars, 10**9, 1e-4, nothing=nothing)
     found = search_designs(model, stars, 1, 1e-4, nothing=nothing)
     assert len(every.solved) == every.designs
@@ -90,7 +90,7 @@ def test_a_set_of_shafts_is_worth_what_an_engine_with_these_alone_is(tmp_path, b
     problem = engines.problem(tmp_path, 3, rest=engines.MOUNTS + weight + TWO_SHAFTS + engines.MOUNT_FORCE)
     model, stars = model_of(problem)
     star, owners = tuple(map(int, stars[0])), owners_of(model)
-    found, _ = solve_design(model, star, built, owners, 1e-4, nothing_of(problem))
+    found, _ = solve_design(model, star, built, owners, 1e-4, numerical_zero(problem))
     candidate = replace(
         model.phasing.star(star, model.space.phases, model.geometry), left_out=model.phasing.without(built)
     )

@@ -309,6 +309,6 @@ def test_throws_that_move_beside_a_spring_that_is_open() -> None:
     for angle, stiffness in itertools.product(np.radians([100, 110, 120, 130, 140]), (0.0, 0.5, 1.0)):
         own = both.phasing.realise(replace(start, throws=(0.0, float(angle), start.throws[2])))
         (decision,) = own.mount_decisions
-        held = own.held([decision.lower + stiffness * (decision.upper - decision.lower)])
+        held = own.fixed_at([decision.lower + stiffness * (decision.upper - decision.lower)])
         values += [objective_value(held, evaluate(held))]
     assert turned.objective.value <= min(values) * (1.0 + 1e-6)

@@ -31,7 +31,7 @@ unbalance = "0.03 kg m"
 
 def doubted(old: str = "", new: str = "") -> list[str]:
     assert old in SINGLE
-    return [str(doubt) for doubt in load(SINGLE.replace(old, new)).doubts]
+    return [str(doubt) for doubt in load(SINGLE.replace(old, new)).plausibility_warnings]
 
 
 def test_a_block_is_heavier_than_what_moves_in_it() -> None:
@@ -43,9 +43,9 @@ def test_a_block_is_heavier_than_what_moves_in_it() -> None:
     )
     block = "[block]\nmass = '{}'\ncentre_of_gravity = ['0 mm', '0 mm', '0 mm']\n"
     block += "inertia = ['1 kg m^2', '1 kg m^2', '1 kg m^2']\n"
-    (said,) = (str(doubt) for doubt in load(SINGLE + block.format("0.5 kg") + mounts).doubts)
+    (said,) = (str(doubt) for doubt in load(SINGLE + block.format("0.5 kg") + mounts).plausibility_warnings)
     assert said.startswith("mass of the block = 0.5 kg: is not more than the 0.6 kg of its pistons and cranks")
-    assert load(SINGLE + block.format("20 kg") + mounts).doubts == ()
+    assert load(SINGLE + block.format("20 kg") + mounts).plausibility_warnings == ()
 
 
 def test_a_usual_engine_raises_none() -> None:
@@ -77,7 +77,7 @@ def test_throws_without_a_firing_order_are_asked_about(told: str) -> None:
     engine = SINGLE.replace('layout = "inline"', vee).replace(
         "throws = [0]", f"throws = [45, 117, 333, 189, 261]\n{told}"
     )
-    found = [str(doubt) for doubt in load(engine).doubts]
+    found = [str(doubt) for doubt in load(engine).plausibility_warnings]
     assert found == ([] if told else [found[0]])
     assert told or found[0].startswith("firing: is of all 10 cylinders within one turn of two; give a firing order")
 
@@ -88,12 +88,12 @@ def test_twins_that_fire_within_one_turn_are_usual() -> None:
 
 def test_engines_that_were_built_raise_none() -> None:
     built = [load(draft_of_engine(key)) for key in engines()]
-    assert {problem.title: problem.doubts for problem in built if problem.doubts} == {}
+    assert {problem.title: problem.plausibility_warnings for problem in built if problem.plausibility_warnings} == {}
 
 
 @pytest.mark.parametrize("path", READY[::6], ids=lambda path: path.stem)
 def test_ready_problems_raise_none(path: object) -> None:
-    assert load(path).doubts == ()  # type: ignore[arg-type]
+    assert load(path).plausibility_warnings == ()  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("text", "is_one"), [("1,25 kg", True), (",5", True), ("1,250,000 N", False), ("1.25", False)])

@@ -16,7 +16,7 @@ from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.norms import NORMS, Grid, Norm
 from laufruhe.problem.decision import Decision, Domain, domains_of
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.nothing import OF_ORDERS, ROUNDING, nothing_of
+from laufruhe.problem.numerical_zero import OF_ORDERS, ROUNDING, numerical_zero
 from laufruhe.problem.sets import Interval, Sector
 from laufruhe.prove.certificate import Multipliers, Proof, Reach, best_bound, certified, kkt_residual, lower_bound
 from mounts.files import problem_of
@@ -112,12 +112,12 @@ class TestGap:
     def test_nothing_is_a_rounding_of_the_parts_and_not_of_the_sum(self, tmp_path: Path) -> None:
         """A balanced six has the parts of a single cylinder six times; soft mounts have no resonance of their own."""
         six = problem_of(tmp_path, SIX)
-        assert objective_value(six, evaluate(six)) < nothing_of(six)
+        assert objective_value(six, evaluate(six)) < numerical_zero(six)
         single = problem_of(tmp_path, SIX.replace("[0, 120, 240, 240, 120, 0]", "[0]"))
         parts = objective_value(single, evaluate(single))
         all_orders = problem_of(tmp_path, SIX.replace("[0, 120, 240, 240, 120, 0]", "[0]").replace("orders", "#"))
         whole = objective_value(all_orders, evaluate(all_orders))
-        assert nothing_of(six) == pytest.approx(6.0 * (ROUNDING * parts + OF_ORDERS * whole), rel=1e-9)
+        assert numerical_zero(six) == pytest.approx(6.0 * (ROUNDING * parts + OF_ORDERS * whole), rel=1e-9)
 
     @pytest.mark.parametrize(("order", "none"), [(1, True), (2, False)])
     def test_an_order_that_a_part_does_not_have_is_nothing(self, order: int, none: bool, tmp_path: Path) -> None:
@@ -126,7 +126,7 @@ class TestGap:
         problem = problem_of(
             tmp_path, yoke.replace("[0, 120, 240, 240, 120, 0]", "[0]").replace("shaking force", TORQUE)
         )
-        assert (0.0 < objective_value(problem, evaluate(problem)) <= nothing_of(problem)) is none
+        assert (0.0 < objective_value(problem, evaluate(problem)) <= numerical_zero(problem)) is none
 
 
 class TestBound:

@@ -191,7 +191,7 @@ def test_cylinders_that_fire_at_once_are_named(tmp_path: Path) -> None:
     page = result_document(result, (), "laufruhe evaluate twin.toml").as_markdown("")
     assert words in page
     assert "firing: is at once in cylinder 1 and cylinder 2; give a firing order" in page
-    assert parsed(result)["warnings"] == [str(doubt) for doubt in result.problem.doubts]
+    assert parsed(result)["warnings"] == [str(doubt) for doubt in result.problem.plausibility_warnings]
     assert fired(scenes.stated(scenes.GIVEN)) == "Firing order 1-3-4-2, every 180 deg."
 
 
@@ -203,7 +203,7 @@ def test_a_steam_engine_does_not_fire() -> None:
 def test_cylinders_that_are_meant_to_fire_at_once_raise_no_question(tmp_path: Path) -> None:
     path = tmp_path / "twin.toml"
     path.write_text(TWIN.replace("[engine]", "[engine]\nfires_together = true"), encoding="utf-8")
-    assert load(path).doubts == ()
+    assert load(path).plausibility_warnings == ()
 
 
 def test_roll_and_rocking_are_the_parts_of_the_moment() -> None:

@@ -14,7 +14,7 @@ from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.problem.decision import Decision, RotorDrive, domains_of
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.sets import Interval
 from laufruhe.solvers.conclusion import FEASIBLE
 from laufruhe.solvers.cones.conic import solve_cones
@@ -36,7 +36,7 @@ def test_a_peak_between_angles_keeps_its_limit() -> None:
         "objective": {"minimise": "mean rocking couple"},
     }  # fmt: skip
     problem = load_tables(table, Path("twin.toml"))
-    model, nothing = AffineModel(problem), nothing_of(problem)
+    model, nothing = AffineModel(problem), numerical_zero(problem)
     domains = model.domains
 
     def peak(x: np.ndarray) -> float:

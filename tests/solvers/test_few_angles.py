@@ -13,7 +13,7 @@ from lanes import first_fast
 from laufruhe.files.reader import load_tables
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.evaluation import evaluate, finely
+from laufruhe.problem.evaluation import evaluate, with_fine_sampling
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Status, solve
@@ -106,7 +106,7 @@ def test_a_limit_that_is_all_but_the_least_has_a_design(samples: int) -> None:
     }  # fmt: skip
     result = solve(load_tables(told, Path("single.toml")))
     assert result.status.has_design
-    assert 0.0 < finely(result.final).excess(result.problem.limits) <= KEPT
+    assert 0.0 < with_fine_sampling(result.final).excess(result.problem.limits) <= KEPT
 
 
 def out_of_reach() -> Problem:
@@ -141,7 +141,7 @@ def test_a_design_is_none_where_few_angles_alone_allow_it(samples: int, most: fl
         }  # fmt: skip
         result = solve(load_tables(told, Path("single.toml")))
         assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-        assert not met or finely(result.final).excess(result.problem.limits) <= KEPT
+        assert not met or with_fine_sampling(result.final).excess(result.problem.limits) <= KEPT
 
 
 def test_a_design_that_few_angles_alone_allow_is_not_one_that_was_overlooked() -> None:
@@ -153,7 +153,7 @@ def test_a_design_that_few_angles_alone_allow_is_not_one_that_was_overlooked() -
     def decide(asked: Problem) -> Result:
         result = solve(asked)
         met.append(not broken_limits(problem.limits, result.final))
-        assert broken_limits(problem.limits, finely(result.final))
+        assert broken_limits(problem.limits, with_fine_sampling(result.final))
         return result
 
     result = with_reachable(failed, problem, {Kind.UNBALANCE}, 1.0, decide)
@@ -245,7 +245,7 @@ def test_stiffness_is_excluded_by_what_the_cycle_has(throw: float, samples: int,
     )
     result = solve(asked)
     assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-    assert not met or finely(result.final).excess(asked.limits) <= KEPT
+    assert not met or with_fine_sampling(result.final).excess(asked.limits) <= KEPT
 
 
 @pytest.mark.parametrize("samples", [48, 60])

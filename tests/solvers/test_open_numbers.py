@@ -106,7 +106,7 @@ def test_a_pin_offset_and_a_stroke_are_those_of_an_independent_search(tmp_path: 
 def test_every_value_is_that_of_a_file_with_it(stroke: float, offset: float, share: float, tmp_path: Path) -> None:
     problem = loaded(tmp_path, ASIDE)
     values = {"web.balance_factor": share, "engine.stroke": stroke, "engine.offset": offset}
-    held = problem.held([values[decision.name] for decision in problem.decisions])
+    held = problem.fixed_at([values[decision.name] for decision in problem.decisions])
     given = problem.with_values(
         {name: value if name.endswith("factor") else f"{value!r} m" for name, value in values.items()}
     )
@@ -120,7 +120,7 @@ def test_what_follows_in_the_file_follows_an_open_number(tmp_path: Path) -> None
     text = changed(ASIDE, "throws = [0]", 'throws = [0, 180]\ncylinder_spacing = { between = ["90 mm", "120 mm"] }')
     problem = loaded(tmp_path, text)
     spacing = next(decision for decision in problem.decisions if decision.name == "engine.cylinder_spacing")
-    places = [part.x for part in problem.held([0.1], [spacing]).engine.slider_cranks]
+    places = [part.x for part in problem.fixed_at([0.1], [spacing]).engine.slider_cranks]
     assert places[0] - places[1] == pytest.approx(0.1, rel=1e-12)
     text = changed(changed(ASIDE, '"3000 rpm"', '{ between = ["2000 rpm", "4000 rpm"] }'), '"70 mm"',
                    '{ between = ["60 mm", "90 mm"] }')  # fmt: skip
@@ -128,7 +128,7 @@ def test_what_follows_in_the_file_follows_an_open_number(tmp_path: Path) -> None
     assert [decision.name for decision in problem.decisions][-2:] == [
         "operating_points.rated.speed", "mounts.positions.1.2",
     ]  # fmt: skip
-    held = problem.held([300.0, 0.08], problem.decisions[-2:])
+    held = problem.fixed_at([300.0, 0.08], problem.decisions[-2:])
     assert (held.points[0].speed, held.engine.mounts[0].position[1]) == pytest.approx((300.0, 0.08))
 
 
@@ -140,7 +140,7 @@ def test_limits_are_kept_by_what_is_searched() -> None:
     assert all(limit.active for limit in result.limits)
     for stroke in np.linspace(0.12, 0.15, 4):
         for offset in np.linspace(0.0, 0.02, 5):
-            held = problem.held([stroke, offset], problem.decisions[-2:])
+            held = problem.fixed_at([stroke, offset], problem.decisions[-2:])
             if max(evaluate(held).standing(limit).excess for limit in held.limits) <= 0.0:
                 assert laufruhe.solve(held).objective.value >= result.objective.value * (1.0 - 1e-5)
 
@@ -183,7 +183,7 @@ def test_an_engine_that_cannot_turn_is_left_out_and_not_built(tmp_path: Path) ->
     problem = loaded(tmp_path, text)
     rod = next(decision for decision in problem.decisions if decision.name == "engine.rod_length")
     with pytest.raises(ModelError, match="does not let the crank turn"):
-        problem.held([0.04], [rod])
+        problem.fixed_at([0.04], [rod])
     found = searched(problem)
     part = found.final.engine.slider_cranks[0]
     assert part.rod_length > part.crank_radius + abs(part.offset)
@@ -230,7 +230,7 @@ def test_every_number_of_a_file_is_open_or_refused_in_a_line(name: str) -> None:
             middle = 0.5 * (decision.lower + decision.upper)
             (drive,) = decision.address_drives
             drawn = load_tables(put(tables, place, drive.written(middle)), Path(f"{name}.toml"))
-            held = problem.held([middle], [decision])
+            held = problem.fixed_at([middle], [decision])
             assert (held.engine, held.points) == (drawn.engine, drawn.points)
     assert opened > 5
     assert not [line for line in refused if "\n" in line]

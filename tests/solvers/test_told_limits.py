@@ -10,7 +10,7 @@ import pytest
 
 from laufruhe.files.reader import load_tables
 from laufruhe.load_models.affine import AffineModel
-from laufruhe.problem.evaluation import evaluate, finely
+from laufruhe.problem.evaluation import evaluate, with_fine_sampling
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import best_bound
@@ -49,7 +49,7 @@ def test_leads_keep_limits_over_the_cycle(most: float, met: bool) -> None:
     )
     result = solve(asked)
     assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-    assert not met or finely(result.final).excess(asked.limits) <= KEPT
+    assert not met or with_fine_sampling(result.final).excess(asked.limits) <= KEPT
 
 
 def test_a_limit_that_nothing_open_moves_is_broken_where_many_angles_tell() -> None:

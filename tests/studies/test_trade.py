@@ -81,7 +81,7 @@ def test_a_search_begins_at_the_design_known_and_nowhere_else() -> None:
     problem = load(PROBLEMS / "tractor-four-shaft-heights.toml")
     sides = [(d.set.lower + 0.25 * (d.set.upper - d.set.lower)) * d.set.directions[0] for d in problem.decisions]
     values = [v.real if d.place_drives else v for d, v in zip(problem.decisions, sides, strict=True)]
-    moved = problem.held(values)
+    moved = problem.fixed_at(values)
     known = state(replace(moved, decisions=()))
     entries = tuple(e for d, v in zip(problem.decisions, values, strict=True) for e in decision_values(d, v))
     begun = _begun(problem, replace(known, problem=problem, decisions=entries))

@@ -41,5 +41,5 @@ def check_problem(path: Path) -> tuple[str, Callable[[], str]]:
 
 def warn(problem: Problem, path: Path) -> None:
     """Print plausibility warnings."""
-    for one in () if is_quiet() else problem.doubts:
+    for one in () if is_quiet() else problem.plausibility_warnings:
         complain(printed(f"{path}: warning: {one}"))

@@ -150,7 +150,7 @@ def exit_statuses(path: Path, interrupted: str = "interrupted, nothing was writt
         complain(str(error))
         raise typer.Exit(BAD_INPUT) from None
     except ModelError as error:
-        complain(str(InputError(str(path), (Complaint.of(error, error.where or "problem"),))))
+        complain(str(InputError(str(path), (Complaint.from_error(error, error.where or "problem"),))))
         raise typer.Exit(BAD_INPUT) from None
     except SolverError as error:
         complain(printed(f"{path}: {error}"))

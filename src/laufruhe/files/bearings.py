@@ -16,17 +16,17 @@ from laufruhe.machine.layouts import Throw
 class MainBearingTable(Table):
     """A main bearing."""
 
-    x: f.Length | None = f.told("Place along the shaft.")
-    beside_throws: f.PositiveLength | None = f.told(
+    x: f.Length | None = f.optional("Place along the shaft.")
+    beside_throws: f.PositiveLength | None = f.optional(
         "In place of x, a bearing in the middle between neighbouring throws, and one so far beyond either end."
     )
-    name: Name | None = f.told("Name of the bearing; by default its number from the front.")
+    name: Name | None = f.optional("Name of the bearing; by default its number from the front.")
     shaft: str = CRANKSHAFT.name
-    diameter: f.OpenPositiveLength | None = f.told(
+    diameter: f.OpenPositiveLength | None = f.optional(
         "Diameter of the journal; needed for a pressure and for friction power."
     )
-    width: f.OpenPositiveLength | None = f.told("Width of the journal; needed for a pressure.")
-    friction: f.NonNegative | None = f.told("Coefficient of friction; needed for friction power.")
+    width: f.OpenPositiveLength | None = f.optional("Width of the journal; needed for a pressure.")
+    friction: f.NonNegative | None = f.optional("Coefficient of friction; needed for friction power.")
 
 
 def one_by_one(tables: Sequence[MainBearingTable], throws: Sequence[Throw]) -> list[MainBearingTable]:
@@ -65,7 +65,7 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
             rule = "rubs on a journal whose diameter is missing"
             raise Refused(f"{where}.friction", table.friction, rule, "add diameter")
         name = table.name or str(k)
-        size = [None if each is None else Open.of(each).start for each in (table.diameter, table.width)]
+        size = [None if each is None else Open.from_value(each).start for each in (table.diameter, table.width)]
         bearing = Bearing(name, table.x or 0.0, size[0], size[1], table.friction, shafts[table.shaft])
         for other in bearings:
             if name == other.name:

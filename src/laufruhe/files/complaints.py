@@ -208,7 +208,7 @@ def measured(text: str | float, unit: str, where: str, given: str | None = None)
     try:
         return units.parse(str(text), unit)
     except units.UnitError as error:
-        complaint = Complaint.of(error, where)
+        complaint = Complaint.from_error(error, where)
         # a key for units has no number
         remedy = f"use {units.usual(unit)} ..." if given else complaint.remedy
         raise Refused(where, given or text, complaint.rule, remedy) from None
@@ -220,7 +220,7 @@ def blamed_on(where: str, value: str = "") -> Iterator[None]:
     try:
         yield
     except ModelError as error:
-        complaint = Complaint.of(error, where, value, remedy="correct it")
+        complaint = Complaint.from_error(error, where, value, remedy="correct it")
         raise Refused(complaint.where, complaint.value or None, complaint.rule, complaint.remedy) from None
 
 

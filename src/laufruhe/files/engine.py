@@ -40,10 +40,10 @@ class RodTable(Table):
     """The connecting rod as a rigid body."""
 
     mass: f.PositiveMass
-    centre_of_gravity: f.Length = f.needed(
+    centre_of_gravity: f.Length = f.required(
         "Distance of the centre of gravity from the crank pin, on the line of the pins."
     )
-    inertia: f.Inertia = f.needed("Moment of inertia about the centre of gravity.")
+    inertia: f.Inertia = f.required("Moment of inertia about the centre of gravity.")
 
 
 class BigEndTable(Table):
@@ -55,7 +55,7 @@ class BigEndTable(Table):
     @property
     def size(self) -> tuple[float, float]:
         """Diameter and width [m], open ones at their start."""
-        return Open.of(self.diameter).start, Open.of(self.width).start
+        return Open.from_value(self.diameter).start, Open.from_value(self.width).start
 
 
 class ShaftTable(Table):
@@ -63,17 +63,17 @@ class ShaftTable(Table):
 
     name: Name
     ratio: f.Ratio = 1.0
-    position: f.Pair[f.Length] = f.needed("Position of the axis: y to the left, z up.")
-    lead: f.OpenAngle = f.told("Crank angle by which all that it carries comes earlier.", 0.0)
+    position: f.Pair[f.Length] = f.required("Position of the axis: y to the left, z up.")
+    lead: f.OpenAngle = f.optional("Crank angle by which all that it carries comes earlier.", 0.0)
 
 
 class SliderCrankTable(Table):
     """Slider-crank of a free list of parts; missing keys are those of [engine]."""
 
     x: f.Length
-    bank_angle: f.Angle = f.told("Angle of the cylinder axis, from upright towards the left.", 0.0)
+    bank_angle: f.Angle = f.optional("Angle of the cylinder axis, from upright towards the left.", 0.0)
     throw: f.Angle = 0.0
-    firing_angle: f.Angle | None = f.told("Crank angle at which it fires.")
+    firing_angle: f.Angle | None = f.optional("Crank angle at which it fires.")
     shaft: str = "crankshaft"
     stroke: f.PositiveLength | None = None
     bore: f.PositiveLength | None = None
@@ -122,29 +122,29 @@ class EngineTable(Table):
     layout: str
     drive: str
     cycle: Literal["two-stroke", "four-stroke"]
-    cylinders: CylinderNumber | None = f.told("Number of cylinders; by default that of throws or firing order.")
-    bore: f.PositiveLength | None = f.told("Diameter of the cylinder; needed with gas.")
+    cylinders: CylinderNumber | None = f.optional("Number of cylinders; by default that of throws or firing order.")
+    bore: f.PositiveLength | None = f.optional("Diameter of the cylinder; needed with gas.")
     stroke: f.PositiveLength | None = None
-    rod_ratio: f.NonNegative | None = f.told("Crank radius over rod length; 0 is a Scotch yoke.")
+    rod_ratio: f.NonNegative | None = f.optional("Crank radius over rod length; 0 is a Scotch yoke.")
     rod_length: f.OpenPositiveLength | None = None
-    offset: f.Length = f.told("Distance of the piston pin's path from the crank axis.", 0.0)
-    reciprocating_mass: f.OpenMass | None = f.told(
+    offset: f.Length = f.optional("Distance of the piston pin's path from the crank axis.", 0.0)
+    reciprocating_mass: f.OpenMass | None = f.optional(
         "Reciprocating mass of a cylinder, with the rod's share unless [engine.rod] is given."
     )
-    rotating_mass: f.Mass = f.told("Rotating mass of a throw, at the crank radius.", 0.0)
+    rotating_mass: f.Mass = f.optional("Rotating mass of a throw, at the crank radius.", 0.0)
     rod: RodTable | None = None
-    big_end: BigEndTable | None = f.told("Big end of the rod; needed for the pressure on crank pins.")
-    rod_inertia_deficit: f.Inertia = f.told("Inertia of the rod less that of two masses at its ends.", 0.0)
-    throws: f.Throws | None = f.told('Angles of the throws at phi = 0, or "open"; by default those of even firing.')
+    big_end: BigEndTable | None = f.optional("Big end of the rod; needed for the pressure on crank pins.")
+    rod_inertia_deficit: f.Inertia = f.optional("Inertia of the rod less that of two masses at its ends.", 0.0)
+    throws: f.Throws | None = f.optional('Angles of the throws at phi = 0, or "open"; by default those of even firing.')
     firing_order: FiringOrder | None = None
-    fires_together: bool = f.told("Whether cylinders are meant to fire at once; else you are asked.", False)
+    fires_together: bool = f.optional("Whether cylinders are meant to fire at once; else you are asked.", False)
     shafts: list[ShaftTable] = Field(default_factory=list)
     slider_cranks: list[SliderCrankTable] = Field(default_factory=list)
 
     @property
     def piston_mass(self) -> Open:
         """Reciprocating mass without a share of the rod; it may be open."""
-        return Open.of(self.reciprocating_mass or 0.0)
+        return Open.from_value(self.reciprocating_mass or 0.0)
 
     @property
     def open_masses(self) -> dict[str, Open]:
@@ -318,7 +318,7 @@ def _sizes(table: EngineTable) -> Sizes:
     own = {key.name: getattr(table, key.name) for key in DRIVES[table.drive].keys}
     values = {name: value.model_dump() if isinstance(value, RodTable) else value for name, value in own.items()}
     values = {name: value.start if isinstance(value, Open) else value for name, value in values.items()}
-    length = None if table.rod_length is None else Open.of(table.rod_length).start
+    length = None if table.rod_length is None else Open.from_value(table.rod_length).start
     return Sizes(table.stroke or 0.0, table.offset, length, table.rod_ratio, values)
 
 
@@ -367,7 +367,7 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
             first = (part.bank_angle - part.throw) / own_shaft.ratio % (math.tau / abs(own_shaft.ratio))
             fires = part.firing_angle if part.firing_angle is not None else first
             parts.append(mechanism.cylinder(k, part.x, part.throw, part.bank_angle, fires, rotating, own_shaft))
-    return led_parts(parts, {shaft.name: Open.of(shaft.lead).start for shaft in table.shafts})
+    return led_parts(parts, {shaft.name: Open.from_value(shaft.lead).start for shaft in table.shafts})
 
 
 def piston_masses(
@@ -408,5 +408,5 @@ def leads_of(table: EngineTable) -> list[Decision]:
     return [
         decision
         for name, shaft, own in (*leads, ("crank lead", _OPPOSED, lead))
-        for decision in Open.of(own).decisions(name, "rad", NumberDrive(Kind.LEAD, shaft))
+        for decision in Open.from_value(own).decisions(name, "rad", NumberDrive(Kind.LEAD, shaft))
     ]

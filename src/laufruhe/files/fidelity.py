@@ -33,11 +33,11 @@ class FidelityTable(Table):
 
     closed: ClassVar[str] = "says how exactly things are computed, not what the engine is"
 
-    kinematics: Literal["exact", "two-order", "auto"] = f.told(
+    kinematics: Literal["exact", "two-order", "auto"] = f.optional(
         "Motion of the pistons; auto takes the cheapest that keeps the objective in tolerance.",
         "exact",
     )
-    tolerance: f.Tolerance | None = f.told("Relative error of the objective that auto may make.")
+    tolerance: f.Tolerance | None = f.optional("Relative error of the objective that auto may make.")
 
     def own(self, key: str) -> Any:
         """Return the value of a fidelity option."""

@@ -51,7 +51,7 @@ class Open:
     start: float
 
     @classmethod
-    def of(cls, value: float | Open | None) -> Open:
+    def from_value(cls, value: float | Open | None) -> Open:
         """Return a number as open: a fixed one has equal bounds, None is zero."""
         return value if isinstance(value, Open) else cls(*(float(value or 0.0),) * 3)
 
@@ -369,12 +369,12 @@ class Table(BaseModel):
         return reference
 
 
-def needed(text: str) -> Any:
+def required(text: str) -> Any:
     """Return a required field with its description for editors."""
     return Field(description=text)
 
 
-def told(text: str, default: Any = None) -> Any:
+def optional(text: str, default: Any = None) -> Any:
     """Return an optional field with its description for editors."""
     return Field(default=default, description=text)
 

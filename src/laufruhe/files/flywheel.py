@@ -22,10 +22,10 @@ class ArmsTable(Table):
     """Oval arms between hub and rim."""
 
     count: Annotated[int, Field(ge=2, le=24)]
-    at_rim: f.Pair[f.PositiveLength] = f.needed(
+    at_rim: f.Pair[f.PositiveLength] = f.required(
         "Width of an arm across the plane of rotation, and depth in it, at the rim."
     )
-    at_hub: f.Pair[f.PositiveLength] = f.needed("Width and depth of an arm at the hub.")
+    at_hub: f.Pair[f.PositiveLength] = f.required("Width and depth of an arm at the hub.")
     hub_diameter: f.PositiveLength
 
 
@@ -33,19 +33,21 @@ class RimTable(Table):
     """A ring of a rectangular section."""
 
     mean_diameter: f.OpenPositiveLength
-    width: f.OpenPositiveLength = f.needed("Width along the shaft.")
-    height: f.OpenPositiveLength = f.needed("Height of the rim along a radius.")
-    density: f.Density = f.told("Density of the rim; by default that of cast iron.", 7250.0)
-    whole: Annotated[float, f.Number("", least=1.0)] = f.told("Mass of the whole flywheel over that of its rim.", 1.0)
+    width: f.OpenPositiveLength = f.required("Width along the shaft.")
+    height: f.OpenPositiveLength = f.required("Height of the rim along a radius.")
+    density: f.Density = f.optional("Density of the rim; by default that of cast iron.", 7250.0)
+    whole: Annotated[float, f.Number("", least=1.0)] = f.optional(
+        "Mass of the whole flywheel over that of its rim.", 1.0
+    )
     arms: ArmsTable | None = None
 
 
 class FlywheelTable(Table):
     """Everything that turns at crank speed, except pistons and rods."""
 
-    inertia: f.OpenInertia | None = f.told("Moment of inertia of the whole flywheel, in place of a rim.")
+    inertia: f.OpenInertia | None = f.optional("Moment of inertia of the whole flywheel, in place of a rim.")
     rim: RimTable | None = None
-    crankshaft_inertia: f.PositiveInertia | None = f.told(
+    crankshaft_inertia: f.PositiveInertia | None = f.optional(
         "Moment of inertia of the crankshaft and all else that turns, beside a rim."
     )
 
@@ -62,10 +64,10 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
         if table.crankshaft_inertia is not None:
             rule = "needs a rim; inertia is that of all that turns"
             raise Refused("flywheel.crankshaft_inertia", None, rule, "leave it out")
-        numbers = [("inertia", "kg m^2", Open.of(table.inertia))]
+        numbers = [("inertia", "kg m^2", Open.from_value(table.inertia))]
         wheel, first = Flywheel(numbers[0][2].start), 0
     else:
-        numbers = [(key, "m", Open.of(getattr(table.rim, key))) for key in _SECTION]
+        numbers = [(key, "m", Open.from_value(getattr(table.rim, key))) for key in _SECTION]
         wheel, first = Flywheel(table.crankshaft_inertia or 0.0, _rim(table.rim)), 1
     if crank_inertia is not None:
         rule, shown = "is given by [flywheel] too", units.shown(crank_inertia, "kg m^2")
@@ -79,7 +81,7 @@ def flywheel_of(table: FlywheelTable | None, crank_inertia: float | None) -> tup
 
 def _rim(table: RimTable) -> Rim:
     """Return the rim with open numbers at their start; every allowed section leaves a hole and room for arms."""
-    diameter, width, height = (Open.of(getattr(table, key)) for key in _SECTION)
+    diameter, width, height = (Open.from_value(getattr(table, key)) for key in _SECTION)
     hole = diameter.lower - height.upper
     if hole <= 0.0:
         rule = "leaves no hole in the rim"
@@ -98,18 +100,18 @@ class GearedInertiaTable(Table):
     """A second crank, or a flywheel on a shaft of its own."""
 
     name: Name
-    ratio: f.Ratio = f.told("Speed over crank speed; negative runs against the crank.", -1.0)
-    share: OpenShare = f.needed("Share of the inertia of all that turns, reduced to the crank.")
+    ratio: f.Ratio = f.optional("Speed over crank speed; negative runs against the crank.", -1.0)
+    share: OpenShare = f.required("Share of the inertia of all that turns, reduced to the crank.")
 
 
 def geared_of(tables: Sequence[GearedInertiaTable]) -> tuple[tuple[GearedInertia, ...], list[Decision]]:
     """Return the geared inertias, and the decisions about their shares (L8)."""
     inertias, decisions = [], list[Decision]()
     for table in tables:
-        share = Open.of(table.share)
+        share = Open.from_value(table.share)
         inertias.append(GearedInertia(table.name, table.ratio, share.start))
         decisions += share.decisions(f"{table.name}.share", "", NumberDrive(Kind.SHARE, table.name))
-    most = sum(Open.of(table.share).upper for table in tables)
+    most = sum(Open.from_value(table.share).upper for table in tables)
     if most > 1.0 + _ROUNDING:
         rule = f"add up to {most:g}, and the inertia of all that turns is one"
         raise Refused("geared_inertias", None, rule, "let shares, and the largest of open ones, add up to 1 at most")

@@ -79,14 +79,16 @@ class SteamTable(Table):
     makes: ClassVar = Steam
     admission: f.PositivePressure
     back_pressure: f.PositivePressure
-    cut_off: f.Part = f.needed("Part of the stroke from the dead centre at which admission ends.")
-    release: f.Part = f.told("Part of the stroke at which the outlet opens.", 1.0)
-    compression: f.Part = f.told(
+    cut_off: f.Part = f.required("Part of the stroke from the dead centre at which admission ends.")
+    release: f.Part = f.optional("Part of the stroke at which the outlet opens.", 1.0)
+    compression: f.Part = f.optional(
         "Part of the stroke before the dead centre at which the outlet closes on the way back.", 0.0
     )
-    lead: f.Part = f.told("Part of the stroke before the dead centre at which fresh steam enters on the way back.", 0.0)
-    clearance: f.NonNegative = f.told("Volume left at the dead centre, over that of the stroke.", 0.05)
-    exponent: f.Positive = f.told("Exponent of expansion and compression; 1, a hyperbola, by default.", 1.0)
+    lead: f.Part = f.optional(
+        "Part of the stroke before the dead centre at which fresh steam enters on the way back.", 0.0
+    )
+    clearance: f.NonNegative = f.optional("Volume left at the dead centre, over that of the stroke.", 0.05)
+    exponent: f.Positive = f.optional("Exponent of expansion and compression; 1, a hyperbola, by default.", 1.0)
 
 
 class PumpTable(Table):
@@ -109,10 +111,12 @@ class ChamberTable(Table):
     """A space on one side of a piston, or of a further piston on the same rod."""
 
     name: f.Name | None = None
-    cylinders: list[f.CylinderNumber] | None = f.told("Cylinders whose rods carry such a piston; all by default.")
-    end: Literal["head", "crank"] = f.needed("head: pressure drives the piston towards the crank; crank: away from it.")
+    cylinders: list[f.CylinderNumber] | None = f.optional("Cylinders whose rods carry such a piston; all by default.")
+    end: Literal["head", "crank"] = f.required(
+        "head: pressure drives the piston towards the crank; crank: away from it."
+    )
     bore: f.PositiveLength
-    rod: f.NonNegativeLength = f.told("Diameter of the piston rod where it passes through this end.", 0.0)
+    rod: f.NonNegativeLength = f.optional("Diameter of the piston rod where it passes through this end.", 0.0)
     steam: SteamTable | None = None
     pump: PumpTable | None = None
     trace: SideTraceTable | None = None
@@ -122,7 +126,7 @@ class ChambersTable(Table):
     """Chambers on both sides of the pistons: steam engines, pumps, and both on one rod."""
 
     model: Literal["chambers"]
-    crankcase_pressure: f.PositivePressure | None = f.told("Absolute pressure of the ambient air.")
+    crankcase_pressure: f.PositivePressure | None = f.optional("Absolute pressure of the ambient air.")
     chambers: Annotated[list[ChamberTable], Field(min_length=1, max_length=100)]
 
 

@@ -60,22 +60,22 @@ class QuantityTable(Table):
     mounts: list[str] | None = None
     bearings: list[str] | None = None
     cylinders: list[str] | None = None
-    sections: list[str] | None = f.told(
+    sections: list[str] | None = f.optional(
         "Sections of the crankshaft that count, named after the discs that they join; all by default."
     )
-    webs: list[str] | None = f.told(
+    webs: list[str] | None = f.optional(
         "Webs, with the journals beside them, that count: cylinder 1 front, cylinder 1 rear ..."
     )
     operating_points: list[str] | None = None
     orders: list[f.NonNegative] | None = None
-    alternating: bool | None = f.told(
+    alternating: bool | None = f.optional(
         "Whether the mean of a load over the cycle is left out: the steady reaction to the mean torque is then no part."
     )
     direction_weights: f.Three[f.NonNegative] | None = None
-    load_cases: list[str] | None = f.told("Load cases that count, by name; all by default.")
-    motions: list[Motion] | None = f.told("Motions that should have a mode of their own; all by default.")
-    wanted: f.Part | None = f.told("Share of a motion in a mode of its own that is enough; 1 by default.")
-    frequency: f.OpenFrequency | None = f.told(
+    load_cases: list[str] | None = f.optional("Load cases that count, by name; all by default.")
+    motions: list[Motion] | None = f.optional("Motions that should have a mode of their own; all by default.")
+    wanted: f.Part | None = f.optional("Share of a motion in a mode of its own that is enough; 1 by default.")
+    frequency: f.OpenFrequency | None = f.optional(
         "Wanted natural frequency about the torque-roll axis; of a raw residual it may be open, or left out."
     )
 
@@ -92,7 +92,7 @@ class ObjectiveTable(QuantityTable):
 
     minimise: QuantityName | None = None
     terms: list[TermTable] = Field(default_factory=list)
-    within: f.NonNegative | None = f.told("Share by which objectives after it may exceed its least value.")
+    within: f.NonNegative | None = f.optional("Share by which objectives after it may exceed its least value.")
 
 
 class ConstraintTable(QuantityTable):
@@ -102,14 +102,14 @@ class ConstraintTable(QuantityTable):
     max: f.Side | None = Field(
         default=None, description="Largest value allowed, in the unit of the quantity.", examples=["6 kg"]
     )
-    min: f.Side | None = f.told("Smallest value allowed, of natural frequencies, decoupling, sag or distance.")
+    min: f.Side | None = f.optional("Smallest value allowed, of natural frequencies, decoupling, sag or distance.")
     outside: f.Pair[f.Side] | None = Field(
         default=None,
         description="Band in which no natural frequency or critical speed may lie.",
         examples=[["12 Hz", "20 Hz"]],
     )
     name: Name | None = None
-    of: list[str] | None = f.told("Names of the counterweights or balancers whose mass counts, or of shafts.")
+    of: list[str] | None = f.optional("Names of the counterweights or balancers whose mass counts, or of shafts.")
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ class Scene:
             cases=as_tuple(table.load_cases), orders=as_tuple(table.orders),
             direction_weights=None if weights is None else (weights[0], weights[1], weights[2]),
             motions=as_tuple(table.motions),
-            frequency=(0.0, math.inf) if table.frequency is None else Open.of(table.frequency).bounds,
+            frequency=(0.0, math.inf) if table.frequency is None else Open.from_value(table.frequency).bounds,
             wanted=1.0 if table.wanted is None else table.wanted, alternating=bool(table.alternating),
         )  # fmt: skip
         if measure.is_mass:

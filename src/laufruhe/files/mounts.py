@@ -53,13 +53,13 @@ _NOT_ELASTIC = ('is for kind = "rigid" only', "give stiffness instead")
 class BlockTable(Table):
     """The rigid body that elastic mounts carry."""
 
-    mass: f.PositiveMass = f.needed("Mass of everything that the mounts carry, moving parts included.")
+    mass: f.PositiveMass = f.required("Mass of everything that the mounts carry, moving parts included.")
     centre_of_gravity: f.Three[f.Length] = Field(default=[0.0, 0.0, 0.0])
-    inertia: f.Three[f.Inertia] = f.needed("Moments of inertia about x, y and z through the centre of gravity.")
-    inertia_products: f.Three[f.Inertia] = f.told(
+    inertia: f.Three[f.Inertia] = f.required("Moments of inertia about x, y and z through the centre of gravity.")
+    inertia_products: f.Three[f.Inertia] = f.optional(
         "Products of inertia xy, xz, yz of the tensor: xy = - integral of x y dm.", [0.0, 0.0, 0.0]
     )
-    turning_inertia: f.Inertia = f.told(
+    turning_inertia: f.Inertia = f.optional(
         "Part of the inertia about x that turns with the crank and does not roll with the block: crankshaft, flywheel.",
         0.0,
     )
@@ -75,21 +75,21 @@ class StopTable(Table):
 class FluidTrackTable(Table):
     """The fluid of a hydraulic mount, all referred to its travel by the area of the piston."""
 
-    axis: Literal["x", "y", "z"] = f.told("Own axis of the mount along which it acts.", "z")
-    mass: f.PositiveMass = f.needed("Effective mass of the fluid in the track: its inertance times the area squared.")
-    bulge_stiffness: f.Stiffness = f.needed("Stiffness of the rubber against swelling: area squared over compliance.")
-    chamber_stiffness: f.Stiffness = f.told("Of the lower chamber.", 0.0)
-    damping: f.Damping = f.told("Of the flow through the track.", 0.0)
+    axis: Literal["x", "y", "z"] = f.optional("Own axis of the mount along which it acts.", "z")
+    mass: f.PositiveMass = f.required("Effective mass of the fluid in the track: its inertance times the area squared.")
+    bulge_stiffness: f.Stiffness = f.required("Stiffness of the rubber against swelling: area squared over compliance.")
+    chamber_stiffness: f.Stiffness = f.optional("Of the lower chamber.", 0.0)
+    damping: f.Damping = f.optional("Of the flow through the track.", 0.0)
 
 
 class DynamicStiffnessTable(Table):
     """Complex stiffness along an own axis from a CSV file: frequency, stiffness, and loss or its angle."""
 
-    axis: Literal["x", "y", "z"] = f.told("Own axis of the mount along which it acts.", "z")
-    file: str = f.needed("CSV file beside the problem.")
-    frequency_unit: str = f.told("Unit of the first column.", "Hz")
-    stiffness_unit: str = f.told("Unit of the stiffness.", "N/mm")
-    columns: Literal["stiffness and loss", "amount and angle"] = f.told(
+    axis: Literal["x", "y", "z"] = f.optional("Own axis of the mount along which it acts.", "z")
+    file: str = f.required("CSV file beside the problem.")
+    frequency_unit: str = f.optional("Unit of the first column.", "Hz")
+    stiffness_unit: str = f.optional("Unit of the stiffness.", "N/mm")
+    columns: Literal["stiffness and loss", "amount and angle"] = f.optional(
         "What follows the frequency: storage and loss stiffness, or its amount and its loss angle in degrees.",
         "amount and angle",
     )
@@ -100,23 +100,25 @@ class MountTable(Table):
 
     name: Name | None = None
     position: f.Three[f.OpenLength] | None = None
-    relative_stiffness: f.Three[f.NonNegative] | None = f.told(
+    relative_stiffness: f.Three[f.NonNegative] | None = f.optional(
         "Relative stiffness along the mount's own x, y, z; 0 carries nothing."
     )
-    turned: f.Three[f.OpenAngle] | None = f.told("Turns about x, then y, then z that bring the axes of C2 to its own.")
-    stiffness: f.Three[f.OpenStiffness] | None = f.told("Stiffness along the mount's own x, y, z.")
-    loss_factor: f.OpenLossFactor | None = f.told(
+    turned: f.Three[f.OpenAngle] | None = f.optional(
+        "Turns about x, then y, then z that bring the axes of C2 to its own."
+    )
+    stiffness: f.Three[f.OpenStiffness] | None = f.optional("Stiffness along the mount's own x, y, z.")
+    loss_factor: f.OpenLossFactor | None = f.optional(
         "Hysteretic loss factor: energy lost in a cycle over 2 pi times the energy stored."
     )
-    damping: f.Three[f.OpenDamping] | None = f.told("Viscous damping along the mount's own x, y, z.")
-    damping_per_stiffness: f.OpenDelay | None = f.told(
+    damping: f.Three[f.OpenDamping] | None = f.optional("Viscous damping along the mount's own x, y, z.")
+    damping_per_stiffness: f.OpenDelay | None = f.optional(
         "Further viscous damping along each axis, over the stiffness there, which it follows."
     )
-    like: Name | None = f.told("Stiffness, loss and damping follow those of this mount.")
-    mirror_of: Name | None = f.told("All follows this mount, mirrored in the plane y = 0.")
+    like: Name | None = f.optional("Stiffness, loss and damping follow those of this mount.")
+    mirror_of: Name | None = f.optional("All follows this mount, mirrored in the plane y = 0.")
     fluid_track: FluidTrackTable | None = None
     dynamic_stiffness: DynamicStiffnessTable | None = None
-    joined_to: Name | None = f.told("It stands where this mount stands, and their forces count together as one.")
+    joined_to: Name | None = f.optional("It stands where this mount stands, and their forces count together as one.")
     stop: StopTable | None = None
 
 
@@ -126,12 +128,14 @@ class MountsTable(Table):
     kind: Literal["rigid", "elastic"] = "rigid"
     positions: list[f.Three[f.Length]] = Field(default_factory=list)
     names: list[Name] | None = None
-    relative_stiffness: f.Three[f.NonNegative] = f.told(
+    relative_stiffness: f.Three[f.NonNegative] = f.optional(
         "Relative stiffness along x, y, z of every mount that gives none; not for elastic mounts.", [0.0, 1.0, 1.0]
     )
-    stiffness: f.Three[f.Stiffness] | None = f.told("Stiffness along x, y, z of every elastic mount that gives none.")
-    loss_factor: f.LossFactor = f.told("Loss factor of every elastic mount that gives none.", 0.0)
-    damping_per_stiffness: f.Delay = f.told(
+    stiffness: f.Three[f.Stiffness] | None = f.optional(
+        "Stiffness along x, y, z of every elastic mount that gives none."
+    )
+    loss_factor: f.LossFactor = f.optional("Loss factor of every elastic mount that gives none.", 0.0)
+    damping_per_stiffness: f.Delay = f.optional(
         "Viscous damping over stiffness of every elastic mount that gives none.", 0.0
     )
     stop: StopTable | None = None
@@ -142,10 +146,10 @@ class LoadCaseTable(Table):
     """Static load: weight, a bump, a torque. Travel counts from the position of the engine without it."""
 
     name: Name
-    times_weight: f.Three[f.Factor] | None = f.told("The weight of the block, so many times along x, y and z.")
-    torque: f.Moment | None = f.told("Moment about x, as that of the crank on the block.")
-    force: f.Three[f.SignedForce] | None = f.told("A force along x, y and z.")
-    place: f.Three[f.Length] | None = f.told("Where the force acts.")
+    times_weight: f.Three[f.Factor] | None = f.optional("The weight of the block, so many times along x, y and z.")
+    torque: f.Moment | None = f.optional("Moment about x, as that of the crank on the block.")
+    force: f.Three[f.SignedForce] | None = f.optional("A force along x, y and z.")
+    place: f.Three[f.Length] | None = f.optional("Where the force acts.")
 
 
 @dataclass(frozen=True)
@@ -199,7 +203,7 @@ def _rigid(table: MountsTable) -> tuple[Mount, ...]:
         numbers = [*stiffness, 0.0, 0.0, 0.0, 0.0]
         for key in ("position", "turned"):
             values = _values(table, place, key, where, "add it, or mirror_of")
-            numbers += [Open.of(value).start for value in values]
+            numbers += [Open.from_value(value).start for value in values]
         mounts.append(mount_of(Mount(name, (0.0, 0.0, 0.0)), [*numbers, 0.0]))
     all_different([m.position for m in mounts], "mounts.positions", "mounts stand in one place", "move one")
     return tuple(mounts)
@@ -331,7 +335,7 @@ class _Numbers:
     def take(self, name: str, key: str, values: Sequence[float | Open]) -> None:
         """Read the values of one key of the last mount."""
         unit, numbers = _FIELDS[key]
-        for number, axis, value in zip(numbers, _AXES, map(Open.of, values), strict=False):
+        for number, axis, value in zip(numbers, _AXES, map(Open.from_value, values), strict=False):
             self.rows[-1][number] = value.start
             label = f"{name}.{key}" if len(numbers) == 1 else f"{name}.{key}.{axis}"
             self.decisions += value.decisions(label, unit, MountDrive(len(self.rows) - 1, number, 1.0))

@@ -31,15 +31,15 @@ class OperatingPointTable(Table):
     name: Name | None = None
     speed: f.Speed | None = None
     mean_piston_speed: f.PistonSpeed | None = None
-    imep: f.Pressure | None = f.told("Indicated mean effective pressure at this point, in place of that of [gas].")
-    bmep: f.PositivePressure | None = f.told(
+    imep: f.Pressure | None = f.optional("Indicated mean effective pressure at this point, in place of that of [gas].")
+    bmep: f.PositivePressure | None = f.optional(
         "Brake mean effective pressure; [friction] adds what friction takes, and its uncertainty."
     )
-    brake_torque: f.PositiveTorque | None = f.told("Torque at the brake, in place of bmep.")
-    motored: bool = f.told("The charge is compressed without combustion.", False)
-    gas: bool = f.told("false: no gas at this point.", True)
-    up_to: f.Speed | None = f.told("Highest speed of a range that starts at speed.")
-    steps: Annotated[int, Field(ge=2, le=1000)] | None = f.told("Number of speeds in the range.")
+    brake_torque: f.PositiveTorque | None = f.optional("Torque at the brake, in place of bmep.")
+    motored: bool = f.optional("The charge is compressed without combustion.", False)
+    gas: bool = f.optional("false: no gas at this point.", True)
+    up_to: f.Speed | None = f.optional("Highest speed of a range that starts at speed.")
+    steps: Annotated[int, Field(ge=2, le=1000)] | None = f.optional("Number of speeds in the range.")
     weight: f.Positive = 1.0
 
 
@@ -48,13 +48,13 @@ class FrictionTable(Table):
 
     closed: ClassVar[str] = "is of a measurement"
 
-    file: str | None = f.told("CSV file: speed, load and fuel for kind fuel; speed and drag for kind motoring.")
+    file: str | None = f.optional("CSV file: speed, load and fuel for kind fuel; speed and drag for kind motoring.")
     kind: Literal["fuel", "motoring"] = "fuel"
     speed_unit: str = "rpm"
-    load_unit: str = f.told("Unit of the load in the file: of a torque, or of a mean pressure.", "N m")
-    fmep: f.PositivePressure | None = f.told("Friction mean effective pressure, in place of a file.")
-    deviation: Annotated[float, f.Number("Pa", least=0.0)] | None = f.told("Standard deviation of fmep.")
-    deviations: f.NonNegative = f.told(
+    load_unit: str = f.optional("Unit of the load in the file: of a torque, or of a mean pressure.", "N m")
+    fmep: f.PositivePressure | None = f.optional("Friction mean effective pressure, in place of a file.")
+    deviation: Annotated[float, f.Number("Pa", least=0.0)] | None = f.optional("Standard deviation of fmep.")
+    deviations: f.NonNegative = f.optional(
         "Number of standard deviations to either side for which the load is computed.", 2.0
     )
 

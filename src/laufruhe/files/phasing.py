@@ -44,7 +44,7 @@ class IntervalsTable(Table):
 
     min: f.Angle | None = None
     max: f.Angle | None = None
-    largest_deviation: f.Angle | None = f.told("Largest deviation of an interval from equal firing.")
+    largest_deviation: f.Angle | None = f.optional("Largest deviation of an interval from equal firing.")
 
 
 class PhasingTable(Table):
@@ -52,21 +52,21 @@ class PhasingTable(Table):
 
     closed: ClassVar[str] = "is a limit, or says how a search goes"
 
-    phases: Annotated[int, Field(ge=1, le=96)] | None = f.told(
+    phases: Annotated[int, Field(ge=1, le=96)] | None = f.optional(
         "Equal steps of a turn on which throws may stand; by default those of even firing."
     )
-    intervals: IntervalsTable | None = f.told("Bounds on firing intervals; even firing by default.")
-    best: Annotated[int, Field(ge=1, le=200)] = f.told("Number of crank stars in the ranking.", 10)
+    intervals: IntervalsTable | None = f.optional("Bounds on firing intervals; even firing by default.")
+    best: Annotated[int, Field(ge=1, le=200)] = f.optional("Number of crank stars in the ranking.", 10)
     rank_orders_by: list[Literal["roll moment", "neighbours", "longest gap"]] = Field(
         default=["neighbours", "longest gap"],
         min_length=1,
         description="What ranks the firing orders of a star; the first counts most.",
     )
-    most_shafts: Annotated[int, Field(ge=0, le=48)] | None = f.told(
+    most_shafts: Annotated[int, Field(ge=0, le=48)] | None = f.optional(
         "Largest number of optional balancer shafts that are built."
     )
-    most_shaft_mass: f.Mass | None = f.told("Largest mass of the optional shafts that are built.")
-    time_limit: f.Time = f.told("Time after which the search ends with the best design so far.", 600.0)
+    most_shaft_mass: f.Mass | None = f.optional("Largest mass of the optional shafts that are built.")
+    time_limit: f.Time = f.optional("Time after which the search ends with the best design so far.", 600.0)
     method: Literal["auto", "search", "program", "enumeration"] = "auto"
 
 
@@ -90,7 +90,7 @@ def opened(
         raise Refused("engine.cylinders", None, "is missing, and open throws do not say how many", "add it")
     cycle, count, bounds = cycle_of(engine), counts[0], None
     if isinstance(engine.throws, list) and engine.given_throws is None:
-        bounds = tuple(Open.of(angle).bounds for angle in engine.throws)
+        bounds = tuple(Open.from_value(angle).bounds for angle in engine.throws)
     # a layout that leaves its throws no choice
     fixed = None if engine.kind.is_free or engine.kind.takes("throws") else layout_of(_closed(engine, count))
     given = fixed.throws if fixed else engine.given_throws
@@ -148,7 +148,7 @@ def _has_open(value: object) -> bool:
 
 
 def _bounds(value: float | Open | None) -> tuple[float, float] | None:
-    return None if value is None else Open.of(value).bounds
+    return None if value is None else Open.from_value(value).bounds
 
 
 def _order_of(engine: EngineTable, cycle: Cycle, count: int) -> tuple[int, ...] | None:
@@ -222,7 +222,7 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
         rule = f"lets throws leave the even steps, and those of layout '{engine.layout}' do not"
         raise Refused(where, None, rule, 'write throws = "open", without intervals')
     for angle in ("bank_angle", "split_pin_angle"):
-        if phasing.throws is not None and Open.of(engine.own(angle)).is_open:
+        if phasing.throws is not None and Open.from_value(engine.own(angle)).is_open:
             rule = "is open beside throws that are given, and is decided with open ones only"
             remedy = f'write throws = "open" and cylinders = {count}, or fix the angle'
             raise Refused(f"engine.{angle}", None, rule, remedy)

@@ -117,7 +117,7 @@ class ProblemFile(Table):
     title: str = Field(min_length=1)
     source: str = ""
     assumptions: list[str] = Field(default_factory=list)
-    tolerance: f.Tolerance = f.told("Relative gap at which an optimum counts as proven.", 1e-4)
+    tolerance: f.Tolerance = f.optional("Relative gap at which an optimum counts as proven.", 1e-4)
     engine: EngineTable
     quantities: QuantitiesTable | None = None
     phasing: PhasingTable | None = None
@@ -133,7 +133,7 @@ class ProblemFile(Table):
     geared_inertias: list[GearedInertiaTable] = Field(default_factory=list)
     counterweights: list[CounterweightTable] = Field(default_factory=list)
     balancer_shafts: list[BalancerShaftTable] = Field(default_factory=list)
-    objective: Annotated[list[ObjectiveTable], f.OneOrEach(ObjectiveTable)] | None = f.told(
+    objective: Annotated[list[ObjectiveTable], f.OneOrEach(ObjectiveTable)] | None = f.optional(
         "What is minimised; of several tables in order, each among the designs that are best by those before it."
     )
     constraints: list[ConstraintTable] = Field(default_factory=list)

@@ -106,7 +106,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
     except ValidationError as error:
         raise InputError(str(path), complaints_of(error, file_model())) from None
     except ModelError as error:
-        raise InputError(str(path), (Complaint.of(error, "engine"),)) from None
+        raise InputError(str(path), (Complaint.from_error(error, "engine"),)) from None
 
 
 @cache

@@ -32,16 +32,16 @@ class CounterweightTable(Table):
     """A counterweight on a crankshaft, or one opposite every throw."""
 
     name: Name
-    shaft: str = f.told(
+    shaft: str = f.optional(
         'Shaft that it turns with; "every" puts a balance factor opposite the throws of all shafts.', CRANKSHAFT.name
     )
-    balance_factor: f.OpenFraction | None = f.told(
+    balance_factor: f.OpenFraction | None = f.optional(
         "Share of the reciprocating mass that is balanced, with the rotating mass, opposite each throw."
     )
-    balance_fraction: f.OpenFraction | None = f.told("Earlier name of balance_factor.")
+    balance_fraction: f.OpenFraction | None = f.optional("Earlier name of balance_factor.")
     throws: list[CylinderNumber] | None = None
     x: f.OpenLength | None = None
-    opposite_throw: CylinderNumber | None = f.told("Number of the throw from which angle and place are counted.")
+    opposite_throw: CylinderNumber | None = f.optional("Number of the throw from which angle and place are counted.")
     unbalance: f.OpenUnbalance | None = None
     mass: f.OpenMass | None = None
     radius: f.PositiveLength | None = None
@@ -80,10 +80,10 @@ class BalancerShaftTable(Table):
 
     name: Name
     ratio: f.Ratio
-    position: f.Pair[f.OpenLength] = f.needed("Position of the axis: y to the left, z up.")
+    position: f.Pair[f.OpenLength] = f.required("Position of the axis: y to the left, z up.")
     unbalances: list[UnbalanceTable] = Field(min_length=1)
-    optional: bool = f.told("Whether the shaft is built is decided too.", False)
-    shaft_mass: f.Mass = f.told("Mass of an optional shaft without its unbalances.", 0.0)
+    optional: bool = f.optional("Whether the shaft is built is decided too.", False)
+    shaft_mass: f.Mass = f.optional("Mass of an optional shaft without its unbalances.", 0.0)
 
 
 @dataclass
@@ -104,7 +104,7 @@ class RotorList:
         sized = {rotor.name for rotor in self.rotors if rotor.unbalance != 0.0}
         sized |= {drive.rotor for decision in self.decisions for drive in decision.rotor_drives}
         drives = (PlaceDrive(rotor, axis) for rotor in rotors if rotor in sized)
-        self.decisions += Open.of(place).decisions(name, "m", *drives)
+        self.decisions += Open.from_value(place).decisions(name, "m", *drives)
 
     def drive(self, rotor: str, source: str, gain: float, mirrored: bool) -> None:
         """Let a rotor follow the decision about another one."""
@@ -167,7 +167,7 @@ def _opposite_throws(table: CounterweightTable, pins: Sequence[_Pin], where: str
     key = table.factor_key or FACTORS[0]
     others = [name for name in ("x", "opposite_throw", "unbalance", "mass", *FACTORS) if name != key]
     none_of(table, others, where, f"cannot stand beside {key}", "leave one of them out")
-    fraction, drives = Open.of(getattr(table, key)), []
+    fraction, drives = Open.from_value(getattr(table, key)), []
     for number in range(1, len(pins) + 1) if table.throws is None else table.throws:
         pin = _pin(pins, number, f"{where}.throws")
         gain = -pin.reciprocating * cis(as_turn(pin.angle))
@@ -188,7 +188,7 @@ def _pin(pins: Sequence[_Pin], number: int, where: str) -> _Pin:
 
 
 def _single_counterweight(table: CounterweightTable, pins: Sequence[_Pin], where: str, into: RotorList) -> None:
-    reference, x = 0.0, None if table.x is None else Open.of(table.x).start
+    reference, x = 0.0, None if table.x is None else Open.from_value(table.x).start
     none_of(table, ("throws",), where, "is for balance_factor only", "use opposite_throw")
     if table.opposite_throw is not None:
         pin = _pin(pins, table.opposite_throw, f"{where}.opposite_throw")
@@ -208,14 +208,14 @@ def balancer_shafts(tables: Sequence[BalancerShaftTable], into: RotorList) -> No
         if table.name in names[:k] or table.name == CRANKSHAFT.name:
             raise Refused(f"{where}.name", table.name, "is the name of another shaft", "give each its own name")
         with blamed_on(f"{where}.ratio"):
-            shaft = Shaft(table.name, table.ratio, *(Open.of(along).start for along in table.position))
+            shaft = Shaft(table.name, table.ratio, *(Open.from_value(along).start for along in table.position))
         for j, unbalance in enumerate(table.unbalances):
             at = f"{where}.unbalances[{j + 1}]"
             name = name_of_unbalance(table.name, [own.name for own in table.unbalances], j)
             if unbalance.coupled is not None:
                 _follow(name, unbalance, unbalance.coupled, shaft, at, into)
             else:
-                rotor = Rotor(name, Open.of(unbalance.x).start, 0j, shaft, Role.BALANCER, unbalance.radius)
+                rotor = Rotor(name, Open.from_value(unbalance.x).start, 0j, shaft, Role.BALANCER, unbalance.radius)
                 _place(rotor, unbalance, 0.0, at, into)
             into.move(f"{name}.x", [name], 0, unbalance.x)
         built = [rotor.name for rotor in into.rotors if rotor.shaft == shaft]
@@ -240,19 +240,21 @@ def _follow(name: str, table: UnbalanceTable, coupled: CoupledTable, shaft: Shaf
     leader = leaders[coupled.to]
     sign, mirrored = _HOW[coupled.how]
     value = sign * (leader.unbalance.conjugate() if mirrored else leader.unbalance)
-    into.add(Rotor(name, Open.of(table.x).start, value, shaft, Role.BALANCER, table.radius or leader.radius), where)
+    into.add(
+        Rotor(name, Open.from_value(table.x).start, value, shaft, Role.BALANCER, table.radius or leader.radius), where
+    )
     into.drive(name, coupled.to, sign, mirrored)
 
 
 def _place(rotor: Rotor, table: SizedTable, reference: float, where: str, into: RotorList) -> None:
     """Add a rotor with its size and angle, and the decision about it if these are open."""
     one_of(table, where, "unbalance", "mass")
-    key, size, gain = "unbalance", Open.of(table.unbalance), 1.0
+    key, size, gain = "unbalance", Open.from_value(table.unbalance), 1.0
     if table.mass is not None:
         if table.radius is None:
             raise Refused(f"{where}.radius", None, "is missing, and a mass needs one", "add it")
-        key, size, gain = "mass", Open.of(table.mass), table.radius
-    angle, direction = Open.of(table.angle), gain * cis(as_turn(reference))
+        key, size, gain = "mass", Open.from_value(table.mass), table.radius
+    angle, direction = Open.from_value(table.angle), gain * cis(as_turn(reference))
     start = size.start * cis(as_turn(angle.start))
     allowed: Set = _sector(key, size, angle, where) if angle.is_open else Interval(*size.bounds, angle.lower)
     into.add(replace(rotor, unbalance=direction * start), f"{where}.name")

@@ -25,8 +25,8 @@ from laufruhe.problem.decision import Decision, Kind, NumberDrive
 class WebsTable(Table):
     """The two webs beside every pin."""
 
-    width: f.OpenPositiveLength = f.needed("Width of a web across the shaft.")
-    thickness: f.OpenPositiveLength = f.needed("Width along the shaft.")
+    width: f.OpenPositiveLength = f.required("Width of a web across the shaft.")
+    thickness: f.OpenPositiveLength = f.required("Width along the shaft.")
 
 
 class ShankTable(Table):
@@ -42,10 +42,10 @@ class PistonPinTable(Table):
     diameter: f.OpenPositiveLength
     bore: f.OpenNonNegativeLength = 0.0
     length: f.OpenPositiveLength
-    in_bosses: Annotated[float, f.Number("", above=0.0, most=0.95)] = f.told(
+    in_bosses: Annotated[float, f.Number("", above=0.0, most=0.95)] = f.optional(
         "Share of the length of the pin that the bosses hold.", 0.5
     )
-    span: f.PositiveLength | None = f.told(
+    span: f.PositiveLength | None = f.optional(
         "Distance between the middles of the bosses; by default it follows from in_bosses."
     )
 
@@ -54,13 +54,13 @@ class BoltsTable(Table):
     """The bolts of every big end."""
 
     count: Annotated[int, Field(ge=1, le=12)] = 2
-    diameter: f.OpenPositiveLength = f.needed("Diameter of a bolt at the root of the thread.")
+    diameter: f.OpenPositiveLength = f.required("Diameter of a bolt at the root of the thread.")
 
 
 class RunningGearTable(Table):
     """Sizes of webs, rods, bolts and piston pins, from which their stresses follow."""
 
-    density: f.Density | None = f.told(
+    density: f.Density | None = f.optional(
         "Density of the parts; their masses and those of the crank pins are then added to those of [engine]."
     )
     elastic_modulus: f.PositivePressure = STEEL
@@ -106,11 +106,11 @@ def _gear_of(table: RunningGearTable, parts: Sequence[SliderCrank], throws: Sequ
 
 
 def _start(value: float | Open) -> float:
-    return Open.of(value).start
+    return Open.from_value(value).start
 
 
 def _piston_pin(table: PistonPinTable) -> PistonPin:
-    bore, diameter = Open.of(table.bore), Open.of(table.diameter)
+    bore, diameter = Open.from_value(table.bore), Open.from_value(table.diameter)
     if bore.upper >= diameter.lower:
         shown, rule = units.shown(bore.upper, "m"), f"does not fit into a pin of {units.shown(diameter.lower, 'm')}"
         raise Refused("running_gear.piston_pin.bore", shown, rule, "make it smaller")
@@ -139,11 +139,11 @@ def size_decisions(
     """Return the decisions about open sizes."""
     decisions = list[Decision]()
     for name, size, value in _opened(table, engine, bearings, built):
-        decisions += Open.of(value).decisions(name, "m", NumberDrive(Kind.SIZE, size))
+        decisions += Open.from_value(value).decisions(name, "m", NumberDrive(Kind.SIZE, size))
     if decisions and engine.rod is not None and isinstance(engine.rod_length, Open):
         raise Refused("engine.rod_length", None, "is open, and [engine.rod] is of one length", "fix it")
     if any(decision.name == "engine.rod_length" for decision in decisions):
-        shortest = Open.of(engine.rod_length or math.inf).lower
+        shortest = Open.from_value(engine.rod_length or math.inf).lower
         if engine.kind.is_free or engine.offset:
             raise Refused("engine.rod_length", None, "is decided in layouts without offset", "fix it, or take a layout")
         if engine.stroke is not None and shortest <= 0.5 * engine.stroke:

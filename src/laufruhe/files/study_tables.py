@@ -42,11 +42,11 @@ End: TypeAlias = Annotated[int | float | str | None, BeforeValidator(_single)]
 class SweepTable(Table):
     """Swept quantity of the problem and its values: listed, or spaced between two ends."""
 
-    quantity: str = f.needed("Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
+    quantity: str = f.required("Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
     values: list[Value] | None = None
     first: End = Field(default=None, alias="from")
     last: End = Field(default=None, alias="to")
-    points: int | None = f.told("Number of values from the first to the last.")
+    points: int | None = f.optional("Number of values from the first to the last.")
     spacing: Literal["linear", "log"] | None = None
 
     @property
@@ -58,7 +58,7 @@ class SweepTable(Table):
 class DrawnTable(Table):
     """Quantity of the problem that is drawn at random, evenly between two ends."""
 
-    quantity: str = f.needed("Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
+    quantity: str = f.required("Path in the problem file: engine.rod_ratio, counterweights.web.balance_factor.")
     first: int | float | str = Field(alias="from")
     last: int | float | str = Field(alias="to")
     spacing: Literal["linear", "log"] = "linear"
@@ -69,9 +69,9 @@ class CaseTable(Table):
 
     name: Name
     problem: str
-    set: dict[str, Setting] = f.told("Paths of the problem file and their new values, or lists of these.", {})
-    without: list[str] = f.told("Tables that are left out, such as balancer_shafts or gas.", [])
-    equal_power_to: Annotated[int, Field(ge=1, le=48)] | None = f.told(
+    set: dict[str, Setting] = f.optional("Paths of the problem file and their new values, or lists of these.", {})
+    without: list[str] = f.optional("Tables that are left out, such as balancer_shafts or gas.", [])
+    equal_power_to: Annotated[int, Field(ge=1, le=48)] | None = f.optional(
         "The engine is rebuilt with the power of this many of its cylinders."
     )
 

@@ -88,7 +88,7 @@ def decided(problem: Problem, shown: Mapping[str, float]) -> dict[str, Value]:
 def _moving(problem: Problem, values: Mapping[str, Value]) -> Problem:
     """The drawing, all but what loads are affine in fixed as it was decided."""
     fixed = [decision for decision in problem.decisions if not decision.is_affine]
-    held = problem.held([values[decision.name] for decision in fixed], fixed)
+    held = problem.fixed_at([values[decision.name] for decision in fixed], fixed)
     return replace(held, phasing=None, extras=())
 
 

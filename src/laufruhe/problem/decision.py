@@ -287,7 +287,7 @@ class AddressDrive:
         return f"{number!r} {self.unit}" if self.unit else number
 
     def move(self, _numbers: Numbers, _change: Any) -> None:
-        """Refuse: the engine is built again instead (`Problem.held`)."""
+        """Refuse: the engine is built again instead (`Problem.fixed_at`)."""
         raise TypeError(f"{self.path} is a number of the file; the engine is put together anew with it")
 
 

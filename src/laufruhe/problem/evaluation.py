@@ -26,7 +26,7 @@ from laufruhe.problem.problem import Problem
 
 BETWEEN = NORMS["maximum"].refinement
 """Refinement of samples among which maxima are sought (M6)."""
-FINE = 5760
+FINE_SAMPLES = 5760
 """Number of samples at which a mean is exact enough for limits that no decision affects (P7)."""
 
 
@@ -124,11 +124,11 @@ class Standing:
 
 
 def fine_samples(samples: int) -> int:
-    """Return the smallest multiple of `samples`, at least twice, that reaches `FINE`."""
-    return samples * max(2, math.ceil(FINE / samples))
+    """Return the smallest multiple of `samples`, at least twice, that reaches `FINE_SAMPLES`."""
+    return samples * max(2, math.ceil(FINE_SAMPLES / samples))
 
 
-def finely(evaluation: Evaluation) -> Evaluation:
+def with_fine_sampling(evaluation: Evaluation) -> Evaluation:
     """Return the evaluation at enough samples for exact means; few samples may overestimate a mean (P7)."""
     return replace(evaluation, samples=fine_samples(evaluation.samples))
 
@@ -139,20 +139,20 @@ def finer(problem: Problem, times: int) -> Problem:
     return problem.at(replace(own, samples=times * own.samples, gas_samples=own.gas_steps))
 
 
-def at_many(problem: Problem) -> Problem:
+def with_default_sampling(problem: Problem) -> Problem:
     """Return the problem with the default number of samples at least: bounds at few samples hold at these only."""
     times = math.ceil(EXACT.samples / problem.fidelity.samples)
     return problem if times == 1 else finer(problem, times)
 
 
-def is_of_few(measure: Measure, samples: int) -> bool:
-    """Return True if the norm of a load sees fewer samples than `FINE`; peaks are refined anyway (M6)."""
-    return measure.norm.refinement * samples < FINE
+def is_coarsely_sampled(measure: Measure, samples: int) -> bool:
+    """Return True if the norm of a load sees fewer samples than `FINE_SAMPLES`; peaks are refined anyway (M6)."""
+    return measure.norm.refinement * samples < FINE_SAMPLES
 
 
-def told_at(measure: Measure, samples: int) -> int:
+def limit_samples(measure: Measure, samples: int) -> int:
     """Return the number of samples at which a limit on a load is checked: `samples`, or enough (P7)."""
-    return fine_samples(samples) if is_of_few(measure, samples) else samples
+    return fine_samples(samples) if is_coarsely_sampled(measure, samples) else samples
 
 
 def over(base: Fraction, signals: Sequence[Spectrum]) -> list[Spectrum]:

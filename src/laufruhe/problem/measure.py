@@ -94,7 +94,7 @@ class Measure(MeasureQuery):
         return channel.is_flywheel or bool(channel.simulation) or (channel.is_number and channel.of_loads)
 
     @property
-    def is_told_apart(self) -> bool:
+    def is_cylinder_resolved(self) -> bool:
         """True for a number of the crankshaft's twist, which no sum over the cylinders gives."""
         return self.channel.of_loads and self.channel.is_number and not self.is_mounting
 

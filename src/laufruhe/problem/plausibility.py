@@ -28,7 +28,9 @@ MOST_SAG, LEAST_SAG = 0.1, 1e-6
 """Of a block on its mounts [m]: soft mounts give about 10 mm."""
 
 
-def doubts(engine: Engine, points: Sequence[OperatingPoint], fires_together: bool = False) -> tuple[Complaint, ...]:
+def plausibility_warnings(
+    engine: Engine, points: Sequence[OperatingPoint], fires_together: bool = False
+) -> tuple[Complaint, ...]:
     """Return warnings about unusual numbers, one for each place.
 
     Parameters

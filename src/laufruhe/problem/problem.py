@@ -19,7 +19,7 @@ from laufruhe.physics.willans import FrictionTest
 from laufruhe.problem.decision import Decision, Numbers, moved_numbers
 from laufruhe.problem.measure import Limit, Measure, Rank, Term
 from laufruhe.problem.phasing import PhasingOf
-from laufruhe.problem.plausibility import doubts
+from laufruhe.problem.plausibility import plausibility_warnings
 from laufruhe.problem.sets import Value
 
 Path: TypeAlias = tuple[str | int, ...]
@@ -233,9 +233,9 @@ class Problem:
         return self.changed(extras=()) if self.extras else self
 
     @property
-    def doubts(self) -> tuple[Complaint, ...]:
+    def plausibility_warnings(self) -> tuple[Complaint, ...]:
         """Plausibility warnings about unusual numbers, which stop nothing."""
-        return doubts(self.engine, self.points, self.fires_together or self.phasing is not None)
+        return plausibility_warnings(self.engine, self.points, self.fires_together or self.phasing is not None)
 
     @property
     def unbalances(self) -> tuple[Decision, ...]:
@@ -305,7 +305,7 @@ class Problem:
     @property
     def feels_order(self) -> bool:
         """True if a measure depends on the firing order of one star: twist, and loads inside the crankcase with gas."""
-        if any(measure.is_told_apart for measure in self.measures):
+        if any(measure.is_cylinder_resolved for measure in self.measures):
             return True
         loads = [measure.load for measure in self.measures if measure.is_inside]
         return (self.has_gas and bool(loads)) or not all(load.feels_unbalances for load in loads)
@@ -379,7 +379,7 @@ class Problem:
         """Return the problem at another fidelity."""
         return self.changed(fidelity=fidelity)
 
-    def held(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Problem:
+    def fixed_at(self, values: Sequence[Value], decisions: Sequence[Decision] | None = None) -> Problem:
         """Return the problem with decisions fixed at these values; by default all decisions.
 
         For a number of the file, the engine, its operating points and the drives of other decisions are built again.
@@ -426,7 +426,7 @@ class Problem:
         """Return the engine with decisions at these values; by default all decisions."""
         moved = self.decisions if decisions is None else decisions
         if any(decision.address_drives for decision in moved):
-            return self.held(values, moved).engine
+            return self.fixed_at(values, moved).engine
         return self.numbers(values, moved).engine(self.engine)
 
     def numbers(self, values: Sequence[Any], decisions: Sequence[Decision] | None = None) -> Numbers:

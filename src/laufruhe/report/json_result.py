@@ -104,7 +104,7 @@ def _running(result: Result) -> Record:
     return {
         "balance_factors": [_of(one, "cylinders factor") for one in balance_factors(engine)],
         "firing_intervals": list(engine.firing_intervals),
-        "warnings": [str(doubt) for doubt in result.problem.doubts],
+        "warnings": [str(doubt) for doubt in result.problem.plausibility_warnings],
     }
 
 

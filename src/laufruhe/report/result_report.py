@@ -31,8 +31,8 @@ def _blocks(result: Result, pictures: Sequence[str], command: str) -> Iterator[B
         yield Paragraph(f"Source: {problem.source}.")
     if problem.assumptions:
         yield Bullets("Assumptions:", problem.assumptions)
-    if problem.doubts:
-        yield Bullets("Numbers to check:", [str(doubt) for doubt in problem.doubts])
+    if problem.plausibility_warnings:
+        yield Bullets("Numbers to check:", [str(doubt) for doubt in problem.plausibility_warnings])
     yield Heading("Result")
     yield Paragraph(headline(result))
     yield from map(Paragraph, told(result))

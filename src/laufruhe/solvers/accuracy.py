@@ -11,7 +11,7 @@ from laufruhe.fidelity.error_bounds import error_bound, missed, missed_of_gas, r
 from laufruhe.numerics.budget import in_time, passed
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.problem.evaluation import Evaluation, objective_value, value_of_loads
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import STRENGTH, Proof, gap_of
 from laufruhe.solvers.result import Result, Status
@@ -68,7 +68,7 @@ def _with_gas(problem: Problem, solve: Callable[[Problem], Result], result: Resu
     proof, told, missed = result.certificate, result.objective, missed + between
     if told is None or proof is None or missed <= problem.tolerance * value_of_loads(problem, result.final):
         return result
-    bound, nothing = max(proof.lower_bound - missed, 0.0), nothing_of(result.problem, result.final.engine)
+    bound, nothing = max(proof.lower_bound - missed, 0.0), numerical_zero(result.problem, result.final.engine)
     weaker = replace(
         proof, kind=min(proof.kind, Proof.WITHIN_GAP, key=STRENGTH), lower_bound=bound,
         gap=gap_of(told.value, bound, nothing), method=f"{proof.method}, less what the gas may miss",

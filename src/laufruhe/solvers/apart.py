@@ -16,7 +16,7 @@ from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import STRENGTH, Certificate, Proof, withheld
 from laufruhe.solvers.accuracy import largest_error
@@ -122,7 +122,7 @@ def _together(found: list[Result], value: float) -> Certificate:
     kind = min((certificate.kind for certificate in told), key=STRENGTH)
     residual = max(certificate.kkt_residual for certificate in told)
     method = "; beside it ".join(certificate.method for certificate in told)
-    if not check_bound(method, bound, value, sum(nothing_of(r.problem, r.final.engine) for r in found)):
+    if not check_bound(method, bound, value, sum(numerical_zero(r.problem, r.final.engine) for r in found)):
         return withheld(value, residual, method)
     gap = (value - bound) / value if value > 0.0 else 0.0
     # what cancels in a part counts as zero there

@@ -15,10 +15,10 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.witness import is_over
 from laufruhe.problem.decision import Decision, Kind
 from laufruhe.problem.dependence import depends, kinds_of
-from laufruhe.problem.evaluation import Evaluation, evaluate, finely, objective_value
+from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import evaluate_start
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Certificate, Proof, Reach, certified, gap_of
@@ -108,7 +108,7 @@ def judged(problem: Problem, values: Sequence[Value], samples: int | None = None
     ModelError
         If it has no loads, as on a resonance that nothing damps.
     """
-    held = problem.held(values)
+    held = problem.fixed_at(values)
     evaluation = evaluate(held, samples=samples)
     value = objective_value(problem, evaluation)
     return Design(problem, tuple(values), evaluation, value, evaluation.excess(problem.limits))
@@ -159,7 +159,7 @@ def read_under(
     for _ in range(READINGS):
         if not is_over(bound, value, nothing) or not any(is_sampled(term.measure) for term in problem.objective):
             break
-        evaluation = finely(evaluation)
+        evaluation = with_fine_sampling(evaluation)
         value = objective_value(problem, evaluation)
     return Reading(evaluation, value, _doubt(problem, evaluation, prices) if is_over(bound, value, nothing) else 0.0)
 
@@ -179,7 +179,7 @@ def known_of(design: Design, place: Array, excess: float = FEASIBLE) -> Known | 
     problem, evaluation = design.problem, design.evaluation
 
     def read() -> float:
-        nothing = nothing_of(problem, evaluation.engine)
+        nothing = numerical_zero(problem, evaluation.engine)
         found = read_under(problem, evaluation, design.value, math.inf, nothing)
         return found.value * (1.0 + STEEP * max(design.excess, 0.0)) + found.doubt + nothing
 
@@ -193,7 +193,7 @@ def is_sampled(measure: Measure) -> bool:
 
 def _doubt(problem: Problem, evaluation: Evaluation, prices: Mapping[Side, Price] | None) -> float:
     """Return by how much a value may be read too low; infinite where its design breaks limits at many angles (P7)."""
-    many = finely(evaluation) if problem.limits else evaluation
+    many = with_fine_sampling(evaluation) if problem.limits else evaluation
     if many.excess(problem.limits) > FEASIBLE:
         return math.inf
     missing = sum(term.weight * missed(term.measure, evaluation) for term in problem.objective)
@@ -211,7 +211,7 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
     as_given = Design(problem, problem.start, initial, given, initial.excess(problem.limits))
     design = min(design, as_given, key=lambda each: each.rank)
     met = design.excess <= KEPT
-    nothing = nothing_of(problem, design.evaluation.engine)
+    nothing = numerical_zero(problem, design.evaluation.engine)
     if met:
         read = read_under(problem, design.evaluation, design.value, shown.bound, nothing, shown.prices)
         design = replace(design, evaluation=read.evaluation, value=read.value)
@@ -390,7 +390,7 @@ def _is_moved(problem: Problem, evaluation: Evaluation, limit: Limit) -> bool:
 def with_limits(result: Result, limits: tuple[Limit, ...]) -> Result:
     """A result with limits beside its own that nothing open acts on, in the order given."""
     problem, known = result.problem, dict(zip(result.problem.limits, result.limits, strict=False))
-    still, finer = result.final, finely(result.final)
+    still, finer = result.final, with_fine_sampling(result.final)
     shown = tuple(
         known.get(limit) or _limit_value(problem, limit, finer if still.excess([limit]) > KEPT else still, {}, 0.0)
         for limit in limits

@@ -85,7 +85,7 @@ def _in_turns(program: LocalProgram, best: Array, decide: Decide) -> Array:
         tell("cones and local programs in turn", k, ROUNDS, before[1])
         values = dict(zip((d.name for d in problem.decisions), program.values(best), strict=True))
         try:
-            held = problem.held([values[decision.name] for decision in outer], outer)
+            held = problem.fixed_at([values[decision.name] for decision in outer], outer)
             own = values_of(held, decide(replace(held, search=replace(held.search, proves=False))))
         except (ModelError, SolverError):
             break

@@ -17,9 +17,9 @@ from dataclasses import replace
 from functools import partial
 
 from laufruhe.numerics.budget import passed
-from laufruhe.problem.evaluation import Evaluation, finely, objective_value
+from laufruhe.problem.evaluation import Evaluation, objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit, Measure
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import STRENGTH, Certificate, Proof
 from laufruhe.solvers.accuracy import largest_error
@@ -61,7 +61,7 @@ def _edge(found: Result, within: float) -> float:
     """What later objectives may make of this one: of what cancels nothing."""
     value = found.objective.value if found.objective else math.inf
     weight = found.problem.objective[0].weight
-    if value <= nothing_of(found.problem, found.final.engine):
+    if value <= numerical_zero(found.problem, found.final.engine):
         return 0.0
     return value / weight * (1.0 + within)
 
@@ -87,7 +87,7 @@ def _together(
     last = stages[-1]
     count = len(problem.limits)
     # each stage had its own angles: what its design is worth to the others is read at many (P7)
-    final = finely(last.final)
+    final = with_fine_sampling(last.final)
     ranks = tuple(
         _rank(stage, final, limit, last, k, count, designs)
         for k, (stage, limit, designs) in enumerate(zip(stages, held, equal, strict=True))

@@ -144,10 +144,10 @@ def _begun(problem: Problem, known: Result) -> Problem:
     values = values_of(problem, known)
     pairs = list(zip(problem.decisions, values, strict=True))
     numbers = [(decision, value) for decision, value in pairs if decision.address_drives]
-    drawn = problem.held([value for _, value in numbers], [decision for decision, _ in numbers])
+    drawn = problem.fixed_at([value for _, value in numbers], [decision for decision, _ in numbers])
     known_there = {decision.name: decision for decision in drawn.decisions}
     decisions = tuple(replace(known_there.get(d.name, d), start=value) for d, value in pairs)
-    return replace(problem.held(values), decisions=decisions, search=_unproven(problem, 1, NEAR_BOXES))
+    return replace(problem.fixed_at(values), decisions=decisions, search=_unproven(problem, 1, NEAR_BOXES))
 
 
 def _unproven(problem: Problem, starts: int, few: int) -> Search:

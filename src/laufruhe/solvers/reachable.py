@@ -17,9 +17,9 @@ from laufruhe.numerics.budget import in_time, left, limited, passed
 from laufruhe.numerics.progress import tell, within
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import depends
-from laufruhe.problem.evaluation import finely, objective_value
+from laufruhe.problem.evaluation import objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit, Term
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach, certified
 from laufruhe.solvers.accuracy import error_of
@@ -106,7 +106,7 @@ def _surely(solve: Solve, problem: Problem, asked: Problem) -> Result:
     result = solve(asked)
     if not result.status.has_design or result.objective is None:
         return result
-    sampled, fine = [limit for limit in problem.limits if limit.measure.is_load], finely(result.final)
+    sampled, fine = [limit for limit in problem.limits if limit.measure.is_load], with_fine_sampling(result.final)
     if (result.final.excess(sampled) <= KEPT) is (fine.excess(sampled) <= KEPT):
         return result
     value = objective_value(result.problem, fine)
@@ -240,7 +240,7 @@ def _recovered(found: Result, problem: Problem, result: Result) -> Result:
     """A design that keeps all limits after all, by what bounds are known of the objective."""
     bound, nothing = (
         found.certificate.lower_bound if found.certificate else 0.0,
-        nothing_of(problem, result.final.engine),
+        numerical_zero(problem, result.final.engine),
     )
     read = read_under(problem, result.final, objective_value(problem, result.final), bound, nothing)
     result, value = replace(result, final=read.evaluation), read.value

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from laufruhe.errors import counted
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, Reach, certified
 from laufruhe.solvers.conclusion import KEPT, limit_values, result_under, with_limits
@@ -63,7 +63,7 @@ def with_bound(result: Result, bound: float, source: str) -> Result:
     own, told = result.certificate, result.objective
     if own is None or told is None or own.kind is Proof.NONE or not bound > own.lower_bound:
         return result
-    nothing = nothing_of(result.problem, result.final.engine)
+    nothing = numerical_zero(result.problem, result.final.engine)
     result, doubt = result_under(result, bound, nothing)
     value, text = (result.objective or told).value, f"{own.method}; {source}"
     proof = certified(value, bound, nothing, result.problem.tolerance, Reach.NEAR, own.kkt_residual, text, doubt)

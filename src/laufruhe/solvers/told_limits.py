@@ -13,9 +13,17 @@ from dataclasses import replace
 from laufruhe.fidelity.error_bounds import missed
 from laufruhe.numerics.budget import rounds
 from laufruhe.numerics.witness import check_bound
-from laufruhe.problem.evaluation import FINE, Evaluation, at_many, finely, finer, is_of_few, objective_value
+from laufruhe.problem.evaluation import (
+    FINE_SAMPLES,
+    Evaluation,
+    finer,
+    is_coarsely_sampled,
+    objective_value,
+    with_default_sampling,
+    with_fine_sampling,
+)
 from laufruhe.problem.measure import Limit
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, gap_of
 from laufruhe.solvers.conclusion import KEPT, broken_message, limit_values
@@ -32,7 +40,7 @@ def solve_told(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
     result = solve(problem)
     for _ in rounds(ROUNDS):
         own = problem.fidelity
-        untold = _told_otherwise(result) if own.samples < FINE else 0.0
+        untold = _told_otherwise(result) if own.samples < FINE_SAMPLES else 0.0
         if untold <= 1.0:
             return result
         # means at equal steps come nearer by the square of these; the gas keeps its own
@@ -52,8 +60,8 @@ def _as_many_tell(result: Result) -> Result:
     if told is None or proof is None or not result.status.has_design:
         return result
     value = told.value - _misread(problem, result.measured)
-    final = finely(result.final) if result.measured is result.final else result.final
-    nothing = nothing_of(problem, final.engine)
+    final = with_fine_sampling(result.final) if result.measured is result.final else result.final
+    nothing = numerical_zero(problem, final.engine)
     gap = gap_of(value, proof.lower_bound, nothing)
     doubt = sum(term.weight * missed(term.measure, final) for term in problem.objective)
     check_bound(proof.method, proof.lower_bound, value, nothing + doubt)
@@ -75,13 +83,13 @@ def _as_many_tell(result: Result) -> Result:
 def told_excess(problem: Problem, evaluation: Evaluation) -> float:
     """Largest relative excess that many angles tell over a limit which few tell of; negative where all have room."""
     limits = _told_by_few(problem, evaluation)
-    return finely(evaluation).excess(limits) if limits else -math.inf
+    return with_fine_sampling(evaluation).excess(limits) if limits else -math.inf
 
 
 def _told_by_few(problem: Problem, evaluation: Evaluation) -> list[Limit]:
     """Limits on loads that are read at few angles."""
     loads = [limit for limit in problem.load_limits if limit.measure.is_load]
-    return [limit for limit in loads if is_of_few(limit.measure, evaluation.samples)]
+    return [limit for limit in loads if is_coarsely_sampled(limit.measure, evaluation.samples)]
 
 
 def _untold(result: Result) -> float:
@@ -92,19 +100,19 @@ def _untold(result: Result) -> float:
     if result.status.has_design:
         return told_excess(problem, own)
     few = replace(own, samples=problem.fidelity.samples)
-    limits, many = _told_by_few(problem, few), finely(few)
+    limits, many = _told_by_few(problem, few), with_fine_sampling(few)
     # what a search missed at fewer angles than by default is sought at these, wherever the design as given stands
-    least = 0.5 * KEPT * (at_many(problem).fidelity.samples / few.samples) ** 2
+    least = 0.5 * KEPT * (with_default_sampling(problem).fidelity.samples / few.samples) ** 2
     return max((max(least, abs(many.standing(x).excess - few.standing(x).excess)) for x in limits), default=0.0)
 
 
 def _misread(problem: Problem, evaluation: Evaluation) -> float:
     """By how much few angles read an objective of loads too large; negative where they read too little."""
-    terms = [term for term in problem.load_terms if is_of_few(term.measure, evaluation.samples)]
+    terms = [term for term in problem.load_terms if is_coarsely_sampled(term.measure, evaluation.samples)]
     if not terms or evaluation.resonance:
         return 0.0
     told = replace(problem, objective=tuple(terms))
-    return objective_value(told, evaluation) - objective_value(told, finely(evaluation))
+    return objective_value(told, evaluation) - objective_value(told, with_fine_sampling(evaluation))
 
 
 def over_read(problem: Problem, evaluation: Evaluation) -> float:
@@ -122,7 +130,7 @@ def _misproven(result: Result) -> float:
     value = told.value - over
     if abs(over) <= FELT * problem.tolerance * value:
         return 0.0
-    nothing = nothing_of(problem, result.final.engine)
+    nothing = numerical_zero(problem, result.final.engine)
     proven = gap_of(value, proof.lower_bound, nothing) <= problem.tolerance
     # a bound over the value is none
     agree = proven is (proof.gap <= problem.tolerance) and proof.lower_bound <= value * (1.0 + problem.tolerance)

@@ -21,7 +21,7 @@ from laufruhe.machine.firing import firing_turns, from_one, intervals_of, lap_or
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Domain, columns_of, domains_of, vector_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import SOONEST, Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
@@ -401,7 +401,7 @@ def _is_shown(found: Result, witness: Visit, bound: float | None) -> bool:
         # the bound may be of as few angles as the fidelity has
         coarse = replace(own, samples=min(own.samples, found.problem.fidelity.samples))
         over = 1.0 + 2.0 * error_of(problem, coarse) + ROUNDING
-        if witness.value * over + nothing_of(problem, own.engine) >= bound:
+        if witness.value * over + numerical_zero(problem, own.engine) >= bound:
             return False
     standings = ((limit, own.standing(limit)) for limit in problem.limits)
     kept = all(stands.excess + relative(missed(limit.measure, own), stands.value) <= 0.0 for limit, stands in standings)

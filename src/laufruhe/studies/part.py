@@ -57,7 +57,7 @@ class Part(Table):
     title: Annotated[str, Field(min_length=1)]
     source: str = ""
     cases: list[CaseTable] = Field(min_length=1)
-    readings: dict[Name, dict[str, Value]] = f.told(
+    readings: dict[Name, dict[str, Value]] = f.optional(
         "Where a number of the source may be misprinted: paths and values, by a name of each reading; "
         "in a replication, numbers and values.",
         {},

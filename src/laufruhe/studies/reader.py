@@ -28,7 +28,7 @@ else:
 class StudyTable(Table):
     """What a study consists of."""
 
-    common: dict[str, Any] = f.told("Keys of every part that does not give its own.", {})
+    common: dict[str, Any] = f.optional("Keys of every part that does not give its own.", {})
     parts: list[AnyPart] = Field(min_length=1)
 
     @model_validator(mode="before")

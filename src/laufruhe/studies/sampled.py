@@ -29,9 +29,9 @@ _WORDS = 4
 class Sampled(Part):
     """Cases with many draws each, all with the same random numbers."""
 
-    draws: Annotated[int, Field(ge=1, le=MOST_DRAWS)] = f.needed("Number of draws of each case.")
+    draws: Annotated[int, Field(ge=1, le=MOST_DRAWS)] = f.required("Number of draws of each case.")
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 1964
-    chunk: Annotated[int | None, Field(ge=1, le=1_000_000)] = f.told("Draws in one piece of work.")
+    chunk: Annotated[int | None, Field(ge=1, le=1_000_000)] = f.optional("Draws in one piece of work.")
     own_chunk: ClassVar[int] = 1000
 
     def settings(self) -> dict[str, Any]:

@@ -111,7 +111,7 @@ class Scenes:
             yield
         except ModelError as error:
             path = self.folder / point.case.problem
-            raise InputError(str(path), (Complaint.of(error, where, f'"{point}"'),)) from None
+            raise InputError(str(path), (Complaint.from_error(error, where, f'"{point}"'),)) from None
 
     def fingerprint(self, point: Point, settings: Mapping[str, Any]) -> str:
         """Return a hash of everything that a point depends on: scene, files that the scene names, settings, program.

@@ -204,7 +204,7 @@ def _table(name: str, records: Sequence[Mapping[str, Any]], columns: Sequence[st
 class SweptPart(Part):
     """Cases at every combination of the swept values."""
 
-    metric: QuantityName | None = f.told("What is compared, in place of the objective of the problem files.")
+    metric: QuantityName | None = f.optional("What is compared, in place of the objective of the problem files.")
     sweep: list[SweepTable] = Field(default_factory=list, max_length=2)
 
     def swept_or_drawn(self) -> list[tuple[str, Callable[[], object]]]:

@@ -26,7 +26,7 @@ from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
 from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBLE
 from laufruhe.solvers.nearby import by_cones, first_of, is_convex, next_to
@@ -217,7 +217,7 @@ class _Decided:
         value, excess = objective_value(problem, final), final.excess(problem.limits)
         if excess <= FEASIBLE and not self.least <= value:
             # what cancels has no share by which another design is worse
-            self.least = 0.0 if value <= nothing_of(problem, engine) else value
+            self.least = 0.0 if value <= numerical_zero(problem, engine) else value
         return value, excess
 
     def by(self, own: Problem) -> Engine | None:

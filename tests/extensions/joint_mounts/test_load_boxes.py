@@ -16,7 +16,7 @@ from attack.own_problem import Own
 from lanes import first_fast
 from laufruhe.extensions.joint_mounts.load_boxes import LoadBoxes, is_boxed, load_bounds
 from laufruhe.extensions.joint_mounts.prover import EARLY
-from laufruhe.problem.evaluation import at_many, evaluate, objective_value
+from laufruhe.problem.evaluation import evaluate, objective_value, with_default_sampling
 from laufruhe.problem.problem import Problem
 
 INPUTS = Path(__file__).parents[2] / "claims" / "inputs"
@@ -44,7 +44,7 @@ def is_inside(problem: Problem, values: list[complex]) -> bool:
 
 @pytest.mark.parametrize("seed", first_fast(SEEDS, 3, 6))
 def test_no_design_of_a_box_is_under_its_bound_and_small_boxes_come_near(seed: int) -> None:
-    problem = at_many(laufruhe.load(random_problem("joint", seed)[0]))
+    problem = with_default_sampling(laufruhe.load(random_problem("joint", seed)[0]))
     if not is_boxed(problem):
         pytest.skip("more is open than boxes take")
     boxes, generator = LoadBoxes(problem, 1e-9), np.random.default_rng(seed)

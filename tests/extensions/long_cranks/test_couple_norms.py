@@ -14,7 +14,7 @@ from laufruhe.extensions.long_cranks.search import search_stars
 from laufruhe.extensions.long_cranks.starts import _blocks, good_starts, swaps
 from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.physics.crank_stars import Stars, star_sums
-from laufruhe.problem.evaluation import evaluate, finely, objective_value
+from laufruhe.problem.evaluation import evaluate, objective_value, with_fine_sampling
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
@@ -68,7 +68,7 @@ def test_couples_say_what_the_exact_model_says(cylinders, cycle, name, gas, tmp_
     own, stars = norms_of(problem, family), every_star(family)
     assert own is not None
     exact = np.array([
-        objective_value(problem, finely(evaluate(of_star(problem, family, star)))) for star in stars
+        objective_value(problem, with_fine_sampling(evaluate(of_star(problem, family, star)))) for star in stars
     ])  # fmt: skip
     low = own.values(family.space, stars)
     assert (low <= exact * (1.0 + 1e-9)).all()

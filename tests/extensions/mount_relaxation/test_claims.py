@@ -18,7 +18,7 @@ from laufruhe.extensions.mount_relaxation.proof import applies, spring_bound
 from laufruhe.extensions.mount_relaxation.quadratics import solver_of
 from laufruhe.extensions.mount_relaxation.search import SpringBoxes
 from laufruhe.numerics.budget import at_least, left, limited, passed
-from laufruhe.problem.evaluation import at_many, evaluate, objective_value
+from laufruhe.problem.evaluation import evaluate, objective_value, with_default_sampling
 from problem_files import PROBLEMS
 
 LEAST_STIFF, STIFFEST = 24.108448, 35.101221
@@ -38,7 +38,7 @@ def test_spring_forces_bound_boxes_of_any_width(
     problem = laufruhe.load(tmp_path / "scene.toml")
     value = objective_value(problem, evaluate(problem, problem.design([stiffness])))
     assert value == pytest.approx(force, rel=1e-7)
-    boxes = SpringBoxes(at_many(problem), value * (1.0 + 1e-9), 0.0, [stiffness])
+    boxes = SpringBoxes(with_default_sampling(problem), value * (1.0 + 1e-9), 0.0, [stiffness])
     assert len(boxes.modes) == (limit != "static sag")
     lower, upper = boxes.lower.copy(), boxes.upper.copy()
     lower[0], upper[0] = np.clip([stiffness * (1.0 - width), stiffness * (1.0 + width)], lower[0], upper[0])

@@ -9,7 +9,7 @@ import pytest
 
 from laufruhe.extensions.sizes.solver import solve_sizes
 from laufruhe.numerics.budget import limited
-from laufruhe.problem.evaluation import evaluate, finely, objective_value
+from laufruhe.problem.evaluation import evaluate, objective_value, with_fine_sampling
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Result, Status, solve
 from laufruhe.solvers.conclusion import KEPT
@@ -37,7 +37,7 @@ def of_many_angles(throw: float) -> Result:
 def test_a_bound_of_sizes_is_not_over_a_rival_that_many_angles_judge() -> None:
     """At a throw of 3 deg 48 angles have a quarter of a percent too much of the second order."""
     few, many = solve(problem(sized(3), objective=SECOND)), of_many_angles(3)
-    rival = objective_value(many.problem, finely(many.final))
+    rival = objective_value(many.problem, with_fine_sampling(many.final))
     assert few.certificate is not None
     assert few.certificate.lower_bound <= rival * (1.0 + 1e-9)
     assert many.status is few.status is Status.OPTIMAL
@@ -53,7 +53,7 @@ def test_limits_of_sizes_are_what_the_cycle_has(throw: float, share: float, met:
     asked = problem(told, objective={"minimise": "rms shaking force"}, **more)
     result = solve(asked)
     assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)
-    assert not met or finely(result.final).excess(asked.limits) <= KEPT
+    assert not met or with_fine_sampling(result.final).excess(asked.limits) <= KEPT
 
 
 def test_a_gap_is_not_left_open_for_what_few_angles_read_too_much() -> None:
@@ -71,7 +71,7 @@ def test_time_that_is_over_leaves_no_design_that_few_angles_alone_allow() -> Non
     asked = problem(told, objective={"minimise": "rms shaking force"}, constraints=[*told["constraints"], limit])
     with limited(1e-9):
         result = solve_told(asked, solve_sizes)
-    assert finely(result.final).excess(asked.limits) > KEPT
+    assert with_fine_sampling(result.final).excess(asked.limits) > KEPT
     assert result.status is Status.FAILED
     assert result.certificate is not None
     assert result.certificate.kind is Proof.NONE

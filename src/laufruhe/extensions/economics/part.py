@@ -49,9 +49,9 @@ class Claim(Table):
     """What a source says about a set of shafts; it is confirmed or not."""
 
     says: Judgement | None = None
-    falls_by: Annotated[float, Field(gt=0.0, lt=1.0)] | None = f.told("Share by which the force is said to fall.")
-    against: Name = f.told("Build that it is compared with.", PLAIN)
-    where: str = f.told("Figure or passage of the source.", "")
+    falls_by: Annotated[float, Field(gt=0.0, lt=1.0)] | None = f.optional("Share by which the force is said to fall.")
+    against: Name = f.optional("Build that it is compared with.", PLAIN)
+    where: str = f.optional("Figure or passage of the source.", "")
 
     @model_validator(mode="after")
     def _says_something(self) -> Claim:
@@ -68,8 +68,8 @@ class BuildTable(Table):
     """One set of shafts."""
 
     name: Name
-    case: Name | None = f.told("Case that has these shafts; the first by default.")
-    shafts: list[Name] = f.told("Balancer shafts that are built; none makes the plain engine of another case.", [])
+    case: Name | None = f.optional("Case that has these shafts; the first by default.")
+    shafts: list[Name] = f.optional("Balancer shafts that are built; none makes the plain engine of another case.", [])
     claim: Claim | None = None
 
     @model_validator(mode="after")
@@ -85,10 +85,10 @@ class Economics(Part):
     """Least force over number and mass of shafts, beside the engine with one more cylinder at equal power."""
 
     kind: Literal["economics"]
-    alternating: bool = f.told(
+    alternating: bool = f.optional(
         "Whether shafts are judged by loads without their mean over the cycle, which no shaft can balance.", True
     )
-    mass_limits: list[f.Mass] = f.needed("Largest masses of the shafts, ascending: the points of the front.")
+    mass_limits: list[f.Mass] = f.required("Largest masses of the shafts, ascending: the points of the front.")
     builds: list[BuildTable] = Field(min_length=1)
     more_cylinders: list[CaseTable] = Field(
         min_length=1, description="Plain engines, rebuilt at equal power; the first decides what is worth building."

@@ -29,7 +29,7 @@ from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
 from laufruhe.load_models.affine import FEASIBLE, MOST_NUMBERS
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.problem.decision import sides_of
-from laufruhe.problem.evaluation import at_many
+from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Around, Bounded, Box, Divided
@@ -104,7 +104,7 @@ class DesignBoxes:
 
     def __init__(self, problem: Problem, value: float, judge: Judge) -> None:
         # as they are told
-        problem = at_many(problem)
+        problem = with_default_sampling(problem)
         self.loads, self.value, self._judge = CornerLoads(problem), value, judge
         self.lower, self.upper = sides_of(problem.mount_decisions)
         self._rest = RestLimits(problem)

@@ -27,7 +27,7 @@ from laufruhe.numerics.norms import NORMS
 from laufruhe.problem import channels
 from laufruhe.problem.decision import Kind, ends_of, sides_of
 from laufruhe.problem.dependence import Dependence, dependence
-from laufruhe.problem.evaluation import at_many
+from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided, divided_on
@@ -123,7 +123,7 @@ class LoadBoxes:
 
     def __init__(self, problem: Problem, left_out: float, throws: OpenThrows | None = None) -> None:
         # as they are told
-        self.problem = problem = at_many(problem)
+        self.problem = problem = with_default_sampling(problem)
         self.loads, turns = MountedLoads(problem, throws), throws is not None
         (low, high), (least, most) = sides_of(problem.mount_decisions), ends_of(self.loads.domains)
         first, last = throws.sides if throws else (np.zeros(0), np.zeros(0))

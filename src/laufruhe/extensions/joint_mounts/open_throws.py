@@ -20,7 +20,7 @@ from laufruhe.load_models.throw_waves import Moving, ThrowWaves
 from laufruhe.load_models.uneven_model import rides_of
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.problem.evaluation import at_many
+from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 
@@ -74,7 +74,10 @@ def throws_at(problem: Problem, phasing: Phasing, candidate: Candidate) -> OpenT
     unknown = problem.feels_gas or problem.fidelity.is_uneven or any(phasing.opened) or phasing.shafts.optional
     if phasing.throw_bounds is None or unknown:
         return None
-    realised, rides = at_many(replace(phasing.realise(candidate), phasing=None)), rides_of(phasing, candidate)
+    realised, rides = (
+        with_default_sampling(replace(phasing.realise(candidate), phasing=None)),
+        rides_of(phasing, candidate),
+    )
     if any(drive.rotor in rides for decision in realised.decisions for drive in decision.rotor_drives):
         return None
     lower, upper = np.transpose(phasing.throw_bounds)

@@ -14,9 +14,9 @@ from laufruhe.extensions.long_cranks.search import best_starts, search_stars
 from laufruhe.numerics.norms import NORMS
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.problem.channels import ROCKING_COUPLE
-from laufruhe.problem.evaluation import Evaluation, evaluate, finely, objective_value
+from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value, with_fine_sampling
 from laufruhe.problem.measure import Measure, Term
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
@@ -92,10 +92,10 @@ def _told(
     designs, complete = [], False
     for steps in dict.fromkeys(stars):
         value, design = _evaluated(phasing, family, steps)
-        fine = finely(design)
+        fine = with_fine_sampling(design)
         # a search at more angles closes what these leave open of a mean (P7)
         shared = firing_bound(problem, fine)
-        left = gap_of(objective_value(problem, fine), max(bound, shared), nothing_of(problem, design.engine))
+        left = gap_of(objective_value(problem, fine), max(bound, shared), numerical_zero(problem, design.engine))
         bound = max(bound, firing_bound(problem, design))
         complete = complete or left <= problem.tolerance
         designs.append(decided(phasing, family, steps, (), value, bound, left <= problem.tolerance))
@@ -130,7 +130,7 @@ def _couples(problem: Problem) -> Problem:
 
 def _by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
     """Return the best star that exchanges of throws lead to, bounded by its own dual rows over all stars (S44, S14)."""
-    nothing = nothing_of(problem)
+    nothing = numerical_zero(problem)
     answers = []
     for family in families:
         simple = _amplitudes(phasing, family) is not None

@@ -15,7 +15,7 @@ from laufruhe.load_models.simulated import simulated_measures
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.witness import EXCESS
-from laufruhe.problem.evaluation import at_many
+from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import EMPTY, NEARLY, Box, Divided, Halving, Over, Parts, Waiting, halves
@@ -84,7 +84,7 @@ def spring_bound(
         return Divided(0.0, 0)
     try:
         with ends_ahead() as ahead:
-            boxes = SpringBoxes(at_many(problem), value, room, near, ahead)
+            boxes = SpringBoxes(with_default_sampling(problem), value, room, near, ahead)
             if not boxes.most_boxes or not boxes.is_sampled_fully:
                 return Divided(0.0, 0)
             ladder = _ladder(boxes, of_many)

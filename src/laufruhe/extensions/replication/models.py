@@ -52,22 +52,22 @@ class GridTable(Table):
 class ReplicaCase(CaseTable):
     """One case, its numbers in place of those of the part."""
 
-    problem: str = f.needed("A name under problems, or a problem file.")
-    numbers: dict[str, Any] = f.told("Numbers in place of those of the part.", {})
-    sweep: dict[str, GridTable] = f.told("Numbers that take several values.", {})
+    problem: str = f.required("A name under problems, or a problem file.")
+    numbers: dict[str, Any] = f.optional("Numbers in place of those of the part.", {})
+    sweep: dict[str, GridTable] = f.optional("Numbers that take several values.", {})
 
 
 class StatementTable(Table):
     """What the source says, and how the same is found here."""
 
     text: Annotated[str, Field(min_length=1)]
-    where: str = f.told("Figure, page or equation.", "")
-    printed: str | None = f.told("Words or number of the source; without it the statement is not counted.")
+    where: str = f.optional("Figure, page or equation.", "")
+    printed: str | None = f.optional("Words or number of the source; without it the statement is not counted.")
     value: str
     unit: str = ""
     expected: Expression | None = Field(default=None, alias="is", description="Printed number in that unit.")
-    within: int | float | f.Share | None = f.told('Allowed: a number in that unit, or "15 %".')
-    holds: str | None = f.told("Condition, with the name value, in place of is and within.")
+    within: int | float | f.Share | None = f.optional('Allowed: a number in that unit, or "15 %".')
+    holds: str | None = f.optional("Condition, with the name value, in place of is and within.")
     why: str = ""
 
     @model_validator(mode="after")
@@ -84,19 +84,21 @@ class AxisTable(Table):
 
     label: str = ""
     ends: list[Expression] | None = Field(default=None, min_length=2, max_length=2)
-    names: list[str] | str | None = f.told("Names of the places 0, 1, 2 ..., in place of numbers.")
+    names: list[str] | str | None = f.optional("Names of the places 0, 1, 2 ..., in place of numbers.")
     ticks: list[int | float] | None = None
-    log: list[Annotated[float, Field(ge=1.0, lt=10.0)]] = f.told("First digits of the ticks of a logarithmic axis.", [])
+    log: list[Annotated[float, Field(ge=1.0, lt=10.0)]] = f.optional(
+        "First digits of the ticks of a logarithmic axis.", []
+    )
 
 
 class CurveTable(Table):
     """A line, or dots where it has a marker and no width."""
 
     y: Expression
-    x: Expression | None = f.told("Place along the horizontal axis; by default the dimension of y.")
+    x: Expression | None = f.optional("Place along the horizontal axis; by default the dimension of y.")
     each: Each = Field(default_factory=dict, alias="for")
     label: str = ""
-    end: str = f.told("Words beside the last point.", "")
+    end: str = f.optional("Words beside the last point.", "")
     colours: list[Hue] = Field(default=list(SERIES), min_length=1)  # type: ignore[arg-type]
     width: Points = 2.0
     dash: list[Points] = Field(default_factory=list, max_length=2)
@@ -111,7 +113,7 @@ class BarsTable(Table):
     each: Each = Field(default_factory=dict, alias="for")
     label: str = ""
     labels: list[str] = Field(default_factory=list)
-    number: f.Format = f.told("Format of the numbers on the bars; three figures by default.", "")
+    number: f.Format = f.optional("Format of the numbers on the bars; three figures by default.", "")
     colours: list[Hue] = Field(default=["grey", "sky", "orange", "blue", "vermilion", "green"], min_length=1)
 
 
@@ -139,7 +141,7 @@ class PanelTable(Table):
     """A panel with two axes, drawn once for every reading."""
 
     title: str = ""
-    once: bool = f.told("Whether one drawing serves all readings.", False)
+    once: bool = f.optional("Whether one drawing serves all readings.", False)
     x: AxisTable = AxisTable()
     y: AxisTable = AxisTable()
     areas: list[AreaTable] = Field(default_factory=list)

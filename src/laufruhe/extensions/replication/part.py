@@ -45,14 +45,14 @@ class Replication(Part):
     """Part of a paper or textbook: what it says beside what is computed here."""
 
     kind: Literal["replication"]
-    says: str = f.told("What the source says, in a sentence.", "")
+    says: str = f.optional("What the source says, in a sentence.", "")
     cases: list[ReplicaCase] = Field(default_factory=list)  # type: ignore[assignment]
-    numbers: dict[str, Any] = f.told("Numbers by name: single numbers, lists, expressions or grids.", {})
-    problems: dict[str, dict[str, Any]] = f.told(
+    numbers: dict[str, Any] = f.optional("Numbers by name: single numbers, lists, expressions or grids.", {})
+    problems: dict[str, dict[str, Any]] = f.optional(
         "Tables of problem files, numbers in braces; `like` names one to start from.", {}
     )
-    quantities: dict[str, str | AskedTable] = f.told("What is computed for every case, by name.", {})
-    define: dict[str, str] = f.told("Expressions that several others use.", {})
+    quantities: dict[str, str | AskedTable] = f.optional("What is computed for every case, by name.", {})
+    define: dict[str, str] = f.optional("Expressions that several others use.", {})
     statements: list[StatementTable] = Field(default_factory=list)
     picture_: PictureTable | None = Field(default=None, alias="picture")
 

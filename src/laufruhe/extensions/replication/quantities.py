@@ -43,7 +43,7 @@ class AskedTable(QuantityTable):
     """A quantity of every case, narrowed."""
 
     quantity: str
-    of: list[str] | None = f.told("Names of the counterweights or balancers whose mass counts.")
+    of: list[str] | None = f.optional("Names of the counterweights or balancers whose mass counts.")
 
 
 class Labelled(NamedTuple):

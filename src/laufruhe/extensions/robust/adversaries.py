@@ -15,7 +15,7 @@ from laufruhe.extensions.robust.tolerance import built, tolerances_of
 from laufruhe.extensions.robust.worst_case import MOST_NODES, check_worst, worst_case
 from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.evaluation import objective_value, told_at
+from laufruhe.problem.evaluation import limit_samples, objective_value
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -93,7 +93,7 @@ class EveryError:
         broken: list[str] = []
         finely = {self.samples: engines}
         for limit in moved_limits(self.problem):
-            angles = told_at(limit.measure, self.samples)
+            angles = limit_samples(limit.measure, self.samples)
             finely[angles] = finely.get(angles) or BuiltEngines(self.problem, values, angles)
             terms: Terms = ((1.0, finely[angles].norm(limit.measure)),)
             own = worst_case(terms, columns, self.tolerance, most=most)
@@ -144,7 +144,7 @@ class DrawnEngines:
         return Found(value, value, tuple(errors), tuple(limits), excess_of(limits), broken, len(self.errors), True)
 
     def _measured(self, values: Sequence[Value], limit: Limit | None) -> Array:
-        samples = self.samples if limit is None else told_at(limit.measure, self.samples)
+        samples = self.samples if limit is None else limit_samples(limit.measure, self.samples)
         if tolerances_of(self.problem).is_affine:
             engines = BuiltEngines(self.problem, values, samples)
             terms: Sequence[tuple[float, AffineNorm]] = (

@@ -29,7 +29,7 @@ from laufruhe.numerics.progress import tell
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import is_affine
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Division, Parts, Waiting
 from laufruhe.prove.certificate import Proof, Reach, certified, withheld
@@ -75,7 +75,7 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
     certificate = withheld(value, math.inf, "a walk by exact evaluations, which proves nothing")
     if witness is None:
         certificate = certified(
-            value, bound, nothing_of(problem), problem.tolerance, Reach.WHOLE, 0.0,
+            value, bound, numerical_zero(problem), problem.tolerance, Reach.WHOLE, 0.0,
             f"branch and bound over assignments, {search.seen} parts bounded by dual rows",
         )  # fmt: skip
     met = final.excess(problem.limits) <= KEPT
@@ -109,7 +109,7 @@ def _walked(problem: Problem, lots: Sequence[Lot], best: Chosen, bound: float, s
             near = list(_neighbours(lots, chosen))
             left = [near[k] for k in random.permutation(len(near))]
     over = 1.0 + 2.0 * error_of(problem, own) + walk.ROUNDING
-    return here if least * over + nothing_of(problem, own.engine) < bound else None
+    return here if least * over + numerical_zero(problem, own.engine) < bound else None
 
 
 def _neighbours(lots: Sequence[Lot], chosen: Chosen) -> Iterator[Chosen]:

@@ -15,7 +15,7 @@ from laufruhe.extensions.robust.tolerance import Over, Tolerance, built, robust_
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, certified
@@ -188,7 +188,7 @@ def robust_result(
 ) -> Result:  # fmt: skip
     """Return the result of a design for built engines; `given` is of the one given."""
     met = max(found.excess, design.excess) <= KEPT
-    nothing = nothing_of(problem, design.evaluation.engine)
+    nothing = numerical_zero(problem, design.evaluation.engine)
     certificate = certified(
         found.bound, shown.bound, nothing, problem.tolerance, shown.reach, shown.kkt_residual, shown.method
     )

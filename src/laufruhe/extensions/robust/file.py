@@ -57,7 +57,9 @@ class TolerancesTable(Table):
         default=None, description="Left on the crankshaft by balancing: an unbalance on each plane, or a grade of "
         "ISO 21940-11 for all of them together.", examples=["G 6.3", "50 g cm"],
     )  # fmt: skip
-    rotor_mass: f.PositiveMass | None = f.told("Mass of the rotor that has the grade: crankshaft, flywheel, clutch.")
+    rotor_mass: f.PositiveMass | None = f.optional(
+        "Mass of the rotor that has the grade: crankshaft, flywheel, clutch."
+    )
     planes: int = Field(
         default=2, ge=1, le=48, description="Number of balancing planes, from the first throw to the last."
     )
@@ -69,7 +71,7 @@ class RobustTable(Table):
 
     closed: ClassVar[str] = "says for which engines one is designed"
 
-    over: str = f.told('"worst case", or a share of engines such as "95 %".', "worst case")
+    over: str = f.optional('"worst case", or a share of engines such as "95 %".', "worst case")
     engines: int = Field(default=1000, ge=20, le=100_000, description="Number of engines that are drawn.")
     seed: int = Field(default=1, ge=0)
 
@@ -349,9 +351,9 @@ MOST_PARTS = 100
 class AssemblyTable(Table):
     """Measured pistons and rods: which of them goes into which cylinder is decided."""
 
-    pistons: str | None = f.told("CSV file with the mass of each piston.")
-    rods: str | None = f.told("CSV file with the masses of each rod at the small end and at the big end.")
-    mass_unit: str = f.told("Unit of the masses in these files.", "g")
+    pistons: str | None = f.optional("CSV file with the mass of each piston.")
+    rods: str | None = f.optional("CSV file with the masses of each rod at the small end and at the big end.")
+    mass_unit: str = f.optional("Unit of the masses in these files.", "g")
 
 
 def _assembly(table: AssemblyTable, problem: Problem, given: Given) -> Problem:

@@ -27,9 +27,9 @@ from laufruhe.numerics.spectrum import common_base
 from laufruhe.numerics.witness import is_over
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import is_affine
-from laufruhe.problem.evaluation import fine_samples, finely, objective_value
+from laufruhe.problem.evaluation import fine_samples, objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
@@ -134,7 +134,7 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
 def _found(problem: Problem, over: Over, start: tuple[Value, ...], drawing: Result) -> tuple[Adversary, Least]:
     """Return who seeks the worst engines, and the design that is best against it."""
     tolerances, samples = tolerances_of(problem), problem.fidelity.samples
-    nothing, random = nothing_of(problem, drawing.final.engine), np.random.default_rng(over.seed)
+    nothing, random = numerical_zero(problem, drawing.final.engine), np.random.default_rng(over.seed)
     if over.share is None and tolerances.is_affine:
         every = EveryError(problem, samples, 0.5 * problem.tolerance)
         return every, _least_worst(problem, every, start, nothing)
@@ -280,7 +280,7 @@ def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], 
     if not problem.decisions:
         # an engine that was found is built, whatever else is: what it breaks is broken, and what it has is had
         engine = evaluated(built(problem, found.errors[0]), start, seeker.samples)
-        best = replace(best, bound=objective_value(problem, finely(engine)), conflict=found.broken)
+        best = replace(best, bound=objective_value(problem, with_fine_sampling(engine)), conflict=found.broken)
         return _read_under(seeker, best, nothing)
     program, values, bound = _Program(problem, nothing), start, 0.0
     program.add([np.zeros(tolerances_of(problem).count)])

@@ -51,10 +51,10 @@ _TOP, _STEP = -0.55, 0.3
 class TolerancesTable(Table):
     """How far a built engine may differ from its drawing."""
 
-    reciprocating_mass: f.Mass = f.told("Tolerance of the reciprocating mass of each cylinder, either way.", 0.0)
-    unbalance: f.Unbalance = f.told("Unbalance left on each balancing plane, at any angle.", 0.0)
+    reciprocating_mass: f.Mass = f.optional("Tolerance of the reciprocating mass of each cylinder, either way.", 0.0)
+    unbalance: f.Unbalance = f.optional("Unbalance left on each balancing plane, at any angle.", 0.0)
     planes: Annotated[int, Field(ge=1, le=48)] = 2
-    alignment: f.NonNegativeLength = f.told("Eccentricity of each aligned mass.", 0.0)
+    alignment: f.NonNegativeLength = f.optional("Eccentricity of each aligned mass.", 0.0)
     aligned_masses: list[f.Mass] = Field(
         default_factory=list, max_length=48, description="Flywheel, clutch and whatever else is centred on the crank."
     )
@@ -184,7 +184,7 @@ _RANDOM = {
 class ToleranceCase(CaseTable):
     """One engine, and what the source says of finer balancing for it."""
 
-    claim: Literal["promises nothing", "matters"] | None = f.told("What the source says of finer balancing.")
+    claim: Literal["promises nothing", "matters"] | None = f.optional("What the source says of finer balancing.")
 
 
 class MarkTable(Table):
@@ -200,7 +200,7 @@ class Tolerance(Part):
     kind: Literal["tolerance"]
     cases: list[ToleranceCase] = Field(min_length=1)  # type: ignore[assignment]
     tolerances: TolerancesTable
-    engines: Annotated[int, Field(ge=100, le=1_000_000)] = f.told("Number of engines that are drawn.", 10_000)
+    engines: Annotated[int, Field(ge=100, le=1_000_000)] = f.optional("Number of engines that are drawn.", 10_000)
     seed: Annotated[int, Field(ge=0)] = 1964
     marks: list[MarkTable] = Field(default_factory=list)
 

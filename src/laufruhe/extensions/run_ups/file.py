@@ -18,9 +18,9 @@ class RunUpTable(Table):
     """From rest to a speed and back, through resonance."""
 
     up_to: f.Speed
-    time: f.Time = f.told("Time in which the engine runs up from rest.", 3.0)
-    shut_down_time: f.Time | None = f.told("Time in which the engine is shut down; by default that of the run-up.")
-    operating_point: str | None = f.told(
+    time: f.Time = f.optional("Time in which the engine runs up from rest.", 3.0)
+    shut_down_time: f.Time | None = f.optional("Time in which the engine is shut down; by default that of the run-up.")
+    operating_point: str | None = f.optional(
         "Operating point whose gas drives the engine during the run; the slowest by default."
     )
 

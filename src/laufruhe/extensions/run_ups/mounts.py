@@ -12,7 +12,7 @@ from laufruhe.load_models.simulated import COARSER
 from laufruhe.machine.mount import every_spring
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_resonance import evaluate_start
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Reach
@@ -72,7 +72,7 @@ def _concluded(
         bound=max(bare, divided.bound),
         reach=Reach.NEAR if divided.boxes else Reach.ASIDE,
         kkt_residual=math.inf if optimum is None else optimum.kkt_residual,
-        method=_method(search.optima, max(found.design.value, nothing_of(problem)), bare, divided),
+        method=_method(search.optima, max(found.design.value, numerical_zero(problem)), bare, divided),
         prices={} if optimum is None else found.joint.prices(optimum),
     )
     design = replace(found.design, problem=problem)

@@ -100,7 +100,9 @@ def _said(work: Callable[Concatenate[Source, P], dict[str, Any]]) -> Callable[Co
         except InputError as error:
             found = {"error": str(error)}
         except ModelError as error:
-            found = {"error": str(InputError(source.path.name, (Complaint.of(error, error.where or "problem"),)))}
+            found = {
+                "error": str(InputError(source.path.name, (Complaint.from_error(error, error.where or "problem"),)))
+            }
         except (SolverError, LaufruheError) as error:
             found = {"error": f"{source.path.name}: {error}"}
         except MemoryError:
@@ -123,7 +125,7 @@ def begin(source: Source) -> dict[str, Any]:
         "objectives": ranks,
         "crank": _opens(source),
         "openCrank": problem.phasing is not None,
-        "doubts": [str(doubt) for doubt in problem.doubts],
+        "doubts": [str(doubt) for doubt in problem.plausibility_warnings],
     }
 
 
@@ -170,7 +172,7 @@ def measure(source: Source, asked: Asked) -> dict[str, Any]:
     tables, whole = _asked_about(source, asked, with_held=True)
     problem = replace(scene_of(whole, tables, source.content).problem, limits=whole.limits)
     values = decided(problem, asked.design)
-    evaluation = evaluate(problem.held([values[decision.name] for decision in problem.decisions]))
+    evaluation = evaluate(problem.fixed_at([values[decision.name] for decision in problem.decisions]))
     limits = {limit.name: limit.value for limit in limit_values(problem, evaluation)}
     return {"objective": objective_value(problem, evaluation) if problem.objective else None, "limits": limits}
 
@@ -246,7 +248,7 @@ def front(source: Source, asked: Asked, across: str, k: int) -> dict[str, Any]:
     if point.conflict:
         return {"skipped": True}
     problem, unit = own.problem, own.across.unit
-    design = evaluate(problem.held(point.values))
+    design = evaluate(problem.fixed_at(point.values))
     (shown_unit, factor), (of_unit, of_factor) = readable(unit), readable(problem.objective_unit or "")
     # a bound of a simpler problem is none of the whole one
     bound = None if simpler else {"at": most, "value": point.bound}

@@ -15,7 +15,7 @@ from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import is_affine
 from laufruhe.problem.measure import Limit, Measure
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import best_bound, gap_of
@@ -86,7 +86,7 @@ class Follower:
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
         self._model = model = AffineModel(problem)
-        self._nothing = nothing_of(problem)
+        self._nothing = numerical_zero(problem)
         self.samples = min(model.full_samples, FEW_ANGLES)
         self._coarse = model.at(self.samples)
         self._fine = model.at(TIMES * self.samples)

@@ -65,7 +65,7 @@ class Scene:
         """Return the exact model's answer to the design that follows, or to that given where none does."""
         if found is None or found.conflict:
             return self.given
-        return evaluate(self.problem.held(found.values))
+        return evaluate(self.problem.fixed_at(found.values))
 
     def standing(self, limits: Sequence[Limit], design: Evaluation, found: Followed | None) -> tuple[LimitValue, ...]:
         """Return how a design stands to limits, with the prices of those that follow [SI]."""

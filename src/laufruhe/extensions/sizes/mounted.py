@@ -18,7 +18,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision, Drive, Kind, NumberDrive, RotorDrive
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Value
 from laufruhe.prove.certificate import Reach, room_of
@@ -89,7 +89,7 @@ def _bound(problem: Problem, design: Design) -> float:
     if model.moves_rod or of_sizes or design.excess > KEPT:
         return 0.0
     relaxed, near = with_masses(problem, model, design.values)
-    room = room_of(design.value, problem.tolerance, nothing_of(problem, design.evaluation.engine))
+    room = room_of(design.value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
     return max(proven(Question(relaxed, design.value, room, near)).bound, mounts_bound(relaxed, near))
 
 

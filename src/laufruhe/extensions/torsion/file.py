@@ -47,8 +47,8 @@ class PieceTable(Table):
 class SectionTable(Table):
     """What any shaft between two discs has."""
 
-    pieces: list[PieceTable] = f.told("Round pieces, one behind another, in place of the stiffness.", [])
-    diameter: f.PositiveLength | None = f.told(
+    pieces: list[PieceTable] = f.optional("Round pieces, one behind another, in place of the stiffness.", [])
+    diameter: f.PositiveLength | None = f.optional(
         "Diameter of the weakest section, needed for a stress; by default that of the pieces."
     )
     bore: f.NonNegativeLength = 0.0
@@ -74,36 +74,36 @@ class DiscTable(Table):
     name: Name
     end: Literal["front", "rear"]
     inertia: f.OpenInertia
-    damping: TorsionalDamping = f.told("Viscous damping against the block.", 0.0)
-    shaft: ShaftTable = f.needed("Shaft from this disc to the next one towards the throws.")
+    damping: TorsionalDamping = f.optional("Viscous damping against the block.", 0.0)
+    shaft: ShaftTable = f.required("Shaft from this disc to the next one towards the throws.")
 
 
 class AbsorberTable(Table):
     """A viscous or rubber damper, or a pendulum."""
 
     name: Name
-    on: str = f.needed("Name of its disc, or throw 1, throw 2 ...")
+    on: str = f.required("Name of its disc, or throw 1, throw 2 ...")
     inertia: f.OpenInertia
     damping: OpenTorsionalDamping = 0.0
     stiffness: OpenTorsionalStiffness | None = None
     loss_factor: f.LossFactor = 0.0
-    order: f.Positive | None = f.told("Order to which a pendulum is tuned.")
+    order: f.Positive | None = f.optional("Order to which a pendulum is tuned.")
     damping_ratio: f.NonNegative = 0.0
 
 
 class TorsionTable(Table):
     """Discs and shafts of the torsional system of the crankshaft."""
 
-    throw_inertia: Inertias = f.needed(
+    throw_inertia: Inertias = f.required(
         "Moment of inertia of a throw: pin, webs and counterweights, without rod and piston."
     )
-    cylinder_damping: TorsionalDampings = f.told("Viscous damping of every throw against the block.", [0.0])
-    loss_factor: f.LossFactor = f.told("Hysteretic loss factor of every shaft that has none of its own.", 0.0)
+    cylinder_damping: TorsionalDampings = f.optional("Viscous damping of every throw against the block.", [0.0])
+    loss_factor: f.LossFactor = f.optional("Hysteretic loss factor of every shaft that has none of its own.", 0.0)
     shear_modulus: f.PositivePressure = STEEL
-    speeds: f.Pair[f.Speed] | None = f.told(
+    speeds: f.Pair[f.Speed] | None = f.optional(
         "Range of speeds in which the response is shown and barred speeds are looked for."
     )
-    output: str | None = f.told("Disc at which the load takes its torque; the last one by default.")
+    output: str | None = f.optional("Disc at which the load takes its torque; the last one by default.")
     crank: CrankTable | None = None
     discs: list[DiscTable] = Field(default_factory=list)
     absorbers: list[AbsorberTable] = Field(default_factory=list)
@@ -117,7 +117,7 @@ class _Opened:
 
     def number(self, value: float | Open, key: str, unit: str, name: str, parts: Sequence[str]) -> float:
         """The number that some parts have, or start from."""
-        given = Open.of(value)
+        given = Open.from_value(value)
         drives = (NumberDrive(TORSION, (part, key)) for part in parts)
         self.decisions += given.decisions(f"torsion.{name}.{key}", unit, *drives)
         return given.start
@@ -232,7 +232,7 @@ def _section(
 
 def _piece(piece: PieceTable, where: str, count: int) -> tuple[float, float, float]:
     """Length, diameter and bore; an open diameter is that of a shaft of one piece."""
-    given = Open.of(piece.diameter)
+    given = Open.from_value(piece.diameter)
     if given.is_open and count > 1:
         raise Refused(f"{where}.diameter", None, "is open, and its shaft has other pieces", "fix it, or give one piece")
     if piece.bore >= given.lower:
@@ -245,7 +245,7 @@ def _absorber(table: AbsorberTable, names: Sequence[str], where: str, opened: _O
         raise Refused(f"{where}.on", table.on, "is no disc", nearest(table.on, list(names)))
     if table.order is not None and table.stiffness is not None:
         raise Refused(f"{where}.order", None, "is of a pendulum, and its stiffness is that of rubber", "keep one")
-    held = Open.of(table.stiffness).lower or Open.of(table.damping).lower or table.order
+    held = Open.from_value(table.stiffness).lower or Open.from_value(table.damping).lower or table.order
     if not held:
         rule = "leaves its ring to nothing where it is zero"
         raise Refused(f"{where}.damping", None, rule, "give stiffness, damping or order, with bounds above zero")

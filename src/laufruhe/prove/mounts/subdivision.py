@@ -20,7 +20,7 @@ from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.processes import called
 from laufruhe.problem import channels
 from laufruhe.problem.dependence import depends
-from laufruhe.problem.evaluation import at_many
+from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
@@ -128,7 +128,7 @@ class StiffnessBoxes:
 
     def __init__(self, problem: Problem, left_out: float, enough: float = math.inf) -> None:
         self.enough = enough
-        self.problem = problem = at_many(named_part(problem))
+        self.problem = problem = with_default_sampling(named_part(problem))
         evaluation = evaluate_start(problem)
         self.model = BoxModel(problem, evaluation)
         terms = [term for term in problem.load_terms if term.measure.on_mounts]

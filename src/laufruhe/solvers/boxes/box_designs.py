@@ -13,7 +13,7 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Side
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Over
@@ -112,7 +112,7 @@ class RebalancedSearch(Search[S, RebalancedDesign]):
         started, problem = time.perf_counter(), self.problem
         initial, best, bound, boxes = evaluate(problem), first, math.inf, 1
         if not isinstance(root, Over) and first is not None:
-            nothing = nothing_of(problem)
+            nothing = numerical_zero(problem)
             best, bound, boxes = divided(self, root, first, nothing, problem.tolerance, most, f"boxes of {what}")
         timing = {"solve": time.perf_counter() - started}
         if best is None or (math.isinf(bound) and best.design.rank[0]):

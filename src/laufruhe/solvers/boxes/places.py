@@ -14,7 +14,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Side
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import EMPTY, Box, Over, halves
@@ -104,7 +104,7 @@ def solve_places_with(problem: Problem, prove: Solve, how: str, propose: Propose
     if not result.status.has_design or not problem.search.proves:
         return result
     first = RebalancedDesign(judged(problem, values_of(problem, result), result.final.samples), result)
-    _, bound, _ = divided(search, root, first, nothing_of(problem), problem.tolerance, 1, "boxes of places")
+    _, bound, _ = divided(search, root, first, numerical_zero(problem), problem.tolerance, 1, "boxes of places")
     return with_bound(result, bound, f"{how} with places at the corners of their bounds")
 
 

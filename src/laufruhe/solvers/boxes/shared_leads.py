@@ -11,7 +11,7 @@ from laufruhe.errors import ModelError
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import divide
 from laufruhe.prove.boxes.shared_gas import SharedGasBoxes
@@ -35,7 +35,7 @@ def solve_shared_leads(problem: Problem) -> Result:
     value, room, known = math.inf, 0.0, None
     if best is not None and best.excess <= KEPT:
         value = best.value
-        room = SHARE * problem.tolerance * max(value, nothing_of(problem))
+        room = SHARE * problem.tolerance * max(value, numerical_zero(problem))
         known = known_of(best, np.array([float(x.real) for x in best.values]))
     divided = divide(boxes, lower, upper, value, room, problem.search.boxes_or(MOST_BOXES), known)
     timing = {"solve": time.perf_counter() - started}

@@ -17,7 +17,7 @@ from laufruhe.problem.decision import Domain, columns_of, vector_of
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit, Measure
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, judged, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
@@ -128,7 +128,9 @@ def _moving(rows: AffineProblem, designs: Sequence[Array]) -> list[Domain]:
 
 def _good(found: Result, problem: Problem, model: AffineModel, x: Array, end: Array) -> list[Array]:
     """The design farthest from the optimum towards an end that the exact model shows to be as good."""
-    most = objective_value(problem, found.final) * (1.0 + problem.tolerance) + nothing_of(problem, found.final.engine)
+    most = objective_value(problem, found.final) * (1.0 + problem.tolerance) + numerical_zero(
+        problem, found.final.engine
+    )
     for share in SHARES:
         there = x + share * (end - x)
         values = [domain.complex_value(there) for domain in model.domains]

@@ -14,10 +14,10 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
 from laufruhe.problem.channels import OF_MOUNTS
 from laufruhe.problem.dependence import depends
-from laufruhe.problem.evaluation import FINE, evaluate, finely
+from laufruhe.problem.evaluation import FINE_SAMPLES, evaluate, with_fine_sampling
 from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.mount_resonance import off_resonance
-from laufruhe.problem.nothing import ROUNDING, nothing_of
+from laufruhe.problem.numerical_zero import ROUNDING, numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, broken_limits, concluded, judged, none_within, not_found
@@ -43,7 +43,11 @@ def beyond_mounts(problem: Problem) -> tuple[str, ...]:
     if not limits:
         return ()
     apart = off_resonance(replace(problem.balance, objective=(Term(limits[0].measure),), limits=limits))
-    return solve_unbalances(apart).conflict if apart.decisions else broken_limits(limits, finely(evaluate(apart)))
+    return (
+        solve_unbalances(apart).conflict
+        if apart.decisions
+        else broken_limits(limits, with_fine_sampling(evaluate(apart)))
+    )
 
 
 def solve_sharply(problem: Problem) -> Result:
@@ -74,7 +78,7 @@ def solve_unbalances(problem: Problem, sharply: bool = False, angles: int = 0) -
         return none_within(problem, initial, hopeless, {"model": modelled - started})
     model = model.with_limits([limit for limit in problem.limits if limit not in idle])
     begin = int(angles * float(problem.engine.cycle.base_order / model.base))
-    optimum, samples = _refine(model.problem, model, nothing_of(problem), begin)
+    optimum, samples = _refine(model.problem, model, numerical_zero(problem), begin)
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
     if optimum is None:
@@ -90,7 +94,7 @@ def solve_unbalances(problem: Problem, sharply: bool = False, angles: int = 0) -
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
     design = judged(problem, values, cycle_samples)
     if idle and design.excess > KEPT:
-        design = judged(problem, values, finely(design.evaluation).samples)
+        design = judged(problem, values, with_fine_sampling(design.evaluation).samples)
     initial = replace(initial, samples=design.evaluation.samples)
     timing["evaluate"] = time.perf_counter() - solved
     return concluded(design, initial, _shown(model.problem.load_limits, idle, optimum, design.value), timing)
@@ -110,7 +114,7 @@ def _refine(problem: Problem, model: AffineModel, nothing: float, begin: int) ->
     """
     samples, best = max(_first_samples(model), begin), None
     # a mean that is all but as little as can be is kept at no few angles
-    most = max(MOST_DOUBLINGS, math.ceil(math.log2(2 * FINE / samples)))
+    most = max(MOST_DOUBLINGS, math.ceil(math.log2(2 * FINE_SAMPLES / samples)))
     for k in in_time(range(most + 1)):
         found = _allowed(problem, model, samples, nothing)
         if found is None:
@@ -192,7 +196,7 @@ def _idle(problem: Problem, model: AffineModel) -> tuple[list[Limit], tuple[str,
     """
     still = [limit for limit in problem.load_limits if not model.norm(limit.measure, model.full_samples).slope.any()]
     # a whole number of times as fine
-    samples = model.full_samples * max(2, math.ceil(FINE / model.full_samples))
+    samples = model.full_samples * max(2, math.ceil(FINE_SAMPLES / model.full_samples))
     none = np.zeros(sum(domain.width for domain in model.domains))
     idle = [(limit, model.norm(limit.measure, samples).value(none)) for limit in still]
     broken = [limit.name for limit, value in idle if value > limit.maximum * (1.0 + KEPT)]

@@ -11,7 +11,7 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time, passed
 from laufruhe.problem.measure import Limit
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import NEARLY, Divided
 from laufruhe.prove.certificate import Reach, certified, room_of
@@ -51,7 +51,9 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
         met = found is not None and found.design.excess <= KEPT
         # of what few angles read too much no box can take anything
         value = found.design.value - over_read(problem, found.design.evaluation) if found and met else math.inf
-        room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine if found else None))
+        room = room_of(
+            value, problem.tolerance, numerical_zero(problem, found.design.evaluation.engine if found else None)
+        )
         near = found.design.values if found is not None else ()
         known = None if found is None or not met else known_of(found.design, mount_numbers(found.design))
         question, count = Question(problem, value, room, near, known), len(problem.mount_decisions)
@@ -73,7 +75,7 @@ def bounded_under(result: Result, value: float, enough: float = math.inf, of_man
     problem, certificate = result.problem, result.certificate
     if certificate is None or result.objective is None or divides(problem) or problem.phasing is not None:
         return result
-    nothing = nothing_of(problem, result.final.engine)
+    nothing = numerical_zero(problem, result.final.engine)
     room = max(room_of(value, problem.tolerance, nothing), (value - min(enough, value)) / NEARLY)
     question = Question(problem, value, room, values_of(problem, result), of_many=of_many)
     found = proven(question)

@@ -19,7 +19,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
@@ -195,7 +195,7 @@ def mounts_bound(problem: Problem, near: Sequence[Value] = ()) -> float:
         alone = replace(problem, objective=felt)
         evaluation = evaluate(alone, alone.design(list(near)))
         value = objective_value(alone, evaluation)
-        found += proven(Question(alone, value, room_of(value, alone.tolerance, nothing_of(alone)), near)).bound
+        found += proven(Question(alone, value, room_of(value, alone.tolerance, numerical_zero(alone)), near)).bound
     if block:
         limits = tuple(limit for limit in problem.load_limits if not limit.measure.on_mounts)
         alone = replace(off_resonance(problem).balance, objective=block, limits=limits)
@@ -219,7 +219,7 @@ def _result(
     among: bool,
 ) -> Result:
     problem, design, optimum = search.problem, found.design, found.optimum
-    nothing = nothing_of(problem, design.evaluation.engine)
+    nothing = numerical_zero(problem, design.evaluation.engine)
     bound = divided.bound
     # throws that move are not in the bound
     if search.moves is None and problem.search.proves and gap_of(design.value, bound, nothing) > problem.tolerance:

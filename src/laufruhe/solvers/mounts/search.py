@@ -16,7 +16,7 @@ from laufruhe.numerics.progress import tell
 from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Limit
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import FEASIBLE, Design, given_design
@@ -125,7 +125,7 @@ class MountSearch:
         if start is not None and start.excess <= SLACK:
             self._keep(Found(start, self.joint))
             return
-        nothing = nothing_of(self.problem)
+        nothing = numerical_zero(self.problem)
         self._under_what_is_felt(lambda: self._search(self._points))
         for _ in rounds(MOST_SIZES):
             if self.best is None or self.best.design.value >= SMALL * self._size or self._size <= nothing:

@@ -24,9 +24,9 @@ from laufruhe.numerics.norms import RMS
 from laufruhe.numerics.progress import tell, within
 from laufruhe.numerics.workers import executor_for, in_turn, working_on
 from laufruhe.problem import channels
-from laufruhe.problem.evaluation import Evaluation, at_many, evaluate
+from laufruhe.problem.evaluation import Evaluation, evaluate, with_default_sampling
 from laufruhe.problem.measure import Measure, Term
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.best_first import Divided
@@ -129,7 +129,7 @@ def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> t
     model = family.model(phasing)
     given = model.problem
     found = search_designs(
-        model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, nothing_of(given)
+        model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, numerical_zero(given)
     )
     stars: list[tuple[float, Star]] = [
         (s.value, (family.candidate(phasing, s.star, phasing.without(s.built)), family.steps_of(s.star)))
@@ -239,7 +239,7 @@ def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs
     whole = len(found) == designs and not phasing.continuous
     ranking = [_entry(phasing, each, whole and each is best) for each in found if not _rank(each)[0]]
     details = ranking_result(phasing, best.candidate, ranking, designs, len(found), _method(found, designs))
-    nothing = nothing_of(problem, best.result.final.engine)
+    nothing = numerical_zero(problem, best.result.final.engine)
     bound = _bound(found) if whole else 0.0
     divided = _divided(problem, phasing, best)
     bound = max(bound, divided.bound)
@@ -256,11 +256,11 @@ def _divided(problem: Problem, phasing: Phasing, best: StarDesign) -> Divided:
     """Return what provers tell of mounts and throws between bounds together."""
     if phasing.throw_bounds is None or not best.is_met or not problem.search.proves or passed():
         return Divided(0.0, 0)
-    realised = at_many(replace(phasing.realise(best.candidate), phasing=None))
+    realised = with_default_sampling(replace(phasing.realise(best.candidate), phasing=None))
     design = judged(realised, values_of(realised, best.result))
     known = known_of(design, mount_numbers(design))
     value = design.value - over_read(realised, design.evaluation)
-    room = room_of(value, problem.tolerance, nothing_of(problem, design.evaluation.engine))
+    room = room_of(value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
     return proven(Question(realised, value, room, design.values, known, moves=(phasing, best.candidate)))
 
 

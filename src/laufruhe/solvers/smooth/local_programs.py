@@ -16,7 +16,7 @@ from laufruhe.numerics.budget import in_time, passed
 from laufruhe.problem.decision import Domain, domains_of, ends_of, vector_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Divided
@@ -74,7 +74,7 @@ class LocalProgram:
         """
         edges = self.edges(shares)
         try:
-            evaluation = evaluate(self.problem.held(self.values(shares)))
+            evaluation = evaluate(self.problem.fixed_at(self.values(shares)))
             rooms = [-evaluation.standing(limit).excess for limit in self.problem.limits]
             return np.array([objective_value(self.problem, evaluation), *rooms, *edges])
         except ModelError:
@@ -211,7 +211,7 @@ def proven(program: LocalProgram, best: Array, bounded: Bounded) -> Proven:
         value, room = math.inf, 0.0
         if found.design.excess <= KEPT:
             value = found.design.value
-            room = room_of(value, problem.tolerance, nothing_of(problem, found.design.evaluation.engine))
+            room = room_of(value, problem.tolerance, numerical_zero(problem, found.design.evaluation.engine))
             # boxes do not make good what few angles read too much
             value -= over_read(problem, found.design.evaluation)
         found = replace(found, divided=bounded(value, room, found.design))

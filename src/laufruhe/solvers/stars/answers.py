@@ -11,7 +11,7 @@ from laufruhe.errors import ModelError
 from laufruhe.extension import lack
 from laufruhe.load_models.amplitudes import AmplitudeObjective, amplitude_objective
 from laufruhe.load_models.pair_tables import PairObjective
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import gap_of
@@ -149,7 +149,7 @@ def stars_answer(phasing: Phasing, family: Family, found: StarsFound, method: st
 
 def _by_designs(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
     """Return the answer of cone programs, with cuts."""
-    nothing = nothing_of(problem)
+    nothing = numerical_zero(problem)
     count = 10**9 if phasing.method is Method.ENUMERATION else phasing.best
     answers = []
     for family in families:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from laufruhe.problem.evaluation import finely
+from laufruhe.problem.evaluation import with_fine_sampling
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import KEPT, state
@@ -47,7 +47,7 @@ class StarDesign:
         result = self.result
         if not result.status.has_design:
             return result.status is Status.INFEASIBLE
-        return finely(result.final).excess(result.problem.limits) > KEPT
+        return with_fine_sampling(result.final).excess(result.problem.limits) > KEPT
 
     @property
     def value(self) -> float:

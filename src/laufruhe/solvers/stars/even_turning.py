@@ -15,7 +15,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified
@@ -72,7 +72,7 @@ def _any_star(problem: Problem, phasing: Phasing) -> Result:
     result = solve_fixed(replace(phasing.realise(candidate), phasing=None))
     value = objective_value(result.problem, result.final)
     method = "every star that fires evenly turns the crank as evenly"
-    proof = certified(value, value, nothing_of(problem), problem.tolerance, Reach.WHOLE, 0.0, method)
+    proof = certified(value, value, numerical_zero(problem), problem.tolerance, Reach.WHOLE, 0.0, method)
     ranking = [ranked_star(phasing, candidate, family.first, value, value, True)]
     details = ranking_result(phasing, candidate, ranking, sum(each.size for each in families), 1, method)
     return with_star(problem, phasing, result, candidate, proof, details)
@@ -88,7 +88,7 @@ def _whole(problem: Problem, phasing: Phasing, found: Result, given: Evaluation,
     shared = sum((term.weight * found.final.value(term.measure) for term in terms), 0.0)
     value, proof = objective_value(problem, found.final), found.certificate
     bound = shared + (proof.lower_bound if has_terms else 0.0)
-    nothing = nothing_of(problem, found.final.engine)
+    nothing = numerical_zero(problem, found.final.engine)
     method = f"{proof.method}; every star that fires evenly turns the crank as evenly"
     details = found.phasing
     if details is not None and has_terms:

@@ -16,7 +16,7 @@ from laufruhe.load_models.lone_parts import gas_tells_apart
 from laufruhe.machine.firing import MOST_ORDERS
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import tell
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified, room_of
@@ -90,7 +90,7 @@ def _of_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Resul
         again = partial(solve_phasing, search=search)
         told = solve_told_alike(problem, even, again) if is_even and families_of(even)[0] else None
         return _uneven(problem, phasing, None if told is None or told.objective is None else told)
-    alone = unlike or phasing.shares_throws or any(measure.is_told_apart for measure in problem.measures)
+    alone = unlike or phasing.shares_throws or any(measure.is_cylinder_resolved for measure in problem.measures)
     if (problem.feels_order or unlike) and is_even and alone:
         stars = every_star(phasing)
         result = by_each_order(problem, phasing, stars) if stars else no_star(problem, none_fires(phasing)[0])
@@ -180,7 +180,7 @@ def by_each_order(
         why = f"no firing order and no set of shafts that may be built {'keeps' if proven else 'was found that keeps'}"
         status, names = Status.INFEASIBLE if proven else Status.FAILED, [limit.name for limit in problem.limits]
         return no_star(problem, f"{why} the limits", status, tuple(names) if proven else ())
-    nothing = nothing_of(problem)
+    nothing = numerical_zero(problem)
     best = solved[0]
     for design in solved[1:]:
         if design.value < best.value - room_of(best.value, _share(problem), nothing):
@@ -231,7 +231,7 @@ def _solved(
     lowest, broken = floors(problem, phasing, designs if is_bounded else ())
     if not is_bounded:
         lowest, broken = np.zeros(len(designs)), np.zeros(len(designs), dtype=bool)
-    places, nothing = np.argsort(lowest, kind="stable"), nothing_of(problem)
+    places, nothing = np.argsort(lowest, kind="stable"), numerical_zero(problem)
     for k, place in enumerate(places):
         best = min((one.value for one in found), default=math.inf)
         tell("firing orders and sets of shafts", k, len(designs), best)
@@ -269,7 +269,7 @@ def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
         why = f"each of the best {counted(len(fired), 'star')} breaks a limit between angles that the search looks at"
         return no_star(problem, f"{why}; raise phasing.best or fidelity.samples", Status.FAILED)
     shared = firing_bound(problem, result.final) if result.objective and not any(phasing.opened) else 0.0
-    bound, nothing = max(answer.bound, shared), nothing_of(problem)
+    bound, nothing = max(answer.bound, shared), numerical_zero(problem)
     result, doubt = result_under(result, bound, nothing)
     value = result.objective.value if result.objective else best.value
     certificate = certified(
@@ -289,7 +289,7 @@ def _needed(problem: Problem, phasing: Phasing, best: Decided) -> tuple[int, ...
         return kept
     model = best.family.model(phasing)
     owners = owners_of(model)
-    nothing = nothing_of(problem)
+    nothing = numerical_zero(problem)
     for k in sorted(best.built, key=lambda k: -phasing.shafts.masses[k]):
         fewer = tuple(j for j in kept if j != k)
         again, _ = solve_design(model, best.steps, fewer, owners, _share(problem), nothing)

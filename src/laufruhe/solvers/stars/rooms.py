@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
-from laufruhe.problem.evaluation import Evaluation, finely
+from laufruhe.problem.evaluation import Evaluation, with_fine_sampling
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import broken_limits
@@ -49,4 +49,4 @@ def with_room(problem: Problem, limits: Sequence[Limit], given: Evaluation) -> t
 
 def surely_broken(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[str, ...]:
     """Of limits that nothing open moves those that are broken: many angles tell, and not the few of a fidelity (P7)."""
-    return broken_limits(limits, finely(evaluation))
+    return broken_limits(limits, with_fine_sampling(evaluation))

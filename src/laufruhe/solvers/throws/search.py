@@ -17,7 +17,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.witness import EXCESS
 from laufruhe.problem.evaluation import over
 from laufruhe.problem.measure import load_rows
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.best_first import Over
@@ -127,7 +127,7 @@ def search_throws(
     improve
         Told of throws that look good.
     """
-    nothing = nothing_of(problem)
+    nothing = numerical_zero(problem)
     proven = best is not None and best.value - floor <= room_of(best.value, problem.tolerance, nothing)
     if proven or not knows(problem):
         return None
@@ -285,7 +285,7 @@ class ThrowSearch(Search[_Part, _Best]):
 
     def _most(self, best: StarDesign) -> float:
         """Return what the objective of a design is not over, with what its samples may have missed."""
-        nothing, result = nothing_of(self._problem), best.result
+        nothing, result = numerical_zero(self._problem), best.result
         read = read_under(result.problem, result.final, best.value, math.inf, nothing)
         return read.value + read.doubt + nothing
 

@@ -23,7 +23,7 @@ from laufruhe.numerics.progress import tell
 from laufruhe.problem.decision import columns_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side, Term
-from laufruhe.problem.nothing import nothing_of
+from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.certificate import Reach, certified
@@ -208,7 +208,7 @@ def _is_nothing(best: StarDesign | None) -> bool:
     """Whether there is nothing to gain: no norm lies under zero."""
     if best is None or best.result.objective is None:
         return False
-    return best.value <= nothing_of(best.result.problem, best.result.final.engine)
+    return best.value <= numerical_zero(best.result.problem, best.result.final.engine)
 
 
 def _size(problem: Problem, best: StarDesign | None) -> float:
@@ -282,7 +282,7 @@ def _result(
     problem: Problem, phasing: Phasing, even: Result | None, found: Sequence[StarDesign],
     trade: tuple[TradePoint, ...], bound: float, source: str,
 ) -> Result:  # fmt: skip
-    nothing = nothing_of(problem)
+    nothing = numerical_zero(problem)
     result, doubt = result_under(found[0].result, bound, nothing)
     best = replace(found[0], result=result)
     method = f"IPOPT from {counted(len(found), 'start')}, firing orders kept; bound from {source}"

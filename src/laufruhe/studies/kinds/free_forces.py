@@ -101,8 +101,8 @@ class FreeForces(Part):
 
     kind: Literal["free forces"]
     cases: list[FreeForcesCase] = Field(min_length=1)  # type: ignore[assignment]
-    spacing: f.PositiveLength = f.needed("Unit of length of the couples: the distance of the throws.")
-    digits: Annotated[int, Field(ge=0, le=12)] = f.told("Digits after the decimal point.", 4)
+    spacing: f.PositiveLength = f.required("Unit of length of the couples: the distance of the throws.")
+    digits: Annotated[int, Field(ge=0, le=12)] = f.optional("Digits after the decimal point.", 4)
 
     def settings(self) -> dict[str, Any]:
         """The unit of length alone: what is printed elsewhere changes nothing."""

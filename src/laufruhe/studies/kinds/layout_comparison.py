@@ -40,7 +40,7 @@ class LayoutComparison(SweptPart):
     further: list[QuantityName] = Field(
         default_factory=list, max_length=8, description="By which the designs decided are ranked beside the metric."
     )
-    flywheel_for: f.Positive | None = f.told(
+    flywheel_for: f.Positive | None = f.optional(
         "Degree of irregularity for which the least inertia beside pistons and rods is told, and ranked."
     )
 

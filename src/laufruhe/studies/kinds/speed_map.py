@@ -65,7 +65,7 @@ class MeasureTable(QuantityTable):
     """One line of the map."""
 
     quantity: QuantityName
-    limit: str | None = f.told("Limit that is drawn beside those of the problem.")
+    limit: str | None = f.optional("Limit that is drawn beside those of the problem.")
 
 
 class SpeedMap(Part):
@@ -73,12 +73,12 @@ class SpeedMap(Part):
 
     kind: Literal["speed map"]
     speeds: SpeedsTable
-    measures: list[MeasureTable] = f.told(
+    measures: list[MeasureTable] = f.optional(
         "Measures of the map; by default all that the problem minimises or limits.", []
     )
-    operating_point: str | None = f.told("Operating point whose load is kept at every speed; the first by default.")
+    operating_point: str | None = f.optional("Operating point whose load is kept at every speed; the first by default.")
     designs: list[DesignName] = Field(default=["as given", "as decided"], min_length=1)
-    by_order: bool = f.told("Whether the amplitude of every order of the first measure is shown too.", False)
+    by_order: bool = f.optional("Whether the amplitude of every order of the first measure is shown too.", False)
 
     def points(self, scenes: Scenes) -> list[Point]:
         """A case each: what is decided does not hang on the speeds."""

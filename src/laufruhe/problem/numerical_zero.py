@@ -20,7 +20,7 @@ SAMPLES = 96
 """Number of samples over the cycle for these sizes."""
 
 
-def nothing_of(problem: Problem, engine: Engine | None = None) -> float:
+def numerical_zero(problem: Problem, engine: Engine | None = None) -> float:
     """Return the objective that counts as zero [SI]: the rounding error of the sum over an engine's parts.
 
     The objective of a balanced engine gives no scale, so that of each part alone is taken. A part without a load of
