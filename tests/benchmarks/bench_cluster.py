@@ -26,7 +26,7 @@ from pages import PAGES, publish
 
 from laufruhe.numerics.cluster import cluster as on_cluster
 from laufruhe.numerics.processes import Processes
-from laufruhe.numerics.workers import HERE, each
+from laufruhe.numerics.workers import SERIAL, unordered_map
 from laufruhe.plots.picture import save_picture
 from laufruhe.present import picture as p
 from laufruhe.studies.sampled import MOST_TABLED
@@ -115,13 +115,13 @@ def overheads(own: clusters.Cluster) -> tuple[list[str], float]:
     """What one piece costs that does nothing; of a cluster [ms]."""
 
     def spent(executor: Executor) -> float:
-        list(each(abs, [-1] * 50, executor))
+        list(unordered_map(abs, [-1] * 50, executor))
         began = time.perf_counter()
-        list(each(abs, [-1] * TASKS, executor))
+        list(unordered_map(abs, [-1] * TASKS, executor))
         return 1e3 * (time.perf_counter() - began) / TASKS
 
     with Processes(2) as pool, on_cluster(own.address) as dask:
-        rows = [("this process", spent(HERE)), ("processes, 2", spent(pool)), ("Dask, 2 workers", spent(dask))]
+        rows = [("this process", spent(SERIAL)), ("processes, 2", spent(pool)), ("Dask, 2 workers", spent(dask))]
     told = [f"| {name} | {milliseconds:.2f} |" for name, milliseconds in rows]
     return ["| who works | ms a piece |", "| --- | ---: |", *told], rows[-1][1]
 

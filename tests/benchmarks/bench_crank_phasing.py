@@ -29,7 +29,7 @@ from laufruhe.load_models.star_model import StarModel
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import even_patterns
 from laufruhe.machine.layouts import inline
-from laufruhe.physics.crank_stars import score_stars
+from laufruhe.physics.crank_stars import star_sums
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.present.tables import Table
 from laufruhe.problem.numerical_zero import numerical_zero
@@ -187,7 +187,7 @@ def scoring() -> list[tuple[str, ...]]:
     for n in (6, 8, 10, 12):
         stars = np.argsort(rng.random((SCORED, n)), axis=1).astype(np.uint8)
         places = inline(n, 1.0).throw_positions
-        rate = SCORED / quickest(lambda s=stars, x=places, n=n: score_stars(s, n, x, ORDERS))
+        rate = SCORED / quickest(lambda s=stars, x=places, n=n: np.abs(star_sums(s, n, x, ORDERS)))
         # two complex sums an order of n terms each, and a length of each: 2 squares, a sum, a root
         work = len(ORDERS) * 2 * (2 * n + 4)
         limit = additions / work

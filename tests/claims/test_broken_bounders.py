@@ -17,7 +17,7 @@ from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.processes import Processes
 from laufruhe.numerics.witness import STRICT, check_bound, collected
-from laufruhe.numerics.workers import each
+from laufruhe.numerics.workers import unordered_map
 from laufruhe.prove import certificate
 from laufruhe.prove.boxes.leads import LeadBoxes
 from laufruhe.prove.boxes.monotone import MonotoneProblem
@@ -136,7 +136,7 @@ def test_workers_report_what_they_met(monkeypatch: pytest.MonkeyPatch) -> None:
     """No report leaves a worker process by itself: it comes with the answer."""
     monkeypatch.delenv(STRICT)
     with Processes(1) as executor, collected() as reports:
-        assert [answer for _, answer in each(contradicted, [2.0], executor)] == [2.0]
+        assert [answer for _, answer in unordered_map(contradicted, [2.0], executor)] == [2.0]
     assert [(error.bound, error.value) for error in reports] == [(2.0, 1.0)]
 
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import laufruhe
 from cli import scenes
 from laufruhe.cli import app
-from laufruhe.numerics.workers import HERE, working_on
+from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.report.screen import PIPE_WIDTH
 from problem_files import PROBLEMS, written
 
@@ -73,7 +73,7 @@ def test_trade_of_several_tells_each_by_its_name(tmp_path: Path) -> None:
     """Whatever is measured first: what takes long, which is named last here."""
     paths = [written(tmp_path, text, name) for name, text in (("given", scenes.GIVEN), ("open", scenes.TIGHT))]
     out = tmp_path / "trade.json"
-    with working_on(HERE):
+    with working_on(SERIAL):
         words = ["trade", *map(str, paths), "--out", str(tmp_path / "trade"), "--json", str(out)]
         answer = RUN.invoke(app, words)
     assert answer.exit_code == 0, answer.output

@@ -9,7 +9,7 @@ import pytest
 
 from lanes import of_clusters
 from laufruhe.numerics.cluster import Cluster
-from laufruhe.numerics.workers import each
+from laufruhe.numerics.workers import unordered_map
 
 pytestmark = of_clusters("distributed")
 
@@ -69,12 +69,12 @@ def half(number: int) -> float:
 
 def test_answers_that_cannot_be_fetched_are_asked_for_again() -> None:
     client = Client(unreachable=2)
-    assert sorted(each(half, [2, 4, 6], Cluster(client))) == [(0, 1.0), (1, 2.0), (2, 3.0)]
+    assert sorted(unordered_map(half, [2, 4, 6], Cluster(client))) == [(0, 1.0), (1, 2.0), (2, 3.0)]
     assert client.asked == 5
 
 
 def test_what_a_call_raises_is_its_own_and_asked_for_once() -> None:
     client = Client(unreachable=0)
     with pytest.raises(ValueError, match="3 is odd"):
-        list(each(half, [3], Cluster(client)))
+        list(unordered_map(half, [3], Cluster(client)))
     assert client.asked == 1

@@ -20,17 +20,17 @@ from laufruhe.files.reader import tables_of
 from laufruhe.numerics.budget import left, limited
 from laufruhe.numerics.cluster import cluster
 from laufruhe.numerics.cores import ONE_THREAD
-from laufruhe.numerics.processes import Processes, WorkerDied, in_twins
+from laufruhe.numerics.processes import Processes, WorkerDied, fork_map
 from laufruhe.numerics.workers import (
-    HERE,
-    Here,
+    SERIAL,
+    SerialExecutor,
     TimeIsOver,
     WorkersGone,
-    at_hand,
-    count_of,
-    each,
+    current_executor,
     executor_for,
-    given,
+    unordered_map,
+    worker_count,
+    worker_pool,
     working_on,
 )
 
@@ -42,16 +42,16 @@ def power(pair: tuple[int, int]) -> int:
     return int(pair[0] ** pair[1])
 
 
-@pytest.mark.parametrize("executor", [HERE, ThreadPoolExecutor(3)], ids=["here", "threads"])
+@pytest.mark.parametrize("executor", [SERIAL, ThreadPoolExecutor(3)], ids=["here", "threads"])
 def test_every_piece_is_answered_once_by_any_executor(executor: Executor) -> None:
-    found = list(each(power, POWERS, executor))
+    found = list(unordered_map(power, POWERS, executor))
     assert sorted(found) == [(k, k**3) for k in range(40)]
 
 
 @pytest.mark.slow
 def test_processes_answer_and_pass_errors_on() -> None:
     with Processes(2) as pool:
-        assert sorted(each(abs, range(-20, 0), pool)) == [(k, 20 - k) for k in range(20)]
+        assert sorted(unordered_map(abs, range(-20, 0), pool)) == [(k, 20 - k) for k in range(20)]
         assert pool.submit(os.getpid).result() in pool.pids
         with pytest.raises(ZeroDivisionError):
             pool.submit(divmod, 1, 0).result()
@@ -96,7 +96,7 @@ def test_who_works_may_be_asked_while_workers_begin(monkeypatch: pytest.MonkeyPa
         def wait(self) -> None: ...
 
     monkeypatch.setattr("laufruhe.numerics.processes.subprocess.Popen", Begun)
-    monkeypatch.setattr("laufruhe.numerics.processes._exchanged", lambda *_: (True, None))
+    monkeypatch.setattr("laufruhe.numerics.processes._exchange", lambda *_: (True, None))
     before, count = sys.getswitchinterval(), 200
     sys.setswitchinterval(1e-6)
     try:
@@ -111,16 +111,16 @@ def test_who_works_may_be_asked_while_workers_begin(monkeypatch: pytest.MonkeyPa
 
 COPIED = """
 import os, signal, sys, tomllib
-from laufruhe.numerics.processes import Copy, Processes, WorkerDied
+from laufruhe.numerics.processes import ForkedWorker, Processes, WorkerDied
 
 tomllib.known = "of this process alone"
 signal.signal(signal.SIGINT, lambda *_: None)
-with Processes(1, [Copy()]) as pool:
+with Processes(1, [ForkedWorker()]) as pool:
     (copy,) = pool.pids
     assert pool.submit(os.getpid).result() == copy == pool.submit(os.getsid, 0).result() != os.getpid()
     assert pool.submit(eval, "__import__('tomllib').known").result() == tomllib.known
     assert pool.submit(eval, "__import__('signal').getsignal(2).name").result() == "SIG_DFL"
-    assert not Copy.can_be()
+    assert not ForkedWorker.is_possible()
     try:
         pool.submit(divmod, 1, 0).result()
     except ZeroDivisionError:
@@ -129,10 +129,10 @@ with Processes(1, [Copy()]) as pool:
         pool.submit(abs, -1).result()
     except WorkerDied:
         assert pool.submit(os.getpid).result() not in (copy, os.getpid())
-with Processes(1, [Copy()]) as pool:
+with Processes(1, [ForkedWorker()]) as pool:
     (copy,) = pool.pids
     pool.submit(abs, -1)
-assert Copy.can_be()
+assert ForkedWorker.is_possible()
 try:
     os.kill(copy, 0)
 except ProcessLookupError:
@@ -142,20 +142,20 @@ THREADS = Path("/proc/self/task")
 SEVERAL = """
 import os, sys
 from laufruhe.numerics import workers
-from laufruhe.numerics.processes import Copy
-from laufruhe.numerics.progress import listening, tell
+from laufruhe.numerics.processes import ForkedWorker
+from laufruhe.numerics.progress import progress_listener, report_progress
 
 workers.processors = lambda: 3
 sys.known = os.getpid()
-with workers.Processes(3, Copy.several(3)) as unasked:
+with workers.Processes(3, ForkedWorker.several(3)) as unasked:
     assert len(unasked.pids) == 3
-with listening(lambda step: print(step, file=sys.stderr)), workers.at_hand(abs):
-    own = workers.given()
+with progress_listener(lambda step: print(step, file=sys.stderr)), workers.worker_pool(abs):
+    own = workers.current_executor()
     pids = own.pids
     assert len(pids) == 3
     assert own.submit(eval, "__import__('sys').known").result() == os.getpid() != own.submit(os.getpid).result()
-    own.submit(tell, "nobody hears it").result()
-    assert not Copy.several(2)
+    own.submit(report_progress, "nobody hears it").result()
+    assert not ForkedWorker.several(2)
 try:
     os.wait()
 except ChildProcessError:
@@ -166,16 +166,16 @@ import os, signal, time
 from laufruhe.numerics import processes
 
 processes.processors = lambda: 2
-with processes.meanwhile(os.getpid, pays=True) as answer:
+with processes.run_concurrently(os.getpid, pays=True) as answer:
     assert answer() != os.getpid()
-with processes.meanwhile(os.getpid, pays=False) as answer:
+with processes.run_concurrently(os.getpid, pays=False) as answer:
     assert answer() == os.getpid()
 here = os.getpid()
-with processes.meanwhile(lambda: os.getpid() == here or os._exit(3), pays=True) as answer:
+with processes.run_concurrently(lambda: os.getpid() == here or os._exit(3), pays=True) as answer:
     assert answer()
 began = time.monotonic()
 try:
-    with processes.meanwhile(lambda: time.sleep(600), pays=True):
+    with processes.run_concurrently(lambda: time.sleep(600), pays=True):
         raise ZeroDivisionError
 except ZeroDivisionError:
     assert time.monotonic() - began < 300.0
@@ -204,19 +204,19 @@ def test_copies_of_a_process_have_all_that_it_has_and_end_with_it(program: str) 
 @pytest.mark.slow
 def test_twins_of_a_process_share_its_work_and_a_dead_one_costs_no_answer() -> None:
     with Processes(1) as pool:
-        known = {"in_twins": in_twins, "pid": os.getpid, "end": os._exit, "own": pool.submit(os.getpid).result()}
-        found = pool.submit(eval, "in_twins(lambda k: (k, pid()), 3)", known).result()
+        known = {"fork_map": fork_map, "pid": os.getpid, "end": os._exit, "own": pool.submit(os.getpid).result()}
+        found = pool.submit(eval, "fork_map(lambda k: (k, pid()), 3)", known).result()
         assert [k for k, _ in found] == [0, 1, 2]
         assert len({pid for _, pid in found}) == 3
-        assert pool.submit(eval, "in_twins(lambda k: k if pid() == own else end(3), 3)", known).result() == [0, 1, 2]
+        assert pool.submit(eval, "fork_map(lambda k: k if pid() == own else end(3), 3)", known).result() == [0, 1, 2]
         with pytest.raises(ZeroDivisionError):
-            pool.submit(eval, "in_twins(lambda k: 1 / (2 - k), 3)", known).result()
+            pool.submit(eval, "fork_map(lambda k: 1 / (2 - k), 3)", known).result()
         assert len(pool.pids) == 1
 
 
 @pytest.mark.slow
 def test_a_worker_that_is_killed_costs_no_answer() -> None:
-    with Processes(2) as pool, closing(each(time.sleep, [0.05] * 30, pool)) as found:
+    with Processes(2) as pool, closing(unordered_map(time.sleep, [0.05] * 30, pool)) as found:
         done = [next(found)[0]]
         for pid in pool.pids:
             os.kill(pid, signal.SIGKILL)
@@ -231,7 +231,7 @@ def test_what_ends_its_workers_is_given_up() -> None:
         with pytest.raises(WorkerDied):
             pool.submit(os._exit, 3).result()
         with pytest.raises(WorkersGone, match="again and again"):
-            list(each(os._exit, [3], pool))
+            list(unordered_map(os._exit, [3], pool))
 
 
 @pytest.mark.slow
@@ -273,7 +273,7 @@ def test_a_call_that_a_worker_takes_while_all_end_is_not_waited_for(monkeypatch:
 
 def test_time_that_is_left_goes_with_a_piece() -> None:
     with limited(100.0):
-        ((_, seconds),) = each(lambda _: left(), [0], HERE)
+        ((_, seconds),) = unordered_map(lambda _: left(), [0], SERIAL)
     assert 90.0 < seconds <= 100.0
 
 
@@ -281,8 +281,8 @@ def test_at_the_time_limit_patience_waits_for_what_was_begun() -> None:
     pieces = [0.2] * 50
     with ThreadPoolExecutor(2) as pool, limited(0.1):
         with pytest.raises(TimeIsOver):
-            list(each(time.sleep, pieces, pool))
-        begun = list(each(time.sleep, pieces, pool, patient=True))
+            list(unordered_map(time.sleep, pieces, pool))
+        begun = list(unordered_map(time.sleep, pieces, pool, patient=True))
     assert 1 <= len(begun) < 50
 
 
@@ -291,33 +291,33 @@ def test_processes_at_hand_end_with_the_searches(monkeypatch: pytest.MonkeyPatch
     """Also in the middle of a call, which nobody waits for."""
     for room in ("workers", "processes"):
         monkeypatch.setattr(f"laufruhe.numerics.{room}.processors", lambda: 2)
-    with at_hand(abs):
-        own = given()
+    with worker_pool(abs):
+        own = current_executor()
         assert isinstance(own, Processes)
         begun = own.submit(time.sleep, 600)
         assert own.submit(abs, -1).result() == 1
         pids = own.pids
         assert pids
-        with at_hand(abs):
-            assert given() is own
-    assert given() is None
+        with worker_pool(abs):
+            assert current_executor() is own
+    assert current_executor() is None
     assert isinstance(begun.exception(), WorkerDied)
     for pid in pids:
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
     monkeypatch.setattr("laufruhe.numerics.workers.processors", lambda: 1)
-    with at_hand(abs):
-        assert given() is None
+    with worker_pool(abs):
+        assert current_executor() is None
 
 
 def test_a_worker_starts_no_workers() -> None:
     with ThreadPoolExecutor(1) as pool:
-        assert list(each(lambda _: given(), [0], pool)) == [(0, HERE)]
-    assert given() is None
-    with working_on(HERE), executor_for(4) as executor:
-        assert isinstance(executor, Here)
-        assert count_of() == 1
-    assert count_of() >= 1
+        assert list(unordered_map(lambda _: current_executor(), [0], pool)) == [(0, SERIAL)]
+    assert current_executor() is None
+    with working_on(SERIAL), executor_for(4) as executor:
+        assert isinstance(executor, SerialExecutor)
+        assert worker_count() == 1
+    assert worker_count() >= 1
 
 
 def test_pieces_are_taken_as_workers_get_free() -> None:
@@ -328,7 +328,7 @@ def test_pieces_are_taken_as_workers_get_free() -> None:
             taken.append(k)
             yield (k, 1)
 
-    with ThreadPoolExecutor(2) as pool, closing(each(power, pieces(), pool)) as found:  # type: ignore[arg-type]
+    with ThreadPoolExecutor(2) as pool, closing(unordered_map(power, pieces(), pool)) as found:  # type: ignore[arg-type]
         next(found)
         assert len(taken) <= 12
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from laufruhe.numerics.budget import limited
-from laufruhe.numerics.progress import Step, listening
+from laufruhe.numerics.progress import Step, progress_listener
 from laufruhe.prove.best_first import EMPTY, Box, Division, Over, Parts, Waiting, divide, halves, widest
 
 # of random numbers in a row, those between two places bound a part from below
@@ -101,7 +101,7 @@ def test_nothing_allowed_leaves_nothing_and_no_time_leaves_the_whole() -> None:
 def test_who_listens_hears_bounds_that_rise_under_the_best_value() -> None:
     heard: list[Step] = []
     search = Least(np.random.default_rng(1).normal(size=64))
-    with listening(heard.append):
+    with progress_listener(heard.append):
         search.divide(search.bound((0, 64)), 1000)
     assert [step.bound for step in heard] == sorted(step.bound for step in heard)
     assert all(step.bound <= step.value for step in heard)

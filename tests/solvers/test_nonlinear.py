@@ -12,7 +12,7 @@ from scipy.optimize import minimize
 from laufruhe.numerics.budget import limited
 from laufruhe.numerics.norms import softened_lengths
 from laufruhe.numerics.processes import Processes
-from laufruhe.numerics.workers import HERE, working_on
+from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.solvers.mounts.starts import spread_starts
 from laufruhe.solvers.smooth.ipopt import Task, _judged
 from laufruhe.solvers.smooth.local_optimum import Ending, distinct, ends_in_words, is_explored
@@ -244,7 +244,7 @@ def test_workers_at_hand_find_what_one_process_finds():
     bowl = NonlinearProgram(x, (x[0] - 0.3) ** 2, np.array([-4.0]), np.array([4.0]))
     starts, found = spread_starts(np.array([-4.0]), np.array([4.0]), 60), []
     with Processes(3) as own:
-        for executor in (HERE, own):
+        for executor in (SERIAL, own):
             with working_on(executor):
                 for program, most in ((bowl, 1), (bowl, 7), (waves(0.3), 13)):
                     ends = solve_nonlinear(

@@ -15,7 +15,7 @@ import laufruhe
 from laufruhe.errors import InputError
 from laufruhe.machine import Engine
 from laufruhe.numerics.processes import Processes
-from laufruhe.numerics.workers import HERE, working_on
+from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
@@ -374,7 +374,7 @@ def test_workers_change_no_bit(tmp_path: Path) -> None:
     text = text.replace("angle = 180", whole).replace('"0.05 kg m"', '"0.02 kg m"')
     text += "\n[search]\nboxes = 2\n[fidelity]\nsamples = 96\n"
     problem = _problem(tmp_path, text)
-    with working_on(HERE):
+    with working_on(SERIAL):
         alone = laufruhe.solve(problem)
     with Processes(2) as pool, working_on(pool):
         shared = laufruhe.solve(problem)

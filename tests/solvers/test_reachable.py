@@ -16,7 +16,7 @@ import pytest
 import laufruhe
 from laufruhe.files.reader import load_tables
 from laufruhe.numerics.budget import at_least, left, limited
-from laufruhe.numerics.progress import Step, listening
+from laufruhe.numerics.progress import Step, progress_listener
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit
@@ -293,7 +293,7 @@ def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a
 
     steps: list[Step] = []
     none = none_within(problem, solve(problem.changed(decisions=())).final, ("light", "quiet"), {})
-    with limited(0.4), listening(steps.append):
+    with limited(0.4), progress_listener(steps.append):
         found = with_reachable(none, problem, {Kind.UNBALANCE}, 1.0, slow)
     assert [(each.ended, each.why) for each in found.reached] == [(True, "")] * 2
     assert all("want of time" in text for text in sentences(found)[:2])

@@ -15,7 +15,7 @@ from laufruhe.errors import SolverError
 from laufruhe.fidelity.error_bounds import reference
 from laufruhe.files.reader import load
 from laufruhe.machine import Engine
-from laufruhe.numerics.workers import HERE, working_on
+from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
@@ -133,7 +133,7 @@ def test_what_is_measured_in_time_has_its_pages(tmp_path: Path, monkeypatch: pyt
 
     monkeypatch.setattr("laufruhe.cli.fidelity.trade", out_of_time)
     monkeypatch.setattr("laufruhe.cli.fidelity.passed", lambda: True)
-    with working_on(HERE), pytest.raises(SolverError, match="1 of 2 problems are measured"):
+    with working_on(SERIAL), pytest.raises(SolverError, match="1 of 2 problems are measured"):
         traded([quick, never], tmp_path / "trade", lambda _: None)
     assert (tmp_path / "trade/boxer-four.md").is_file()
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from laufruhe.cli.screen import Ask, loudness, speak
 from laufruhe.numerics.cores import processors
-from laufruhe.numerics.processes import Copy, Processes, called
+from laufruhe.numerics.processes import ForkedWorker, Processes, call_by_name
 
 if TYPE_CHECKING:
     from laufruhe.solvers.result import Result
@@ -29,25 +29,25 @@ SELDOM = 200_000
 def artist(kinds: Sequence[str]) -> Iterator[Ask]:
     """Yield the function that requests pictures of these kinds: from another process, or this one if it is alone."""
     is_other = bool(kinds) and processors() > 1
-    copies: tuple[Copy, ...] = ()
-    if is_other and Copy.can_be():
+    copies: tuple[ForkedWorker, ...] = ()
+    if is_other and ForkedWorker.is_possible():
         # a fork has imported the libraries that solving and drawing share
         import_module("laufruhe.solvers.conclusion")
-        copies = (Copy(),)
+        copies = (ForkedWorker(),)
     with Processes(1, copies) as workers:
         if is_other:
             workers.submit(gc.set_threshold, SELDOM)
             workers.submit(speak, loudness())
-            workers.submit(called, "laufruhe.plots:get_ready")
+            workers.submit(call_by_name, "laufruhe.plots:get_ready")
         yield partial(_request, workers if is_other else None)
 
 
 def _request(workers: Processes | None, name: str, *args: Any) -> Callable[[], Any]:
-    here = partial(called, name, *args)
+    here = partial(call_by_name, name, *args)
     if workers is None:
         return here
     try:
-        future = workers.submit(called, name, *args)
+        future = workers.submit(call_by_name, name, *args)
     except (AttributeError, TypeError, ValueError):
         # classes of a user may have no pickle
         return here

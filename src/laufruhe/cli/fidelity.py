@@ -17,7 +17,7 @@ from laufruhe.fidelity.mount_needs import needs
 from laufruhe.files.reader import load, load_tables, tables_of
 from laufruhe.load_models.batch import prepare
 from laufruhe.numerics.budget import passed
-from laufruhe.numerics.workers import count_of, each, executor_for, given
+from laufruhe.numerics.workers import current_executor, executor_for, unordered_map, worker_count
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import kinds_of
@@ -101,7 +101,7 @@ def _measured(
     paths: Sequence[Path], problems: Sequence[Problem], say: Callable[[str], None]
 ) -> Iterator[tuple[int, Trade, Pages]]:
     """Yield index, measurements and pages of every problem; several are measured in parallel."""
-    if len(problems) == 1 and given() is None:
+    if len(problems) == 1 and current_executor() is None:
         one = trade(problems[0], lambda text: say(f"{problems[0].name}: {text}"))
         yield 0, one, _pages(paths[0], one)
         return
@@ -109,8 +109,8 @@ def _measured(
     order = sorted(range(len(problems)), key=lambda k: effort(problems[k]), reverse=True)
     pieces = [(paths[k], tables_of(paths[k])) for k in order]
     with (
-        executor_for(min(len(pieces), count_of())) as executor,
-        closing(each(_measured_by_worker, pieces, executor, patient=True)) as answers,
+        executor_for(min(len(pieces), worker_count())) as executor,
+        closing(unordered_map(_measured_by_worker, pieces, executor, patient=True)) as answers,
     ):
         for place, answer in answers:
             if answer is not None:

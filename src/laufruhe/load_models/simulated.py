@@ -6,7 +6,7 @@ from typing import Protocol
 
 from laufruhe.errors import ModelError
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.processes import called
+from laufruhe.numerics.processes import call_by_name
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 
@@ -62,5 +62,5 @@ def peaks_of(problem: Problem, coarser: int, roughly: bool = False) -> Peaks | N
     measures = simulated_measures(problem)
     if not measures:
         return None
-    found: Peaks = called(f"{measures[0].channel.simulation}:peaks", problem, measures, coarser, roughly)
+    found: Peaks = call_by_name(f"{measures[0].channel.simulation}:peaks", problem, measures, coarser, roughly)
     return found

@@ -1,4 +1,4 @@
-"""What the engine is: slider-cranks and rotors on a block on mounts, in SI (C1)."""
+"""The engine: slider-cranks and rotors on a block on mounts, in SI units (C1)."""
 
 from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.block import Block

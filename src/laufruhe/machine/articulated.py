@@ -38,13 +38,12 @@ class Knuckle:
     angle: float
 
     def motion(self, lib: Any, alpha: Any, bank: float) -> tuple[Any, Any, Any]:
-        """Place with first and second derivative, in the plane of a cylinder at `bank` and its angle alpha (K11)."""
+        """Return place, velocity and acceleration by alpha, in the plane of a cylinder at `bank` (K11) [m]."""
         arm, rate, swing = self._arm(lib, alpha, bank)
         pin = (0.0 * alpha + self.master.crank_radius) * (lib.cos(alpha) + 1j * lib.sin(alpha))
         return pin + arm, 1j * (pin + rate * arm), (1j * swing - rate * rate) * arm - pin
 
     def _shape(self, lib: Any, alpha: Any, bank: float) -> tuple[Any, Any, Any, Any]:
-        """What tells how the master rod leans at an angle of a cylinder at `bank`."""
         zero, length = 0.0 * alpha, 0.0 * alpha + self.master.rod_length
         lead = bank - self.master.bank
         return lib, alpha + lead, (zero + self.master.crank_radius) / length, self.master.offset / length
@@ -57,13 +56,13 @@ class Knuckle:
         return arm, -kinematics.rod_rate(*shape), -kinematics.rod_acceleration(*shape)
 
     def push(self, lib: Any, alpha: Any, bank: float, force: Any) -> Any:
-        """What the master's piston leans with so that its rod does not turn under `force` here (B11)."""
+        """Return the wall force on the master's piston that keeps its rod from turning under `force` here (B11)."""
         arm, _, _ = self._arm(lib, alpha, bank)
         reach = (0.0 * alpha + self.master.rod_length) * kinematics.cos_psi(*self._shape(lib, alpha, bank))
         return -(arm.conjugate() * force).imag / reach
 
     def length_to(self, reach: complex, bank: float) -> float:
-        """Length of a rod whose piston pin comes as far as `reach` on its axis and no farther (K13)."""
+        """Return the length of a rod whose piston pin reaches `reach` at its highest [m] (K13)."""
 
         def slope(alpha: float) -> tuple[float, float]:
             place, velocity, acceleration = self.motion(np, alpha, bank)
@@ -74,7 +73,7 @@ class Knuckle:
         return float(abs(reach - place))
 
     def scaled(self, length: float, mass: float) -> Knuckle:
-        """The same in another size."""
+        """Return the pin in another size."""
         return Knuckle(self.master.scaled(length, mass), self.radius * length, self.angle)
 
 
@@ -95,19 +94,19 @@ class ArticulatedCrank(SliderCrank):
 
     @property
     def path(self) -> Hashable:
-        """What the piston's path depends on, besides the angle of the crank."""
+        """Numbers that determine the path of the piston over the angle of the crank."""
         master = self.knuckle.master
         own = (self.knuckle.radius, self.knuckle.angle, self.bank - master.bank)
         return (*super().path, *own, master.path)  # type: ignore[misc]
 
     @property
     def fires_at(self) -> float:
-        """The true dead centre."""
+        """Local crank angle of the true dead centre [rad]."""
         return self.dead_centres[0]
 
     @cached_property
     def dead_centres(self) -> tuple[float, float]:
-        """Where the piston stands, by Newton (K13)."""
+        """Local crank angles of the highest and lowest piston position [rad], by Newton's method (K13)."""
 
         def slope(alpha: float) -> tuple[float, float]:
             _, velocity, acceleration = self._piston(np, alpha)[0]
@@ -117,20 +116,20 @@ class ArticulatedCrank(SliderCrank):
 
     @property
     def stroke(self) -> float:
-        """Distance between the dead centres [m], a little off that of the master."""
+        """Distance between the dead centres [m]; it differs a little from that of the master."""
         top, bottom = self.dead_centres
         return float(self.travel(np, bottom) - self.travel(np, top))
 
     def travel(self, lib: Any, alpha: Any) -> Any:
-        """Way of the piston towards the crank from alpha = 0 [m]."""
+        """Return the piston travel towards the crank from alpha = 0 [m]."""
         return self._piston(lib, 0.0 * alpha)[0][0] - self._piston(lib, alpha)[0][0]
 
     def velocity(self, lib: Any, alpha: Any) -> Any:
-        """Velocity of the piston away from the crank, by the angle of its crank [m]."""
+        """Return the velocity of the piston away from the crank, by the angle of its crank [m]."""
         return self._piston(lib, alpha)[0][1]
 
     def _piston(self, lib: Any, alpha: Any) -> tuple[tuple[Any, Any, Any], tuple[Any, Any]]:
-        """Piston along its axis with first and second derivative, and the rod's turning (K12)."""
+        """Return piston position with two derivatives along its axis, and rate and acceleration of the rod (K12)."""
         place, velocity, acceleration = self.knuckle.motion(lib, alpha, self.bank)
         length = 0.0 * alpha + self.rod_length
         sine = (place.imag - self.offset) / length
@@ -144,44 +143,44 @@ class ArticulatedCrank(SliderCrank):
         ), (-rate, -swing)
 
     def rod_lean(self, lib: Any, alpha: Any) -> tuple[Any, Any]:
-        """Sine and cosine of the angle chi between its rod and the cylinder axis (K12)."""
+        """Return sine and cosine of the angle chi between rod and cylinder axis (K12)."""
         place, _, _ = self.knuckle.motion(lib, alpha, self.bank)
         sine = (place.imag - self.offset) / (0.0 * alpha + self.rod_length)
         return sine, lib.sqrt((1.0 - sine) * (1.0 + sine))
 
     @property
     def crank_pin_mass(self) -> float:
-        """Nothing: its rod's share is at the knuckle pin [kg]."""
+        """Zero: the rod's share is at the knuckle pin [kg]."""
         return 0.0
 
     @property
     def master_bank(self) -> float:
-        """Of the master's cylinder [rad]."""
+        """Bank angle of the master's cylinder [rad]."""
         return self.knuckle.master.bank
 
     def is_hinged_to(self, master: SliderCrank) -> bool:
-        """Whether this is its master's cylinder."""
+        """Return True for the cylinder of the master rod."""
         place = master.shaft, master.x, master.bank
         return not isinstance(master, ArticulatedCrank) and place == (self.shaft, self.x, self.master_bank)
 
     def on_pin(self, lib: Any, alpha: Any, force: Any, with_masses: bool) -> Any:
-        """On the knuckle pin, with the pull of the mass there (B11)."""
+        """Return the force on the knuckle pin, with the inertia of the mass there (B11)."""
         if not with_masses:
             return force
         _, _, acceleration = self.knuckle.motion(lib, alpha, self.bank)
         return force - self.rotating_mass * acceleration
 
     def on_wall_of_master(self, lib: Any, alpha: Any, force: Any) -> Any:
-        """What holds the master rod against the moment of a force on the knuckle pin about the crank pin (B11)."""
+        """Return the wall force that balances the moment of a knuckle-pin force about the crank pin (B11)."""
         return self.knuckle.push(lib, alpha, self.bank, force)
 
     @property
     def big_end_area(self) -> float:
-        """Not told of a knuckle pin."""
+        """Unknown for a knuckle pin."""
         raise ModelError(f"{self.name} works on a knuckle pin, whose area is not told; ask for the crank-pin force")
 
     def motion(self, lib: Any, alpha: Any) -> Motion:
-        """Piston, rod and knuckle pin, less what is counted at the crank pin."""
+        """Return the motion of piston, rod and knuckle pin, less the mass that is counted at the crank pin."""
         (place, velocity, acceleration), rod = self._piston(lib, alpha)
         radius = 0.0 * alpha + self.crank_radius
         pin = radius * (lib.cos(alpha) + 1j * lib.sin(alpha))
@@ -195,12 +194,12 @@ class ArticulatedCrank(SliderCrank):
         )
 
     def scaled(self, length: float, mass: float) -> Self:
-        """The same mechanism in another size."""
+        """Return the mechanism in another size."""
         return replace(super().scaled(length, mass), knuckle=self.knuckle.scaled(length, mass))
 
 
 def _root(slope: Callable[[float], tuple[float, float]], start: float) -> float:
-    """Where a function given with its derivative is zero, by Newton."""
+    """Find a zero of a function given with its derivative, by Newton's method."""
     angle = start
     for _ in range(_ROUNDS):
         value, derivative = slope(angle)

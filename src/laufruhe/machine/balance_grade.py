@@ -1,4 +1,4 @@
-"""Balance grades of rotors (ISO 21940-11): what unbalance a balanced shaft may keep."""
+"""Balance grades of rotors (ISO 21940-11)."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ _GRADE = re.compile(r"^\s*G\s*(\d+\.?\d*|\.\d+)\s*$")
 
 
 def grade_of(text: str) -> float | None:
-    """The grade [m/s] of a text such as "G 6.3", which is in mm/s; None where it is none."""
+    """Return the grade [m/s] of a text such as "G 6.3" (in mm/s), or None."""
     match = _GRADE.match(text)
     return float(match.group(1)) * 1e-3 if match else None
 
 
 def permitted_unbalance(grade: float, mass: float, speed: float) -> float:
-    """Unbalance that a rotor may keep on all its planes together [kg m] (R1).
+    """Return the permitted unbalance of a rotor, summed over its planes [kg m] (R1).
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ class Bearing:
                 raise ModelError(f"bearing '{self.name}' has a {what} of {size:g} m; it must be positive")
 
     def scaled(self, length: float) -> Bearing:
-        """The same bearing in another size."""
+        """Return the bearing in another size."""
         diameter, width = (None if size is None else size * length for size in (self.diameter, self.width))
         return replace(self, x=self.x * length, diameter=diameter, width=width, shaft=self.shaft.scaled(length))
 

@@ -64,7 +64,7 @@ class Block:
 
     @property
     def tensor(self) -> NDArray[np.float64]:
-        """Inertia with which the block follows its motion, shape (3, 3): without what turns at imposed speed (E1a)."""
+        """Inertia without what turns at imposed speed, shape (3, 3) [kg m2] (E1a)."""
         return np.array(self.inertia, dtype=float) - np.diag([self.turning_inertia, 0.0, 0.0])
 
     @property

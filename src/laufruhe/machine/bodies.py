@@ -1,4 +1,4 @@
-"""Bodies of a mechanism: a rod as it is given, how masses move, and what is drawn of them."""
+"""Bodies of a mechanism: the rod, the motion of masses, and drawn outlines."""
 
 from __future__ import annotations
 
@@ -29,23 +29,23 @@ class Rod:
 
     @property
     def reciprocating_mass(self) -> float:
-        """Share of the piston pin: two masses keep mass and centre of gravity (eq. 9)."""
+        """Share of the piston pin [kg]: two masses keep mass and centre of gravity (eq. 9)."""
         return self.mass * self.centre_of_gravity / self.length
 
     @property
     def rotating_mass(self) -> float:
-        """Share of the crank pin."""
+        """Share of the crank pin [kg]."""
         return self.mass - self.reciprocating_mass
 
     @property
     def inertia_deficit(self) -> float:
-        """Theta - m1 s1^2 - m2 s2^2 [kg m2], what two masses get wrong (eqs. 9, 10)."""
+        """Error of two masses in the inertia, Theta - m1 s1^2 - m2 s2^2 [kg m2] (eqs. 9, 10)."""
         return self.inertia - self.mass * self.centre_of_gravity * (self.length - self.centre_of_gravity)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Where a mechanism's masses are and how they move, by the crank's own angle alpha (C5).
+    """Masses of a mechanism and their motion over the crank's own angle alpha (C5).
 
     The plane is turned so that the cylinder axis is real: zeta e^{-i beta} (C4). Momentum of all this is
     the mechanism's load; the mass at the crank pin is a rotor and left out.

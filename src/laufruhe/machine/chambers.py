@@ -1,4 +1,4 @@
-"""Working chambers on the two sides of a piston, and on further pistons of the same rod: steam, pumps, traces."""
+"""Working chambers on both sides of a piston, and of further pistons on its rod: steam, pumps, traces."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Steam:
 
     @property
     def turning_points(self) -> tuple[tuple[float, bool], ...]:
-        """Where the diagram bends: part of the stroke, and whether on the way out."""
+        """Kinks of the diagram: part of the stroke, and True on the way out."""
         return (self.cut_off, True), (self.release, True), (self.compression, False), (self.lead, False)
 
     @property
@@ -93,7 +93,6 @@ class Steam:
         return ((begin + self.clearance) / (end + self.clearance)) ** self.exponent if begin != end else 1.0
 
     def _work(self, begin: float, end: float) -> float:
-        """Integral of ((begin + c) / (x + c))^n from begin to end."""
         if begin == end:
             return 0.0
         first, log = begin + self.clearance, math.log((end + self.clearance) / (begin + self.clearance))
@@ -130,7 +129,7 @@ Diagram: TypeAlias = Steam | Pump | PressureTrace
 
 @dataclass(frozen=True)
 class Chamber:
-    """A space that a piston makes larger and smaller once a turn.
+    """Space that a piston enlarges and reduces once a turn.
 
     Attributes
     ----------
@@ -160,23 +159,23 @@ class Chamber:
 
     @property
     def area(self) -> float:
-        """That the pressure acts on [m2], F' or F'' of eq. 296."""
+        """Area under pressure [m2], F' or F'' of eq. 296."""
         return math.pi / 4.0 * (self.bore - self.rod) * (self.bore + self.rod)
 
     @property
     def drive(self) -> Hashable:
-        """What it does to a piston, whatever it is called and whichever cylinders have it."""
+        """Numbers that determine the force on the piston."""
         return self.end, self.bore, self.rod, self.diagram
 
     @property
     def side(self) -> int:
-        """1 where pressure drives the piston towards the crank, else -1."""
+        """Sign of the force: 1 towards the crank, else -1."""
         return ENDS[self.end]
 
 
 @dataclass(frozen=True)
 class Chambers:
-    """All working chambers of a machine.
+    """Working chambers of a machine.
 
     Attributes
     ----------
@@ -193,7 +192,7 @@ class Chambers:
             raise ModelError("there is no chamber; list one at least")
 
     def of(self, part: SliderCrank) -> tuple[Chamber, ...]:
-        """Chambers whose pistons are on the rod of a slider-crank."""
+        """Return the chambers on the rod of a slider-crank."""
         return tuple(chamber for chamber in self.chambers if part.name in chamber.cylinders)
 
 

@@ -1,4 +1,4 @@
-"""Where the shafts of an engine stand, how far apart, and what they sweep; over boxes of places too."""
+"""Distances of shafts, and the room that they sweep, also over boxes of places."""
 
 from __future__ import annotations
 
@@ -33,13 +33,13 @@ def _shafts(engine: Engine) -> dict[str, _Swept]:
 
 
 def shafts_of(engine: Engine) -> tuple[str, ...]:
-    """Names of all shafts; none where there is no balancer shaft."""
+    """Return the names of all shafts; none without a balancer shaft."""
     shafts = _shafts(engine)
     return tuple(shafts) if any(each.balances for each in shafts.values()) else ()
 
 
 def distances(names: Sequence[str] | None, lower: Engine, upper: Engine, swept: bool) -> list[Span]:
-    """Least and largest distance of every two axes that count, with shafts between their places in two engines [m].
+    """Return (least, largest) distance of every two axes, with shafts between their places in two engines [m].
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def distances(names: Sequence[str] | None, lower: Engine, upper: Engine, swept: 
 
 
 def reaches(names: Sequence[str] | None, lower: Engine, upper: Engine) -> list[Span]:
-    """Least and largest distance of what every balancer shaft sweeps from the origin, as `distances` [m]."""
+    """Return (least, largest) distance from the origin that every balancer shaft sweeps to, as `distances` [m]."""
     low, high, origin = _shafts(lower), _shafts(upper), Shaft("origin")
     out = []
     for name in low if names is None else names:
@@ -72,7 +72,6 @@ def reaches(names: Sequence[str] | None, lower: Engine, upper: Engine) -> list[S
 
 
 def _apart(lower: tuple[Shaft, Shaft], upper: tuple[Shaft, Shaft]) -> Span:
-    """Least and largest distance of two axes, either of them anywhere between its two places."""
     (a, b), (c, d) = lower, upper
     spans = []
     for own, other in (((a.y, c.y), (b.y, d.y)), ((a.z, c.z), (b.z, d.z))):

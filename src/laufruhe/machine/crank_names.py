@@ -1,4 +1,4 @@
-"""Cranks that have a name of their own among riders and drivers."""
+"""Names that riders and drivers have for cranks."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _SAME = math.radians(1e-6)
 
 
 def name_of_crank(throws: Sequence[float]) -> str:
-    """Name of a crank with these throws [rad], however it is turned, mirrored or seen; empty where it has none."""
+    """Return the name of a crank with these throws [rad], however turned or mirrored; empty if it has none."""
     for name, degrees in CRANKS.items():
         named = [math.radians(angle) for angle in degrees]
         images = [[sign * angle for angle in own] for sign in (1.0, -1.0) for own in (named, named[::-1])]

@@ -1,4 +1,4 @@
-"""Springs whose stiffness depends on frequency: a fluid track, or what was measured (E50, E51)."""
+"""Springs whose stiffness depends on frequency: fluid tracks and measured stiffness (E50, E51)."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ class Dynamic(Protocol):
 
     @property
     def axis(self) -> int:
-        """Number of the own axis."""
+        """Index of the own axis."""
 
     @property
     def static(self) -> float:
         """Stiffness at rest [N/m]."""
 
     def at(self, omegas: Array) -> ComplexArray:
-        """Complex stiffness at angular frequencies [N/m], shape of `omegas`; at rest the static one."""
+        """Return complex stiffness at angular frequencies [N/m], shape of `omegas`; at rest the static one."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +59,11 @@ class FluidTrack:
 
     @property
     def static(self) -> float:
-        """Bulge and lower chamber one behind the other [N/m]."""
+        """Stiffness of bulge and lower chamber in series [N/m]."""
         return self.bulge * self.stiffness / (self.bulge + self.stiffness)
 
     def at(self, omegas: Array) -> ComplexArray:
-        """Bulge in series with fluid, track and lower chamber."""
+        """Return the stiffness of the bulge in series with fluid, track and lower chamber."""
         behind = self.stiffness - self.mass * omegas**2 + 1j * self.damping * omegas
         whole = self.bulge + behind
         # without damping the fluid resonates: the force of the mount has no size there
@@ -100,11 +100,11 @@ class MeasuredStiffness:
 
     @property
     def static(self) -> float:
-        """That of the lowest frequency, without loss [N/m]."""
+        """Stiffness at the lowest frequency, without loss [N/m]."""
         return self.values[0].real
 
     def at(self, omegas: Array) -> ComplexArray:
-        """Interpolated, real and imaginary part each."""
+        """Interpolate real and imaginary part."""
         values = np.array(self.values)
         real, imag = (np.interp(omegas, self.omegas, part) for part in (values.real, values.imag))
         return np.asarray(np.where(omegas == 0.0, self.static, real + 1j * imag), dtype=complex)

@@ -144,7 +144,7 @@ class Engine:
             )
 
     def extra(self, kind: type[E]) -> E | None:
-        """Return the part that an extension adds of a class; None where there is none."""
+        """Return the part of an extension by its class, or None."""
         return next((one for one in self.extras if isinstance(one, kind)), None)
 
     def with_extra(self, extra: Extra) -> Engine:
@@ -153,11 +153,11 @@ class Engine:
 
     @cached_property
     def moving(self) -> Moving:
-        """What sizes move."""
+        """Parts that sizes change."""
         return Moving(self.gear, self.slider_cranks, self.rotors, self.bearings)
 
     def resized(self, sizes: Mapping[Size, float]) -> Engine:
-        """The engine with sizes in place of its own, and the masses of these."""
+        """Return the engine with other sizes, and the masses that follow from them."""
         found = self.moving.resized(sizes)
         return replace(
             self, gear=found.gear, slider_cranks=found.parts, rotors=found.rotors, bearings=found.bearings
@@ -165,18 +165,18 @@ class Engine:
 
     @property
     def shafts(self) -> tuple[Shaft, ...]:
-        """Every shaft that something turns with, in order of first use."""
+        """Shafts that turn anything, in order of first use."""
         used = [part.shaft for part in self.slider_cranks] + [rotor.shaft for rotor in self.rotors]
         return tuple(dict.fromkeys(used))
 
     @property
     def pins(self) -> tuple[Rotor, ...]:
-        """Rotating masses at the crank pins, as the rotors that they are."""
+        """Rotating masses at the crank pins, as rotors."""
         return _pins(self.slider_cranks)
 
     @property
     def cylinders(self) -> tuple[SliderCrank, ...]:
-        """One slider-crank for each cylinder: of two pistons that face each other the first."""
+        """Slider-cranks, one for each cylinder: the first of two pistons that face each other."""
         found: list[SliderCrank] = []
         for part in self.slider_cranks:
             if not any(part.faces(other) for other in found):
@@ -194,7 +194,6 @@ class Engine:
 
 @lru_cache(maxsize=64)
 def _pins(parts: tuple[SliderCrank, ...]) -> tuple[Rotor, ...]:
-    """Rotating masses at the pins of cranks."""
     return tuple(
         Rotor(
             f"pin of {part.name}", part.x, part.rotating_mass * part.crank_radius * cis(as_turn(part.throw)), part.shaft
@@ -206,6 +205,5 @@ def _pins(parts: tuple[SliderCrank, ...]) -> tuple[Rotor, ...]:
 
 @lru_cache(maxsize=256)
 def _returns(ratio: float, turns: int) -> bool:
-    """Whether a shaft stands after so many turns of the crank as before, and turns at all."""
     own = as_order(ratio) * turns
     return own.denominator == 1 and own != 0

@@ -1,4 +1,4 @@
-"""One chamber between two pistons that face each other, on cranks that need not be in step (G18).
+"""Shared chamber of two pistons that face each other, on cranks that need not be in step (G18).
 
 Both sweep it: V = A (x_1(gamma) + x_2(gamma + ahead)), each from its own crank. It is least between the dead
 centres of the two, and from there its charge counts the angle.
@@ -39,15 +39,15 @@ class Facing:
     ahead: float
 
     def scaled(self, length: float) -> Facing:
-        """The same in another size."""
+        """Return the piston in another size."""
         return Facing(self.crank_radius * length, self.rod_length * length, self.ahead)
 
     def mirrors(self, part: SliderCrank) -> bool:
-        """Whether a piston moves as it does, so that each has half of the chamber for itself."""
+        """Return True if a piston moves in step with it, so that each has half of the chamber."""
         return self.ahead == 0.0 and part.path == (self.crank_radius, self.rod_length, 0.0)
 
     def swept(self, part: SliderCrank) -> Swept:
-        """The chamber that a piston shares with it."""
+        """Return the chamber that a piston shares with it."""
         if self.mirrors(part):
             return Swept(part)
         chamber = _chamber(part)
@@ -56,7 +56,7 @@ class Facing:
 
 @dataclass(frozen=True)
 class SharedChamber(SliderCrank):
-    """As if one piston swept what two of them sweep together."""
+    """Slider-crank that sweeps alone what two pistons sweep together."""
 
     @property
     def _other(self) -> Facing:
@@ -64,14 +64,14 @@ class SharedChamber(SliderCrank):
         return self.facing
 
     def travel(self, lib: Any, alpha: Any) -> Any:
-        """Of both, from where this one's own piston stands highest [m]."""
+        """Return the travel of both pistons, from the highest position of this one [m]."""
         other = self._other
         angle = self.shaft.ratio * alpha + other.ahead
         far = other.crank_radius * kinematics.travel(lib, angle, other.crank_radius / other.rod_length)
         return super().travel(lib, alpha) + far
 
     def velocity(self, lib: Any, alpha: Any) -> Any:
-        """Of both, against the growth of the chamber, by the angle of this one's crank [m]."""
+        """Return the velocity of both pistons, towards each other, by the angle of this one's crank [m]."""
         other = self._other
         angle = self.shaft.ratio * alpha + other.ahead
         far = other.crank_radius * kinematics.piston_velocity(lib, angle, other.crank_radius / other.rod_length)
@@ -79,7 +79,7 @@ class SharedChamber(SliderCrank):
 
     @cached_property
     def dead_centres(self) -> tuple[float, float]:
-        """Angles of its crank at which the chamber is least and largest, between the dead centres of both (G18)."""
+        """Crank angles at which the chamber is smallest and largest [rad], between the dead centres of both (G18)."""
         ratio, first = self.shaft.ratio, -self._other.ahead
         low, high = min(first, 0.0), max(first, 0.0)
 
@@ -92,24 +92,23 @@ class SharedChamber(SliderCrank):
 
     @property
     def fires_at(self) -> float:
-        """Where the chamber is least."""
+        """Crank angle at which the chamber is smallest [rad]."""
         return self.dead_centres[0]
 
     @cached_property
     def stroke(self) -> float:
-        """Largest less least of both together [m]."""
+        """Largest less smallest travel of both together [m]."""
         top, bottom = self.dead_centres
         return float(self.travel(math, bottom) - self.travel(math, top))
 
 
 @lru_cache(maxsize=256)
 def _chamber(part: SliderCrank) -> SharedChamber:
-    """Of a piston: one object, so that its dead centres are sought once."""
     return SharedChamber(**{field.name: getattr(part, field.name) for field in fields(SliderCrank)})
 
 
 def with_shared_chambers(parts: Sequence[SliderCrank], cycle_angle: float) -> tuple[SliderCrank, ...]:
-    """Pistons that face each other, each with the chamber that both sweep.
+    """Return the pistons, those that face each other with the chamber that both sweep.
 
     Raises
     ------
@@ -146,7 +145,7 @@ def _facing(part: SliderCrank, other: SliderCrank, cycle_angle: float) -> Facing
 
 
 def least_room(part: SliderCrank, other: SliderCrank) -> float:
-    """Least distance between the pins of two pistons that face each other [m]; infinite for Scotch yokes."""
+    """Return the least distance between the pins of two facing pistons [m]; infinite for Scotch yokes."""
     apart = math.hypot(other.shaft.y - part.shaft.y, other.shaft.z - part.shaft.z)
     reach = part.crank_radius + part.rod_length + other.crank_radius + other.rod_length
     if math.isinf(reach):

@@ -1,4 +1,4 @@
-"""Even firing as a lattice: which stars fire evenly, and in which orders (S6-S8).
+"""Even firing as a lattice: stars that fire evenly, and their orders (S6-S8).
 
 Cylinders that fire at equal intervals of turns/n have their dead centres on multiples
 of 1/R of a turn, R of them, and every multiple is taken by as many cylinders as there
@@ -26,12 +26,12 @@ ORDERS_LOOKED_AT = 200_000
 
 
 class NoEvenStarError(ModelError):
-    """No star of this layout fires evenly."""
+    """Error of a layout without an evenly firing star."""
 
 
 @dataclass(frozen=True)
 class FiringLattice:
-    """Where cylinders may fire when all intervals are equal (S6).
+    """Crank angles of firings at equal intervals (S6).
 
     Attributes
     ----------
@@ -49,19 +49,19 @@ class FiringLattice:
 
     @property
     def capacity(self) -> tuple[int, ...]:
-        """Firings on every step, the same for all."""
+        """Firings on every step."""
         return tuple(self.slots.count(step) for step in range(self.steps))
 
 
 def firing_lattice(cycle: Cycle, cylinders: int) -> FiringLattice:
-    """Of `cylinders` equal intervals."""
+    """Return the lattice of `cylinders` equal intervals."""
     steps = cylinders // math.gcd(cycle.turns, cylinders)
     interval = cycle.turns * steps // cylinders
     return FiringLattice(steps, tuple(s * interval % steps for s in range(cylinders)))
 
 
 def pin_steps(layout: Layout, lattice: FiringLattice) -> tuple[tuple[int, ...], ...]:
-    """Dead centres of a throw's cylinders after that of cylinder 1, the throw beside throw 1, in steps (S6).
+    """Return the dead centres of each throw's cylinders, in steps after cylinder 1, the throw beside throw 1 (S6).
 
     Raises
     ------
@@ -88,7 +88,7 @@ def pin_steps(layout: Layout, lattice: FiringLattice) -> tuple[tuple[int, ...], 
 
 
 def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
-    """How many throws may stand on every step so that the firing is even (S7).
+    """Return the numbers of throws on every step with which the firing is even (S7).
 
     Returns
     -------
@@ -135,13 +135,13 @@ def _patterns(lattice: FiringLattice, own: tuple[int, ...], throws: int) -> Iter
 
 
 def star_throws(layout: Layout, steps: Sequence[int], lattice_steps: int) -> tuple[float, ...]:
-    """Throw angles of a star [rad], cylinder 1 at its dead centre when phi = 0 (C5)."""
+    """Return the throw angles of a star [rad], cylinder 1 at its dead centre at phi = 0 (C5)."""
     first = layout.own_turn(0)
     return tuple(angle_of((first + Fraction(int(step), lattice_steps)) % 1) for step in steps)
 
 
 def even_orders(cycle: Cycle, layout: Layout, steps: Sequence[int]) -> Iterator[tuple[int, ...]]:
-    """Firing orders that belong to a star, cylinder 1 first (S8): each cylinder on a free firing of its step."""
+    """Yield the firing orders of a star, cylinder 1 first, each cylinder on a free firing of its step (S8)."""
     lattice = firing_lattice(cycle, len(layout.positions))
     pins = pin_steps(layout, lattice)
     seen = [0] * len(pins)
@@ -165,35 +165,34 @@ def even_orders(cycle: Cycle, layout: Layout, steps: Sequence[int]) -> Iterator[
 
 @lru_cache(maxsize=64)
 def _dead_centres(layout: Layout, throws: tuple[float, ...]) -> tuple[float, ...]:
-    """Of every cylinder as a part of a turn; asked for with every order of one star."""
     return tuple(float(layout.dead_centre(throws, k) % 1) for k in range(len(layout.positions)))
 
 
 def slot_steps(cycle: Cycle, slots: Sequence[int]) -> tuple[int, ...]:
-    """Steps of throws on the lattice whose cylinders, each alone on its own, fire in these of n equal slots (S6)."""
+    """Return the lattice steps of throws whose single cylinders fire in these of n equal slots (S6)."""
     count = len(slots)
     shared = math.gcd(cycle.turns, count)
     return tuple(-slot * (cycle.turns // shared) % (count // shared) for slot in slots)
 
 
 def slot_order(slots: Sequence[int]) -> tuple[int, ...]:
-    """Firing order of cylinders that fire in these slots, each in its own."""
+    """Return the firing order of cylinders that fire in these slots."""
     return tuple(1 + slots.index(slot) for slot in range(len(slots)))
 
 
 def from_one(order: Sequence[int]) -> tuple[int, ...]:
-    """A firing order that begins with cylinder 1."""
+    """Rotate a firing order so that it begins with cylinder 1."""
     first = order.index(1)
     return (*order[first:], *order[:first])
 
 
 def order_slots(order: Sequence[int]) -> tuple[int, ...]:
-    """Slot in which each cylinder of a firing order fires."""
+    """Return the slot in which each cylinder of a firing order fires."""
     return tuple(order.index(number) for number in range(1, len(order) + 1))
 
 
 def firing_turns(layout: Layout, throws: Sequence[float], order: Sequence[int]) -> tuple[float, ...]:
-    """Turn of the crank at which each cylinder of the order fires, ascending from 0."""
+    """Return the turn of the crank at which each cylinder of the order fires, ascending from 0."""
     turns = _dead_centres(layout, tuple(throws))
     start, out = None, []
     previous = -1.0
@@ -210,7 +209,7 @@ def firing_turns(layout: Layout, throws: Sequence[float], order: Sequence[int]) 
 
 
 def lap_orders(cycle: Cycle, layout: Layout, throws: Sequence[float]) -> Iterator[tuple[int, ...]]:
-    """Firing orders of throws at any angles, each once: every cylinder on one of the turns, cylinder 1 first.
+    """Yield each firing order of throws at any angles once, cylinder 1 first.
 
     An order says no more than that a cylinder fires at its first dead centre after the one
     before it: firings that wait for a later one, or come two at once, have no order.
@@ -234,19 +233,19 @@ def lap_orders(cycle: Cycle, layout: Layout, throws: Sequence[float]) -> Iterato
 
 
 def intervals_of(cycle: Cycle, turns: Sequence[float]) -> tuple[float, ...]:
-    """Crank angles from each firing to the next [rad]."""
+    """Return the crank angles from each firing to the next [rad]."""
     following = [*turns[1:], turns[0] + cycle.turns]
     return tuple(math.tau * (b - a) for a, b in zip(turns, following, strict=True))
 
 
 def successive_neighbours(layout: Layout, order: Sequence[int]) -> int:
-    """How often cylinders on one throw, or on throws side by side, fire in succession."""
+    """Count successive firings on one throw, or on neighbouring throws."""
     pins = [layout.pins[number - 1] for number in order]
     return sum(abs(a - b) <= 1 for a, b in zip(pins, [*pins[1:], pins[0]], strict=True)) if len(pins) > 2 else 0
 
 
 def longest_bank_gap(cycle: Cycle, layout: Layout, order: Sequence[int], turns: Sequence[float]) -> float:
-    """Largest crank angle in which one bank does not fire [rad]."""
+    """Return the largest crank angle in which one bank does not fire [rad]."""
     gaps = []
     for bank in sorted(set(layout.banks)):
         own = [t for number, t in zip(order, turns, strict=True) if layout.banks[number - 1] == bank]
@@ -255,7 +254,7 @@ def longest_bank_gap(cycle: Cycle, layout: Layout, order: Sequence[int], turns: 
 
 
 def order_content(cycle: Cycle, turns: Sequence[float]) -> float:
-    """Largest share of a torque order below the firing order that is not cancelled, 0 to 1 (S9).
+    """Return the largest remaining share of a torque order below the firing order, 0 to 1 (S9).
 
     Equal impulses at these turns add up to |sum_k e^{-i h 2 pi t_k}| / n in order h.
     """

@@ -1,4 +1,4 @@
-"""Which firings of a cycle the cylinders of one throw may take when intervals are bounded (S25).
+"""Shares of the firings of a cycle between throws when intervals are bounded (S25).
 
 Cylinders of one throw fire as far apart as their banks and pins stand, give or take whole turns, whatever
 the throw does. Firings are numbered from 0 to n - 1: a throw takes a set of them, all throws
@@ -32,7 +32,7 @@ _BROKEN = 1e3
 
 @dataclass(frozen=True)
 class FiringPattern:
-    """Firings that throws share out between them.
+    """Firings shared out between throws.
 
     Attributes
     ----------
@@ -52,20 +52,20 @@ class FiringPattern:
     broken: float
 
     def intervals(self, cycle: Cycle) -> tuple[float, ...]:
-        """Crank angles from firing to firing [rad]."""
+        """Return the crank angles from firing to firing [rad]."""
         return tuple(b - a for a, b in itertools.pairwise((*self.moments, cycle.angle)))
 
 
 @dataclass
 class _Budget:
-    """How much is still looked at."""
+    """Number of nodes that may still be visited."""
 
     left: int
 
 
 @dataclass(frozen=True)
 class FiringSlots:
-    """What throws may share out between them.
+    """Firings to share out between throws, and the bounds of intervals.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class FiringSlots:
         return self.throws * len(self.sides)
 
     def patterns(self, given: Sequence[Sequence[int]] | None = None) -> tuple[list[FiringPattern], bool]:
-        """Every way to fire within the bounds, and whether none was left out; the least broken ones where none is.
+        """Return all ways to fire within the bounds, or the least broken ones, and True if none was left out.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class FiringSlots:
             slack = max(0.05 * even, 1.3 * slack)
 
     def _first_covers(self, slack: float, given: Sequence[Sequence[int]] | None) -> tuple[list[Cover], bool]:
-        """Those of little unevenness before others, as many as are worth a program; and whether these are all."""
+        """Return covers in order of unevenness, as many as pay for a program, and True if these are all."""
         even, found = self.cycle.angle / self.count, dict[Cover, None]()
         most = min(_MOST_COVERS, 300_000 // self.count**2) if slack == 0.0 else _MOST_BROKEN
         complete = False
@@ -129,12 +129,11 @@ class FiringSlots:
         return list(found), complete
 
     def _unevenness(self, pattern: FiringPattern) -> float:
-        """Largest deviation from equal intervals, rounded so that equals stay in their order [rad]."""
         even = self.cycle.angle / self.count
         return round(max(abs(interval - even) for interval in pattern.intervals(self.cycle)), 9)
 
     def _shapes(self) -> list[Shape]:
-        """Of the other cylinders of a throw: firings after its first one's, whole turns, share of the angle."""
+        """Return the shapes of a throw: slot offset, whole turns and angle share of its further cylinders."""
         whole, count = self.cycle.angle, self.count
         low, high = max(self.least, 0.0), self.most
         choices = []
@@ -156,7 +155,7 @@ class FiringSlots:
         return [shape for shape in itertools.product(*choices) if len({d for d, _, _ in shape}) == len(shape)]
 
     def _covers(self, given: Sequence[Sequence[int]] | None, budget: _Budget) -> Iterator[Cover]:
-        """Throws by the firing of their first cylinder and their shape, every firing taken once."""
+        """Yield the ways to cover every firing once by throws: slot of the first cylinder, and shape."""
         count, shapes = self.count, self._shapes()
         if given is not None:
             own = [
@@ -194,7 +193,7 @@ class FiringSlots:
                 yield tuple((first, shapes[number]) for first, number in turned)
 
     def _timed(self, cover: Cover) -> FiringPattern | None:
-        """The moments that break the bounds least, and then are the most even."""
+        """Return the firing moments that break the bounds least, and then are most even."""
         from scipy.optimize import linprog
 
         count, whole = self.count, self.cycle.angle

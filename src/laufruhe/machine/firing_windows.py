@@ -1,4 +1,4 @@
-"""Within which angles throws keep a firing order and bounds on their firing intervals (S26).
+"""Angles at which throws keep a firing order and bounds on firing intervals (S26).
 
 A cylinder fires at t_k = 2 pi l_k - (theta_p + c_k), p its throw, c_k what its pin and bank add, l_k whole
 turns. Bounds on intervals, and on throws, are bounds on differences of two throws, or of a throw and
@@ -31,7 +31,7 @@ _ROUNDS = 3
 
 @dataclass(frozen=True, eq=False)
 class OwnAngles:
-    """Own angles of cylinders: that of their throw, and what angles of banks and pins that are open add to it.
+    """Own angles of cylinders: throw angle plus shares of open bank and pin angles.
 
     Attributes
     ----------
@@ -46,12 +46,11 @@ class OwnAngles:
 
     @cached_property
     def _differences(self) -> tuple[Indices, Indices]:
-        """Own angles of one throw, in pairs."""
         first, second = np.nonzero(self.throws[:, None] == self.throws[None, :])
         return first[first != second], second[first != second]
 
     def shortened(self, paths: Array, lower: Array, upper: Array) -> Array | None:
-        """Shortest paths of own angles in a box of throws and open angles; None where nothing keeps them."""
+        """Return shortest paths of own angles in a box of throws and open angles, or None if infeasible."""
         count = len(lower) - self.shares.shape[1]
         least, most = _range(self.shares, lower[count:], upper[count:])
         paths = paths.copy()
@@ -65,7 +64,7 @@ class OwnAngles:
         return None if np.any(np.diag(paths) < -_ROUNDING) else paths
 
     def box(self, paths: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """What shortest paths leave of a box of throws and open angles."""
+        """Tighten a box of throws and open angles by shortest paths."""
         count = len(lower) - self.shares.shape[1]
         low, high = lower.copy(), upper.copy()
         least, most = _range(self.shares, lower[count:], upper[count:])
@@ -87,7 +86,6 @@ class OwnAngles:
 
 
 def _range(shares: Array, lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Least and largest of shares . angles for angles between bounds."""
     up, down = np.maximum(shares, 0.0), np.minimum(shares, 0.0)
     return up @ lower + down @ upper, up @ upper + down @ lower
 
@@ -123,7 +121,7 @@ class FiringWindow:
         return self.within(*self.root) or self.root
 
     def within(self, lower: Array, upper: Array) -> tuple[Array, Array] | None:
-        """The least box that holds all throws of a box that keep the window; None where there are none."""
+        """Return the smallest box around the throws of a box that keep the window, or None if empty."""
         for _ in range(_ROUNDS if self.own.shares.size else 1):
             paths = self.own.shortened(self.paths, lower, upper)
             if paths is None:
@@ -136,14 +134,14 @@ class FiringWindow:
 
 
 def lateness(layout: Layout) -> tuple[float, ...]:
-    """c_k of every cylinder: by how much it fires sooner than a throw at theta = 0 [rad]."""
+    """Return c_k of every cylinder: crank angle by which it fires before a throw at theta = 0 [rad]."""
     zero = [0.0] * len(layout.throw_positions)
     return tuple(-math.tau * float(layout.dead_centre(zero, k)) for k in range(len(layout.positions)))
 
 
 @dataclass(frozen=True)
 class FiringBounds:
-    """What firing has to keep.
+    """Conditions on firing: intervals, throws, order and open angles.
 
     Attributes
     ----------
@@ -173,12 +171,11 @@ class FiringBounds:
         return tuple(late + self.layout.side(k) * least for k, late in enumerate(found)) if least else found
 
     def share(self, k: int) -> float:
-        """What an open angle adds to the own angle of a cylinder, beside that of cylinder 1 where throws are open."""
+        """Return the share of an open angle in the own angle of cylinder k, from cylinder 1 if throws are open."""
         return (self.layout.side(0) if self.throws is None else 0.0) - self.layout.side(k) if self.open_angles else 0.0
 
     @cached_property
     def _named(self) -> list[tuple[int, float]]:
-        """Throw and share of every own angle."""
         return sorted({(pin, self.share(k)) for k, pin in enumerate(self.layout.pins)})
 
     @cached_property
@@ -193,7 +190,6 @@ class FiringBounds:
 
     @cached_property
     def _root(self) -> tuple[Array, Array]:
-        """Bounds of throws and open angles."""
         free = ((-math.inf, math.inf),) * len(self.layout.throw_positions)
         every = np.array([*(self.throws or free), *self.open_angles])
         if self.throws is None:
@@ -203,14 +199,14 @@ class FiringBounds:
 
     @property
     def anywhere(self) -> FiringWindow:
-        """Throws within bounds of their own, whatever fires when."""
+        """Window of the bounds on throws alone, without a firing order."""
         return self._window((), (0,) * len(self.layout.positions), self._start())
 
     def _window(self, order: tuple[int, ...], laps: tuple[int, ...], paths: Array) -> FiringWindow:
         return FiringWindow(order, laps, paths, self.own, self._root)
 
     def windows(self) -> Iterator[FiringWindow]:
-        """Every order and choice of dead centres that some throws keep, one after the other."""
+        """Yield the window of every order and choice of dead centres that some throws keep."""
         firsts = [self.order[0] - 1] if self.order else [0]
         if self.order is None and self.most > math.tau + SLACK:
             # whose first dead centre comes more than a turn after the last of the others need not be cylinder 1
@@ -219,7 +215,7 @@ class FiringBounds:
             yield from self._grown((first,), {first: 0}, self._start())
 
     def rows(self, window: FiringWindow) -> tuple[Array, Array]:
-        """Firing intervals as A u + b with u the throws and open angles, shapes (n, u) and (n,)."""
+        """Return firing intervals as A u + b of throws and open angles u, shapes (n, u) and (n,)."""
         order, late = [number - 1 for number in window.order], self.late
         throws = len(self.layout.throw_positions)
         moments = np.zeros((len(order), throws + len(self.open_angles)))
@@ -260,7 +256,6 @@ class FiringBounds:
                     yield from self._grown((*fired, k), {**laps, k: lap}, longer)
 
     def _laps(self, k: int, before: int, lap_before: int, back: float, there: float) -> Sequence[int]:
-        """Whole turns that let cylinder k fire after another, whose own angle is so far back at most, or ahead."""
         # 2 pi l = interval + theta_own + c_own + t_before
         still = self.late[k] - self.late[before] + math.tau * lap_before
         low = self.least + still - back
@@ -270,7 +265,7 @@ class FiringBounds:
     def _apart(
         self, paths: Array, before: int, lap_before: int, after: int, lap_after: int, wrapped: bool = False
     ) -> Array | None:
-        """Paths with the bounds of one more interval; None where nothing keeps them."""
+        """Return the paths with the bounds of one more interval, or None if infeasible."""
         late = self.late
         still = math.tau * (lap_after - lap_before) - late[after] + late[before]
         still += self.cycle.angle if wrapped else 0.0
@@ -290,7 +285,6 @@ class FiringBounds:
 
 
 def _tightened(paths: Array, i: int, j: int, most: float) -> Array:
-    """Shortest paths when j stands no more ahead of i than this."""
     if most >= paths[i, j]:
         return paths
     return np.minimum(paths, paths[:, i : i + 1] + most + paths[j : j + 1, :])

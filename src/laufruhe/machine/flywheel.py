@@ -1,4 +1,4 @@
-"""The flywheel: what turns with the crank and stores work, as an inertia or as a rim on arms (T5-T8)."""
+"""Flywheel: an inertia that turns with the crank, or a rim on arms (T5-T8)."""
 
 from __future__ import annotations
 
@@ -63,22 +63,22 @@ class Rim:
 
     @property
     def mass(self) -> float:
-        """Of the ring alone [kg] (T5)."""
+        """Mass of the ring alone [kg] (T5)."""
         return math.pi * self.density * self.mean_diameter * self.width * self.height
 
     @property
     def inertia(self) -> float:
-        """About the shaft [kg m2] (T5)."""
+        """Moment of inertia about the shaft [kg m2] (T5)."""
         inside, outside = self.radii
         return 0.5 * self.mass * (inside**2 + outside**2)
 
     def stress(self, speed: float) -> float:
-        """Largest in the ring, around its inside, as if nothing held it [Pa] (T6)."""
+        """Return the largest hoop stress, at the inside of a free ring [Pa] (T6)."""
         inside, outside = self.radii
         return 0.25 * self.density * speed**2 * ((3.0 + LATERAL) * outside**2 + (1.0 - LATERAL) * inside**2)
 
     def arm_stress(self, speed: float, torque: float) -> float:
-        """Largest in an arm that hangs down, the rim taking nothing of its own pull [Pa] (T7).
+        """Return the largest stress in an arm that hangs down, the rim carrying none of its own pull [Pa] (T7).
 
         Parameters
         ----------
@@ -98,7 +98,7 @@ class Rim:
 
 @dataclass(frozen=True)
 class Flywheel:
-    """All that turns with the crank at its speed, pistons and rods left out.
+    """Parts that turn with the crank at its speed, pistons and rods excluded.
 
     Attributes
     ----------
@@ -111,27 +111,27 @@ class Flywheel:
 
     @property
     def inertia(self) -> float:
-        """Of all of it [kg m2]."""
+        """Total moment of inertia [kg m2]."""
         return self.rest + (self.rim.inertia if self.rim else 0.0)
 
     @property
     def ring(self) -> Rim:
-        """Its rim, which it must have."""
+        """The rim; an error without one."""
         if self.rim is None:
             raise ModelError("a flywheel that is given by its inertia has no mass and no stress; give its rim")
         return self.rim
 
     @property
     def numbers(self) -> tuple[float, ...]:
-        """What decisions may move: inertia of the rest, and mean diameter, width and height of a rim."""
+        """Decision variables: inertia of the rest, then mean diameter, width and height of a rim."""
         return (self.rest, *((self.rim.mean_diameter, self.rim.width, self.rim.height) if self.rim else ()))
 
     def weighing(self, mass: float) -> Flywheel:
-        """With a rim as wide as makes it weigh so much [kg]."""
+        """Return the flywheel with the rim width that gives a mass [kg]."""
         return replace(self, rim=replace(self.ring, width=self.ring.width * (mass / self.ring.mass)))
 
     def moved(self, numbers: Any) -> Flywheel:
-        """With these numbers in place of its own."""
+        """Return the flywheel with other decision variables."""
         rest, *section = (float(number) for number in numbers)
         if self.rim is None:
             return Flywheel(rest)

@@ -1,4 +1,4 @@
-"""Working-gas models: what the cylinder pressure is described by."""
+"""Working-gas models: descriptions of the cylinder pressure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ MAX_SHAPE = 20.0
 
 @dataclass(frozen=True, kw_only=True)
 class Charge:
-    """What every computed cycle says of the charge and of the gas exchange.
+    """Charge and gas exchange of a computed cycle.
 
     Attributes
     ----------

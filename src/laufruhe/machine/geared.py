@@ -1,4 +1,4 @@
-"""Inertia that turns on other shafts than the crank."""
+"""Inertia on shafts other than the crank."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shafts that are turned ahead of where they stand, with all that they carry (L10)."""
+"""Phase leads of shafts and of all that they carry (L10)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from laufruhe.machine.slider_crank import SliderCrank
 
 
 def led_parts(parts: Sequence[SliderCrank], leads: Mapping[str, float]) -> tuple[SliderCrank, ...]:
-    """Slider-cranks whose shafts come some crank angles earlier [rad], by the names of the shafts."""
+    """Return the slider-cranks with phase leads [rad] by the names of their shafts."""
     return tuple(_led(part, leads.get(part.shaft.name, 0.0)) for part in parts)
 
 
@@ -23,7 +23,7 @@ def _led(part: SliderCrank, lead: float) -> SliderCrank:
 
 
 def led(engine: Engine, leads: Mapping[str, float]) -> Engine:
-    """An engine whose shafts come some crank angles earlier [rad]: every load on them does."""
+    """Return the engine with phase leads of its shafts [rad], and so of all loads on them."""
     parts = led_parts(engine.slider_cranks, leads)
     if any(part.facing is not None for part in parts):
         parts = with_shared_chambers([replace(part, facing=None) for part in parts], engine.cycle.angle)

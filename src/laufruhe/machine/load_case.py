@@ -1,4 +1,4 @@
-"""A load that is held, beside what turns: weight, torque, a bump."""
+"""Static load case: weight, torque, a bump."""
 
 from __future__ import annotations
 

@@ -70,12 +70,12 @@ class Mount:
 
     @property
     def springs(self) -> tuple[Mount, ...]:
-        """All of the place, each by itself."""
+        """Springs of this place, each by itself."""
         return (replace(self, joined=()), *self.joined) if self.joined else (self,)
 
     @property
     def at_rest(self) -> Vector3:
-        """Stiffness along its own three axes, with that of what depends on frequency (E50) [N/m]."""
+        """Static stiffness along its own three axes, frequency-dependent springs included (E50) [N/m]."""
         if not self.dynamic:
             return self.stiffness
         x, y, z = (k + sum(law.static for law in self.dynamic if law.axis == a) for a, k in enumerate(self.stiffness))
@@ -83,11 +83,11 @@ class Mount:
 
     @property
     def depends_on_frequency(self) -> bool:
-        """Whether any spring of the place does."""
+        """True if the stiffness of any spring of the place does."""
         return any(spring.dynamic for spring in self.springs)
 
     def each(self, change: Callable[[Mount], Mount]) -> Mount:
-        """With every spring of the place changed."""
+        """Return the mount with a change of every spring."""
         own = change(replace(self, joined=())) if self.joined else change(self)
         return replace(own, joined=tuple(map(change, self.joined))) if self.joined else own
 
@@ -117,5 +117,5 @@ class Mount:
 
 
 def every_spring(mounts: Sequence[Mount]) -> list[tuple[int, Mount]]:
-    """Springs of all places, those of one behind each other, with the number of their place."""
+    """Return (place index, spring) of all springs of all places, those of one place one after the other."""
     return [(place, spring) for place, mount in enumerate(mounts) for spring in mount.springs]

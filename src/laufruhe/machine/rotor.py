@@ -30,7 +30,7 @@ class Shaft:
             raise ModelError(f"shaft '{self.name}' has ratio 0: a shaft that stands still balances nothing")
 
     def scaled(self, length: float) -> Shaft:
-        """The same shaft of an engine in another size."""
+        """Return the shaft in another size."""
         return replace(self, y=self.y * length, z=self.z * length)
 
 
@@ -38,7 +38,7 @@ CRANKSHAFT = Shaft("crankshaft")
 
 
 class Role(StrEnum):
-    """What an unbalance is there for; mass limits are counted by it."""
+    """Purpose of an unbalance; mass limits count by it."""
 
     THROW = "throw"
     COUNTERWEIGHT = "counterweight"
@@ -47,7 +47,7 @@ class Role(StrEnum):
 
 @dataclass(frozen=True)
 class Rotor:
-    """One unbalance on a shaft (C4).
+    """Unbalance on a shaft (C4).
 
     Attributes
     ----------
@@ -70,11 +70,11 @@ class Rotor:
 
     @property
     def place(self) -> tuple[float, float, float]:
-        """Its x, and y and z of its shaft [m] (C2)."""
+        """Position: x of the rotor, y and z of its shaft [m] (C2)."""
         return self.x, self.shaft.y, self.shaft.z
 
     def placed(self, x: float, y: float, z: float) -> Rotor:
-        """The same elsewhere, its shaft with it."""
+        """Return the rotor at another position, its shaft moved with it."""
         moved = self.shaft if (y, z) == (self.shaft.y, self.shaft.z) else replace(self.shaft, y=y, z=z)
         return replace(self, x=x, shaft=moved)
 

@@ -1,4 +1,4 @@
-"""Sizes of the running gear beside its pins and journals: webs, rod shank, piston pin and bolts, and what they weigh.
+"""Sizes of the running gear and the masses that follow: webs, rod shank, piston pin and bolts.
 
 Crank pins are the big ends of the rods, journals the main bearings. What hangs on the sizes is written once here:
 moduli and areas of sections, and masses (Z1, Z2).
@@ -46,7 +46,7 @@ class Webs:
 
     @property
     def area(self) -> float:
-        """Of the section [m2]."""
+        """Area of the section [m2]."""
         return self.width * self.thickness
 
 
@@ -68,7 +68,7 @@ class Shank:
 
     @property
     def area(self) -> float:
-        """Of the section [m2]."""
+        """Area of the section [m2]."""
         return ring_area(self.diameter, self.bore)
 
     @property
@@ -126,13 +126,13 @@ class Bolts:
 
     @property
     def area(self) -> float:
-        """Of all of them [m2]."""
+        """Area of all bolts [m2]."""
         return self.count * ring_area(self.diameter, 0.0)
 
 
 @dataclass(frozen=True)
 class RunningGear:
-    """What is alike at every throw.
+    """Sizes that all throws share.
 
     Attributes
     ----------
@@ -151,14 +151,14 @@ class RunningGear:
     throws: tuple[tuple[str, complex], ...] = ()
 
     def part(self, name: str) -> Webs | Shank | PistonPin | Bolts:
-        """One of its parts, which it must have."""
+        """Return a part; an error if the running gear lacks it."""
         found: Webs | Shank | PistonPin | Bolts | None = getattr(self, name)
         if found is None:
             raise ModelError(f"the running gear has no {name.replace('_', ' ')}; add it to [running_gear]")
         return found
 
     def scaled(self, length: float, density: float) -> RunningGear:
-        """The same in another size, of another density."""
+        """Return the running gear in another size and density."""
         longer: dict[str, object] = {}
         for name in PARTS:
             own = getattr(self, name)
@@ -169,7 +169,7 @@ class RunningGear:
         return replace(self, density=heavy, **longer)  # type: ignore[arg-type]
 
     def rod_masses(self, part: SliderCrank) -> tuple[float, float, float]:
-        """What shank and piston pin add to a slider-crank (Z2).
+        """Return the masses that shank and piston pin add to a slider-crank (Z2).
 
         Returns
         -------
@@ -182,7 +182,7 @@ class RunningGear:
         return 0.5 * shank + ring, 0.5 * shank, -shank * length**2 / 6.0 if shank else 0.0
 
     def throw_unbalance(self, radius: float, big_end: tuple[float, float] | None, journal: float) -> float:
-        """Of crank pin and both webs [kg m] (Z2).
+        """Return the unbalance of crank pin and both webs [kg m] (Z2).
 
         Parameters
         ----------
@@ -198,7 +198,7 @@ class RunningGear:
 
 @dataclass(frozen=True)
 class Moving:
-    """What sizes move: of an engine all that turns, reciprocates or carries."""
+    """Parts of an engine whose masses or loads depend on sizes."""
 
     gear: RunningGear | None
     parts: tuple[SliderCrank, ...]
@@ -206,7 +206,7 @@ class Moving:
     bearings: tuple[Bearing, ...]
 
     def weighed(self, sense: float = 1.0) -> Moving:
-        """With the masses of the running gear added to those given, or taken off where `sense` is -1 (Z2)."""
+        """Return the parts with the masses of the running gear added (`sense` 1) or removed (-1) (Z2)."""
         gear = self.gear
         if gear is None or gear.density is None or not self.parts:
             return self
@@ -218,12 +218,12 @@ class Moving:
 
     @cached_property
     def bare(self) -> Moving:
-        """Without the masses of the running gear (Z2)."""
+        """Parts without the masses of the running gear (Z2)."""
         return self.weighed(-1.0)
 
     @property
     def throw_unbalance(self) -> float:
-        """Of crank pin and webs of every throw [kg m] (Z2)."""
+        """Unbalance of pin and webs of one throw [kg m] (Z2)."""
         if self.gear is None or not self.parts:
             return 0.0
         # about the journal a web turns about its own middle
@@ -232,7 +232,7 @@ class Moving:
 
     @property
     def sizes(self) -> dict[Size, float]:
-        """Every size that decisions may move [m]."""
+        """Sizes that decisions may move [m]."""
         found: dict[Size, float] = {}
         if self.parts:
             found[ROD_LENGTH] = self.parts[0].rod_length
@@ -246,7 +246,7 @@ class Moving:
         return found
 
     def resized(self, sizes: Mapping[Size, float]) -> Moving:
-        """With sizes in place of its own, and the masses of these."""
+        """Return the parts with other sizes, and the masses that follow from them."""
         bare = self.bare
         parts, gear = bare.parts, bare.gear
         length, end = sizes.get(ROD_LENGTH), tuple(sizes.get((BIG_END, key)) for key in _ACROSS)
@@ -280,22 +280,22 @@ def _heavier(gear: RunningGear, part: SliderCrank, sense: float) -> SliderCrank:
 
 
 def on(bearing: Bearing) -> str:
-    """The name of a main bearing among those of parts."""
+    """Return the name of a main bearing among those of parts."""
     return f"bearing {bearing.name}"
 
 
 def ring_area(diameter: float, bore: float) -> float:
-    """Of a round section [m2]."""
+    """Return the area of a round section [m2]."""
     return math.pi / 4.0 * (diameter**2 - bore**2)
 
 
 def round_modulus(diameter: float, bore: float = 0.0) -> float:
-    """Of a round section against bending, half of that against torsion [m3] (Z1)."""
+    """Return the section modulus in bending, twice which is that in torsion [m3] (Z1)."""
     return math.pi / 32.0 * (diameter**4 - bore**4) / diameter
 
 
 def round_inertia(diameter: float, bore: float = 0.0) -> float:
-    """Second moment of a round section [m4]."""
+    """Return the second moment of a round section [m4]."""
     return 0.5 * diameter * round_modulus(diameter, bore)
 
 

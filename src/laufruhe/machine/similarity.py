@@ -38,7 +38,7 @@ class EqualPowerScale:
 
 
 def equal_power_scale(cylinders: int, reference_cylinders: int) -> EqualPowerScale:
-    """Similarity of an engine with `cylinders` to one with `reference_cylinders` (eqs. 14-23)."""
+    """Return the factors from an engine with `reference_cylinders` to one with `cylinders` (eqs. 14-23)."""
     ratio = cylinders / reference_cylinders
     return EqualPowerScale(
         length=ratio**-0.5,

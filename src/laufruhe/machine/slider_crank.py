@@ -19,7 +19,7 @@ _ON_ONE_AXIS = 1e-9
 
 @dataclass(frozen=True)
 class Swept:
-    """What a charge works in: a piston's cylinder, or chambers alike that come one after the other.
+    """Space that a charge works in: a cylinder, or similar chambers that fire one after the other.
 
     Attributes
     ----------
@@ -46,23 +46,23 @@ class Swept:
 
     @property
     def chamber(self) -> SliderCrank:
-        """What makes its volume."""
+        """Mechanism that gives the volume."""
         return self.charge or self.piston
 
 
 class Shared(Protocol):
-    """Another piston that works in the same chamber."""
+    """Second piston of a chamber."""
 
     def scaled(self, length: float) -> Any:
-        """The same in another size."""
+        """Return the piston in another size."""
 
     def swept(self, part: SliderCrank) -> Swept:
-        """What both sweep, as one of them sees it."""
+        """Return the shared chamber as seen by one of the pistons."""
 
 
 @dataclass(frozen=True)
 class SliderCrank:
-    """One cylinder's mechanism; any other is a class of its own that says how it moves.
+    """Mechanism of one cylinder; other mechanisms are subclasses.
 
     Attributes
     ----------
@@ -146,7 +146,7 @@ class SliderCrank:
 
     @property
     def path(self) -> Hashable:
-        """What the piston's path depends on, besides the angle of the crank."""
+        """Numbers that determine the path of the piston over the angle of the crank."""
         return self.crank_radius, self.rod_length, self.offset
 
     @property
@@ -164,15 +164,15 @@ class SliderCrank:
         return top, math.pi + math.asin(self.offset_ratio / (1.0 - self.rod_ratio))
 
     def travel(self, lib: Any, alpha: Any) -> Any:
-        """Way of the piston towards the crank from alpha = 0 [m] (K4)."""
+        """Return the piston travel towards the crank from alpha = 0 [m] (K4)."""
         return self.crank_radius * kinematics.travel(lib, alpha, self.rod_ratio, self.offset_ratio)
 
     def velocity(self, lib: Any, alpha: Any) -> Any:
-        """Velocity of the piston away from the crank, by the angle of its crank [m] (K5)."""
+        """Return the velocity of the piston away from the crank, by the angle of its crank [m] (K5)."""
         return self.crank_radius * kinematics.piston_velocity(lib, alpha, self.rod_ratio, self.offset_ratio)
 
     def motion(self, lib: Any, alpha: Any) -> Motion:
-        """Piston, counted from where it stands at alpha = 0, and rod; in the digits of `lib` and `alpha`."""
+        """Return the motion of piston and rod; positions count from alpha = 0, in the digits of `lib` and `alpha`."""
         zero = 0.0 * alpha
         radius, offset = zero + self.crank_radius, zero + self.offset
         shape = (lib, alpha, radius / self.rod_length, offset / self.rod_length)
@@ -186,16 +186,16 @@ class SliderCrank:
 
     @property
     def counterweight_mass(self) -> float | None:
-        """Of what it carries against its other masses [kg]; None where it has no place for that."""
+        """Mass that it carries against its other masses [kg], or None if it carries no such mass."""
         return None
 
     def only(self, masses: Mapping[str, float]) -> Self:
-        """The same mechanism without any mass but these, by the names of its fields."""
+        """Return the mechanism with these masses alone, by field name."""
         told: dict[str, Any] = {**self.weightless, **masses}
         return replace(self, **told)
 
     def scaled(self, length: float, mass: float) -> Self:
-        """The same mechanism in another size."""
+        """Return the mechanism in another size."""
         return replace(
             self,
             x=self.x * length,
@@ -213,11 +213,11 @@ class SliderCrank:
 
     @cached_property
     def star_turn(self) -> Turn:
-        """theta - beta as a part of a turn: the local crank angle at phi = 0 (C5)."""
+        """Local crank angle theta - beta at phi = 0, in turns (C5)."""
         return as_turn(self.throw) - as_turn(self.bank)
 
     def faces(self, other: SliderCrank) -> bool:
-        """Whether two pistons work against each other in one cylinder: on one axis, each towards the other (C5)."""
+        """Return True if two pistons work against each other on one axis in one cylinder (C5)."""
         if self.x != other.x:
             return False
         axis, opposite = cis(as_turn(self.bank)), cis(as_turn(other.bank))
@@ -227,11 +227,11 @@ class SliderCrank:
 
     @property
     def swept(self) -> Swept:
-        """What a charge works in."""
+        """Space that its charge works in."""
         return Swept(self) if self.facing is None else self.facing.swept(self)
 
     def lean(self, lib: Any, angles: Any) -> Any:
-        """Force on the crank pin over that of the gas away from it, some crank angles after firing (B2).
+        """Return crank-pin force over gas force at crank angles after firing, in the plane of the cylinder axis (B2).
 
         In the plane turned to the cylinder axis: the rod leans on the wall.
         """
@@ -239,42 +239,42 @@ class SliderCrank:
         return 1.0 - 1j * sine / cosine
 
     def rod_lean(self, lib: Any, alpha: Any) -> tuple[Any, Any]:
-        """Sine and cosine of the angle between rod and cylinder axis (K1, K2)."""
+        """Return sine and cosine of the angle between rod and cylinder axis (K1, K2)."""
         shape = lib, alpha, self.rod_ratio, self.offset_ratio
         return kinematics.sin_psi(*shape), kinematics.cos_psi(*shape)
 
     @property
     def crank_pin_mass(self) -> float:
-        """What turns with its rod's end at the crank pin [kg]."""
+        """Mass of the rod's end that turns with the crank pin [kg]."""
         return self.rotating_mass
 
     @property
     def master_bank(self) -> float | None:
-        """Bank angle of the cylinder whose rod carries its own [rad]; None of a rod on the crank pin."""
+        """Bank angle of the cylinder whose rod carries this rod [rad]; None for a rod on the crank pin."""
         return None
 
     def is_hinged_to(self, _master: SliderCrank) -> bool:
-        """Whether its rod works on a pin of another cylinder's rod."""
+        """Return True if the rod works on a pin of another cylinder's rod."""
         return False
 
     def on_pin(self, _lib: Any, _alpha: Any, force: Any, _with_masses: bool) -> Any:
-        """Force on the pin that its rod works on, of one on its piston pin, in the plane turned to its axis (B11).
+        """Return the force on the rod's pin for a force on its piston pin, in the plane of its axis (B11).
 
         With the pull of what moves with that pin but does not turn with the crank, at unit speed of the crank.
         """
         return force
 
     def on_wall_of_master(self, _lib: Any, alpha: Any, _force: Any) -> Any:
-        """By how much more the piston of its master rod leans on the wall for a force on its pin (B11)."""
+        """Return the wall force of the master's piston that a pin force adds (B11)."""
         return 0.0 * alpha
 
     def outlines(self, _alpha: float) -> tuple[Outline, ...]:
-        """Bodies at an angle of its crank; of none a piston and a rod are drawn."""
+        """Return drawn bodies at a crank angle; without any, a piston and a rod are drawn."""
         return ()
 
     @property
     def largest_ratio(self) -> float:
-        """Compression ratio that its shape allows."""
+        """Largest compression ratio that its shape allows."""
         return math.inf
 
     @property

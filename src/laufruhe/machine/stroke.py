@@ -1,4 +1,4 @@
-"""The crank radius that makes a stroke."""
+"""Crank radius from the stroke."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from laufruhe.errors import ModelError
 def radius_for_stroke(
     stroke: float, offset: float, *, rod_length: float | None = None, rod_ratio: float = 0.0
 ) -> float:
-    """Crank radius [m] that makes a stroke [m], at a given rod length or rod ratio.
+    """Return the crank radius of a stroke [m], at a given rod length or rod ratio.
 
     Squaring stroke = sqrt((l + r)^2 - e^2) - sqrt((l - r)^2 - e^2) twice leaves an
     equation linear in r^2 for a given l, and quadratic for a given r / l.

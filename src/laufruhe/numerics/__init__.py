@@ -1,1 +1,1 @@
-"""What knows no engine: exact turns, spectra, norms, maths namespaces, processors."""
+"""Numerics without engines: exact angles, spectra, norms, maths namespaces, executors."""

@@ -1,4 +1,4 @@
-"""Smallest balls that hold sets of points, of many sets at once."""
+"""Smallest enclosing balls of many sets of points at once."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FLAT, _NOTHING = 1e-15, 1e-290
 
 @dataclass(frozen=True, eq=False)
 class Balls:
-    """One for each set.
+    """Smallest enclosing ball of each set.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class Balls:
 
 
 def smallest_balls(points: Array) -> Balls:
-    """Of points of shape (sets, k, d).
+    """Return the smallest enclosing balls of points, shape (sets, k, d).
 
     The farthest point joins those that hold a ball, and the ball of these few is found by trying every choice of them
     that has it. Radii grow with every round, so it ends.
@@ -69,13 +69,12 @@ def smallest_balls(points: Array) -> Balls:
 
 
 def _squares(points: Array, centres: Array) -> Array:
-    """Of distances; shapes (sets, k, d) and (sets, d) to (sets, k)."""
     away = points - centres[:, None]
     return np.asarray(np.einsum("skd,skd->sk", away, away))
 
 
 def _of_few(points: Array) -> tuple[Indices, Array, Array, Array]:
-    """Of d + 2 points, the last of which is outside the ball of the others: it is one of those that hold the ball.
+    """Return the ball of d + 2 points, the last of which is outside the ball of the others and so on its surface.
 
     Of the centres between some of them it is the one from which the farthest is nearest.
     """
@@ -111,16 +110,11 @@ def _of_few(points: Array) -> tuple[Indices, Array, Array, Array]:
 
 @cache
 def _choices(count: int, size: int) -> Indices:
-    """So many of a count, the last always among them, shape (choices, size)."""
     choices = [(*first, count - 1) for first in itertools.combinations(range(count - 1), size - 1)]
     return np.array(choices)
 
 
 def _centre_shares(points: Array) -> Array:
-    """Shares that add up to one of the point as far from each of these, in the plane that they span.
-
-    From shape (..., k, d) to (..., k).
-    """
     apart = points[..., 1:, :] - points[..., :1, :]
     products = apart @ apart.swapaxes(-1, -2)
     squares = np.einsum("...kk->...k", products).copy()

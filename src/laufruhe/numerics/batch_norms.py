@@ -1,4 +1,4 @@
-"""Norms of many designs at once: rows that are linear in a few numbers per design (F12).
+"""Norms of many designs at once, from rows that are linear in a few numbers per design (F12).
 
 The work is one matrix product and two passes over its result.
 Designs go through in blocks that stay in the cache; what a block holds is fixed by the
@@ -25,14 +25,14 @@ _PARTS_OF_COMPLEX = 2
 
 @dataclass(frozen=True, eq=False)
 class BatchNorm:
-    """N(f . R) of many f, with R of shape (components, features, k)."""
+    """Norm N(f . R) for many f, R of shape (components, features, k)."""
 
     norm: Norm
     rows: Array
     grid: Grid
 
     def values(self, features: Array, threads: int = 1, cache_bytes: int = CACHE_BYTES) -> Array:
-        """The norm of every design, from features of shape (designs, features).
+        """Return the norm of every design from features (designs, features).
 
         One block of rows takes `cache_bytes`; `threads` are worked on at the same time.
         """
@@ -62,20 +62,19 @@ class BatchNorm:
         return out
 
     def value(self, features: Array) -> float:
-        """The norm of one design, features of shape (n,), in as few calls as there can be."""
+        """Return the norm of one design from features (n,)."""
         if not self.norm.of_row_lengths:
             return self.norm.value(self.grid, np.einsum("cfk,f->kc", self.rows, features))
         return float(self.norm.of_lengths(self._lengths(np.dot(features, self._matrix)), self.grid.weights))
 
     @cached_property
     def _matrix(self) -> Array:
-        """R as one matrix, shape (features, components k): two components as the parts of a complex number."""
         components, features, k = self.rows.shape
         order = (1, 2, 0) if components == _PARTS_OF_COMPLEX else (1, 0, 2)
         return np.ascontiguousarray(self.rows.transpose(order).reshape(features, components * k))
 
     def _lengths(self, product: Array, out: Array | None = None) -> Array:
-        """Of the rows of every design, shape (..., k); the products are used up."""
+        """Return the row lengths of every design, shape (..., k); overwrites the products."""
         components, _, k = self.rows.shape
         if components == 1:
             return np.absolute(product, out=out)
@@ -90,6 +89,6 @@ class BatchNorm:
 
     @property
     def operations(self) -> int:
-        """Additions and multiplications of the matrix products of one design."""
+        """Number of additions and multiplications of the matrix product of one design."""
         components, features, k = (int(n) for n in self.rows.shape)
         return 2 * components * features * k

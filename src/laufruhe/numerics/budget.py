@@ -1,4 +1,4 @@
-"""How long work may take: one deadline for all loops of a search, which stop at it with the best that they have."""
+"""Time limit of a search: one deadline for all its loops, which stop there with the best result so far."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _until: ContextVar[float] = ContextVar("until", default=math.inf)
 
 @contextmanager
 def limited(seconds: float | None) -> Iterator[None]:
-    """Work within may take so many seconds, and no more than what it stands in may; None sets no limit of its own."""
+    """Limit the work within to some seconds, and to those left outside; None sets no further limit."""
     own = math.inf if seconds is None else time.monotonic() + seconds
     before = _until.set(min(_until.get(), own))
     try:
@@ -27,7 +27,7 @@ def limited(seconds: float | None) -> Iterator[None]:
 
 @contextmanager
 def at_least(seconds: float) -> Iterator[None]:
-    """Work within has so many seconds where less is left, or none: for what a result cannot do without."""
+    """Give work within at least some seconds: a result needs it."""
     before = _until.set(max(_until.get(), time.monotonic() + seconds))
     try:
         yield
@@ -36,17 +36,17 @@ def at_least(seconds: float) -> Iterator[None]:
 
 
 def left() -> float:
-    """Seconds that are left, infinite where nothing limits them."""
+    """Return the seconds left; infinite without a limit."""
     return _until.get() - time.monotonic()
 
 
 def passed() -> bool:
-    """Whether time is over."""
+    """Return True if the time is over."""
     return left() <= 0.0
 
 
 def in_time(items: Iterable[T]) -> Iterator[T]:
-    """The first of some pieces of work, and the others as long as time is left."""
+    """Yield the first piece, and further ones while time is left."""
     for k, item in enumerate(items):
         if k and passed():
             return
@@ -54,7 +54,7 @@ def in_time(items: Iterable[T]) -> Iterator[T]:
 
 
 def rounds(most: int) -> Iterator[int]:
-    """Numbers of rounds that may be left out, as long as time is left."""
+    """Yield numbers of optional rounds while time is left."""
     for k in range(most):
         if passed():
             return

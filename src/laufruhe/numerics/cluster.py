@@ -19,7 +19,7 @@ ANSWERS, PATIENCE = 10.0, 60.0
 
 
 class Cluster(Executor):
-    """The workers of a `distributed.Client`."""
+    """Workers of a `distributed.Client`."""
 
     def __init__(self, client: Any) -> None:
         from distributed.scheduler import KilledWorker
@@ -28,7 +28,7 @@ class Cluster(Executor):
         self.losses = (KilledWorker,)
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Ask for a call; while the scheduler is away it waits."""
+        """Schedule a call; it waits while the scheduler is away."""
         if self._client.status in ("closing", "closed"):
             raise RuntimeError("the connection is closed")
         asked, answer = self._client.submit(fn, *args, pure=False, **kwargs), Future[T]()
@@ -38,22 +38,21 @@ class Cluster(Executor):
         return answer
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Nothing is left to end: the client belongs to who has made it."""
+        """Do nothing: the client belongs to its creator."""
 
     @property
     def count(self) -> int:
-        """Threads of all workers that are there."""
+        """Number of threads of all workers."""
         known = self._client.scheduler_info(n_workers=-1)["workers"].values()
         return max(sum(int(worker["nthreads"]) for worker in known), 1)
 
     @property
     def gone(self) -> str:
-        """What is said where nobody works any more."""
+        """Message for the loss of all workers."""
         return f"the cluster at {self._client.scheduler.address if self._client.scheduler else 'its address'} is gone"
 
 
 def _tell(answer: Future[Any], asked: Any) -> None:
-    """What has become of a call; one that is done and whose answer cannot be fetched any more is lost."""
     if not answer.set_running_or_notify_cancel():
         return
     try:
@@ -65,7 +64,7 @@ def _tell(answer: Future[Any], asked: Any) -> None:
 
 @contextmanager
 def cluster(address: str) -> Iterator[Executor]:
-    """The workers of the scheduler at an address, such as tcp://10.0.0.1:8786.
+    """Connect to the scheduler at an address such as tcp://10.0.0.1:8786, and yield its workers.
 
     Raises
     ------

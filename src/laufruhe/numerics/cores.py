@@ -1,4 +1,4 @@
-"""Processors that work may be shared among, and processes that do not outlive who started them."""
+"""Processors to share work among, and processes that end with their parent."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ _DEATH_SIGNAL = 1
 
 
 def processors() -> int:
-    """As many processes as may run side by side."""
+    """Return the number of processors of this process."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def end_with_parent(parent: int) -> None:
-    """Be ended with the process that started this one, where the system can do that (Linux)."""
+    """End this process with its parent, where the system can (Linux)."""
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).prctl(_DEATH_SIGNAL, signal.SIGKILL)
     if os.getppid() != parent:

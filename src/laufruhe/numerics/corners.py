@@ -1,4 +1,4 @@
-"""Corners of a periodic signal: angles at which its derivatives jump, in closed form (L5a).
+"""Kinks of a periodic signal: angles at which its derivatives jump, in closed form (L5a).
 
 No sum of finitely many orders bends at an angle; it cuts the corner off. The function of period P
 whose m-th derivative jumps by one at zero, and by nothing else anywhere, is a polynomial between its jumps,
@@ -55,7 +55,7 @@ class Corners:
 
     @property
     def bending(self) -> Array:
-        """Where a peak may stand: angles at which the slope jumps, and both sides of those at which the value does."""
+        """Angles where a peak may stand: jumps of the slope, and both sides of jumps of the value."""
         size = np.abs(self.jumps).reshape(*self.jumps.shape[:2], -1).max(axis=2)
         # what is left of the jumps of higher derivatives is a rounding
         steps, slopes = size[:, 0] > 1e-9 * size.max(), size[:, 1] > 1e-6 * size.max()
@@ -63,7 +63,7 @@ class Corners:
         return np.concatenate([self.angles[slopes & ~steps], beside - SAME_ANGLE, beside + SAME_ANGLE])
 
     def values(self, angles: Array, period: float, derivative: int = 0) -> Array:
-        """Sum of f_m times the jumps, or a derivative of it, shape (len(angles), ...)."""
+        """Return the sum of f_m times the jumps, or a derivative of it, shape (len(angles), ...)."""
         k = len(self.jumps)
         weights = self.pieces(period, derivative)
         weights = weights.reshape(*weights.shape[:2], -1)
@@ -79,7 +79,7 @@ class Corners:
         return out.reshape(len(angles), *self.jumps.shape[2:])
 
     def pieces(self, period: float, derivative: int = 0) -> Array:
-        """Factors of the powers of phi / P - 1/2 after every corner, shape (powers, k, ...)."""
+        """Return the factors of the powers of phi / P - 1/2 after every kink, shape (powers, k, ...)."""
         k, degrees = self.jumps.shape[:2]
         powers = [m - derivative for m in range(degrees)]
         table: Array = np.array([period**m * _kernel(m, degrees + 2) for m in powers])
@@ -87,7 +87,7 @@ class Corners:
         return np.asarray(found.reshape(-1, k, *self.jumps.shape[2:]))
 
     def coefficients(self, count: int, base: float) -> NDArray[np.complex128]:
-        """Orders 0, b, ... (count - 1) b, shape (count, ...); none at order zero."""
+        """Return the coefficients of orders 0, b, ... (count - 1) b, shape (count, ...); zero at order 0."""
         k, degrees = self.jumps.shape[:2]
         flat, orders = self.jumps.reshape(k, degrees, -1), np.arange(count) * base
         waves = np.exp(-1j * np.outer(orders, self.angles))
@@ -100,7 +100,7 @@ class Corners:
         return np.where(np.abs(total) > _CANCELLED * size, total, 0.0).reshape(count, *self.jumps.shape[2:])
 
     def beyond(self, count: int, base: float) -> tuple[Array, Array]:
-        """What all orders from `count` b on can hold at most: their sum, and the root of their mean square."""
+        """Bound all orders from `count` b on: their sum, and the root of their mean square."""
         total = power = np.zeros(self.jumps.shape[2:])
         for m, jumps in enumerate(np.abs(self.jumps).sum(axis=0)):
             unit, last = jumps / (math.pi * base**m), max(count - 1, 0.5)
@@ -110,7 +110,7 @@ class Corners:
         return total, power
 
     def beyond_averaged(self, count: int, base: float, steps: float) -> Array:
-        """What averages about so many angles in a period (P7) have at most of all orders from `count` b on."""
+        """Bound the orders from `count` b on of averages about `steps` angles in a period (P7)."""
         total, last = np.zeros(self.jumps.shape[2:]), max(count - 1, 0.5)
         for m, jumps in enumerate(np.abs(self.jumps).sum(axis=0)):
             # sinc^2 leaves of order j no more than (steps / (pi j))^2
@@ -118,36 +118,36 @@ class Corners:
         return np.minimum(total, self.beyond(count, base)[0])
 
     def curvature(self, period: float) -> Array:
-        """The second derivative over one period, on both sides of every corner and at steps between, shape (n, ...)."""
+        """Return the second derivative on both sides of every kink and at steps between, shape (n, ...)."""
         steps = period * np.arange(_STEPS) / _STEPS
         return self.values(np.concatenate([steps, self.angles - SAME_ANGLE, self.angles + SAME_ANGLE]), period, 2)
 
     def each(self, linear: Callable[[Array], Array]) -> Corners | None:
-        """Through a real linear map of values (n, ...); None where nothing bends any more."""
+        """Return the kinks through a real linear map of values (n, ...), or None without any."""
         k, degrees = self.jumps.shape[:2]
         flat = np.asarray(linear(self.jumps.reshape(k * degrees, *self.jumps.shape[2:])))
         return _left(self.angles, flat.reshape(k, degrees, *flat.shape[1:]))
 
     def moved(self, by: float, degrees: int = 0) -> Self:
-        """Later by an angle, and integrated as often as `degrees` says."""
+        """Shift the kinks later by an angle, and integrate them `degrees` times."""
         none = np.zeros((len(self.angles), degrees, *self.jumps.shape[2:]))
         return type(self)(self.angles + by, np.concatenate([none, self.jumps], axis=1))
 
     @property
     def derivative(self) -> Corners | None:
-        """Of the derivative of a signal that does not jump itself."""
+        """Kinks of the derivative of a continuous signal."""
         return _left(self.angles, self.jumps[:, 1:])
 
     def repeated(self, period: float, times: int) -> Corners | None:
-        """Of the same signal counted over so many of its periods."""
+        """Return the kinks of the same signal counted over several of its periods."""
         return joined([self.moved(k * period) for k in range(times)])
 
     def folded(self, period: float, times: int) -> Corners | None:
-        """Of a signal that repeats so often within the period it was counted over, after its own."""
+        """Return the kinks of a signal that repeats `times` within `period`, over its own period."""
         return merged(_within(self.angles, period), self.jumps / times)
 
     def strongest(self, count: int) -> Corners | None:
-        """The few that bend most over a degree."""
+        """Return the `count` kinks that bend most over a degree."""
         steps = math.radians(1.0) ** np.arange(self.jumps.shape[1])
         size = np.einsum("km,m->k", np.abs(self.jumps).reshape(*self.jumps.shape[:2], -1).max(axis=2), steps)
         kept = np.sort(np.argsort(-size, kind="stable")[:count])
@@ -155,7 +155,7 @@ class Corners:
 
 
 def joined(parts: Sequence[Corners | None]) -> Corners | None:
-    """Corners of a sum of signals."""
+    """Return the kinks of a sum of signals."""
     found = [corners for corners in parts if corners is not None]
     if len(found) < 2:
         return found[0] if found else None
@@ -171,7 +171,7 @@ def _pad(jumps: Array, degrees: int) -> Array:
 
 
 def merged(angles: Array, jumps: Array) -> Corners | None:
-    """Corners at one angle as one; None where nothing is left of any."""
+    """Merge kinks at equal angles; None if nothing is left."""
     _, first, inverse = np.unique(np.round(angles / SAME_ANGLE), return_index=True, return_inverse=True)
     total = np.zeros((len(first), *jumps.shape[1:]))
     np.add.at(total, inverse, jumps)
@@ -179,7 +179,6 @@ def merged(angles: Array, jumps: Array) -> Corners | None:
 
 
 def _left(angles: Array, jumps: Array) -> Corners | None:
-    """Corners at which anything jumps; None where there are none."""
     used = jumps.reshape(len(jumps), -1).any(axis=1)
     if len(angles) and used.all():
         return Corners(angles, jumps)
@@ -187,7 +186,7 @@ def _left(angles: Array, jumps: Array) -> Corners | None:
 
 
 def found_corners(signal: Callable[[Array], Array], breaks: Array, period: float) -> Corners | None:
-    """Corners of a function of the angle at the angles where its derivatives may jump.
+    """Find the kinks of a function of the angle at the angles where its derivatives may jump.
 
     The derivatives on either side are those of polynomials through values beside the corner.
 
@@ -226,19 +225,16 @@ def found_corners(signal: Callable[[Array], Array], breaks: Array, period: float
 
 
 def _within(angles: Array, period: float) -> Array:
-    """Of one period; what ends it within a rounding begins it."""
     return np.asarray(np.mod(angles + 0.5 * SAME_ANGLE, period) - 0.5 * SAME_ANGLE)
 
 
 @lru_cache(maxsize=8)
 def _fit(degree: int) -> Array:
-    """Coefficients of the powers of t from values at the nodes, shape (degree + 1, nodes)."""
     return np.asarray(np.linalg.pinv(np.vander(_PLACES, degree + 1, increasing=True)))
 
 
 @lru_cache(maxsize=64)
 def _kernel(degree: int, count: int) -> Array:
-    """f_m over P^m as coefficients of the powers of phi / P - 1/2, between -1/2 and 1/2."""
     own = [-1.0] if degree >= -1 else [0.0]
     for _ in range(degree + 1):
         own = [0.0, *(c / k for k, c in enumerate(own, 1))]

@@ -1,4 +1,4 @@
-"""Python and the libraries that numbers come from."""
+"""Versions of Python and of the numerical libraries."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ PACKAGES = ("numpy", "scipy", "cvxpy", "clarabel", "casadi")
 
 
 def version_of(package: str) -> str:
-    """Return the version that is installed."""
+    """Return the installed version of a package."""
     try:
         return version(package)
     except PackageNotFoundError:

@@ -1,4 +1,4 @@
-"""Folders that one process keeps to itself while it writes there."""
+"""Locks on folders that one process writes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ _KEPT: set[int] = set()
 
 
 def _let_go() -> None:
-    """A copy of a process keeps nothing: it may live a little longer, and the folder is free when its own is done."""
     while _KEPT:
         os.close(_KEPT.pop())
 
@@ -30,7 +29,7 @@ if hasattr(os, "register_at_fork"):
 
 @contextmanager
 def held(folder: Path, wait: bool = True) -> Iterator[bool | None]:
-    """Keep a folder to this process; False where another has it, which is not waited for, None where nothing tells."""
+    """Lock a folder; yield True if locked, False if another process holds it (without `wait`), None if unknown."""
     if fcntl is None:
         yield None
         return

@@ -15,7 +15,7 @@ import numpy as np
 
 
 class Maths(Protocol):
-    """What a kernel may call."""
+    """Functions that a kernel may call."""
 
     def sin(self, x: Any, /) -> Any:
         """Sine."""
@@ -24,7 +24,7 @@ class Maths(Protocol):
         """Cosine."""
 
     def matrix(self, rows: Sequence[Sequence[Any]], /) -> Any:
-        """A matrix from rows of scalars."""
+        """Return a matrix from rows of scalars."""
 
 
 class _Numbers:
@@ -46,7 +46,7 @@ NUMBERS: Maths = _Numbers()
 
 @cache
 def symbols() -> Maths:
-    """The same for CasADi's SX, MX and DM."""
+    """Return the namespace of CasADi's SX, MX and DM."""
     import casadi as ca
 
     class Symbols:

@@ -1,7 +1,7 @@
-"""Processes on this machine as an executor: each an interpreter of its own.
+"""Processes of this machine as an executor, each an interpreter of its own or a forked copy of this process.
 
-Neither forks of a threaded process nor the caller's main module are involved, so it works from any script, notebook
-or test. A process that dies takes with it the one call that it was at; the next call gets a new one.
+The executor forks no threaded process and does not import the caller's main module, so it works from any script,
+notebook or test. A process that dies takes with it the one call that it was at; the next call gets a new one.
 """
 
 from __future__ import annotations
@@ -33,125 +33,124 @@ _SERVES = False
 _PROGRAM = "from laufruhe.numerics.processes import serve; serve({})"
 
 
-def called(name: str, *args: Any) -> Any:
-    """Call what stands under a name as `package.module:function`; who asks another process to need not import it."""
+def call_by_name(name: str, *args: Any) -> Any:
+    """Call a function by its address `package.module:function`, which the caller then need not import."""
     return resolve_name(name)(*args)
 
 
-def in_twins(work: Callable[[int], T], count: int) -> list[T]:
-    """Answers to 0 ... count - 1: the first by this process, each other by a twin that has all that this one imported.
+def _fork(child: Callable[[], object], detached: bool = False) -> int:
+    """Start a copy of this process that runs `child` and ends, and return its process number.
 
-    Only a process that serves has twins: its other thread waits for calls, and holds nothing that a twin needs.
+    Signals are blocked meanwhile, so that neither process is ended in place of the other. A detached copy has a
+    session of its own, and the default handlers of signals.
     """
-    with ExitStack() as ends:
-        twins = _SERVES and hasattr(os, "fork")
-        rest = [ends.enter_context(_twin(own)) if twins else own for own in (partial(work, k) for k in range(1, count))]
-        return [work(0), *(answer() for answer in rest)]
+    parent, blocked = os.getpid(), signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
+    pid = os.fork()
+    if pid == 0:
+        try:
+            if detached:
+                os.setsid()
+                for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+                    signal.signal(number, signal.SIG_DFL)
+            signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+            end_with_parent(parent)
+            child()
+        finally:
+            os._exit(0)
+    signal.pthread_sigmask(signal.SIG_SETMASK, blocked)
+    return pid
 
 
 @contextmanager
-def meanwhile(work: Callable[[], T], pays: bool) -> Iterator[Callable[[], T]]:
-    """Gives what waits for the answer of a twin, which works meanwhile; this process works first where it has none.
+def run_concurrently(work: Callable[[], T], pays: bool = True) -> Iterator[Callable[[], T]]:
+    """Run `work` in a forked copy of this process, and yield a function that waits for its answer.
+
+    Where nothing can be forked, the work is done first; where the copy dies, it is done when the answer is asked for.
 
     Parameters
     ----------
     pays
-        Whether it takes longer than a twin takes to begin, some milliseconds.
+        True if the work takes longer than a fork, some milliseconds.
     """
-    if pays and processors() > 1 and Copy.can_be():
-        with _twin(work) as answer:
-            yield answer
-    else:
-        found = work()
-        yield lambda: found
-
-
-@contextmanager
-def _twin(work: Callable[[], T]) -> Iterator[Callable[[], T]]:
-    """What waits for the answer of a twin; where that has died, the work is done here."""
+    # the other thread of a process that serves holds nothing that a copy needs
+    if not (pays and processors() > 1 and hasattr(os, "fork") and (_SERVES or ForkedWorker.is_possible())):
+        done = work()
+        yield lambda: done
+        return
     read, write = os.pipe()
-    parent, (twin, heard) = os.getpid(), _forked()
-    if twin == 0:
-        try:
-            signal.pthread_sigmask(signal.SIG_SETMASK, heard)
-            end_with_parent(parent)
-            with os.fdopen(write, "wb") as answers:
-                pickle.dump(work(), answers)
-        finally:
-            os._exit(0)
-    signal.pthread_sigmask(signal.SIG_SETMASK, heard)
+
+    def child() -> None:
+        with os.fdopen(write, "wb") as stream:
+            pickle.dump(work(), stream)
+
+    pid = _fork(child)
     os.close(write)
 
     def answer() -> T:
         try:
-            found: T = pickle.load(answers_of_twin)
+            received: T = pickle.load(answers)
         except (EOFError, pickle.UnpicklingError):
             return work()
-        return found
+        return received
 
     try:
-        with os.fdopen(read, "rb") as answers_of_twin:
+        with os.fdopen(read, "rb") as answers:
             yield answer
     except BaseException:
-        # nobody waits for what is at work
-        os.kill(twin, signal.SIGKILL)
+        os.kill(pid, signal.SIGKILL)
         raise
     finally:
-        os.waitpid(twin, 0)
+        os.waitpid(pid, 0)
 
 
-def _forked() -> tuple[int, set[int | signal.Signals]]:
-    """What fork says, all signals held back, and those that were: neither process is ended as if it were the other."""
-    held = signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
-    return os.fork(), held
+def fork_map(work: Callable[[int], T], count: int) -> list[T]:
+    """Return work(0) ... work(count - 1): in a process that serves, a forked copy does each but the first."""
+    with ExitStack() as stack:
+        others = [stack.enter_context(run_concurrently(partial(work, k), _SERVES)) for k in range(1, count)]
+        return [work(0), *(answer() for answer in others)]
 
 
 class WorkerDied(BrokenExecutor):
-    """The process that a call was in has ended without an answer."""
+    """The process of a call has ended without an answer."""
 
 
-class Copy:
-    """A process that begins as a copy of this one, with all that it has imported, and serves.
+class ForkedWorker:
+    """A forked copy of this process that serves calls, with all that this process has imported.
 
-    Only a process without other threads can be copied: what they hold would never be let go.
+    Only a process without other threads can be forked: their locks would never be released.
     """
 
     def __init__(self) -> None:
-        there, asking = os.pipe()
-        answering, back = os.pipe()
-        parent, (self.pid, heard) = os.getpid(), _forked()
-        if self.pid == 0:
-            try:
-                os.setsid()
-                for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-                    signal.signal(number, signal.SIG_DFL)
-                signal.pthread_sigmask(signal.SIG_SETMASK, heard)
-                os.close(asking)
-                os.close(answering)
-                # nobody listens to it, and it works for nobody else
-                Context().run(_serve, parent, os.fdopen(there, "rb"), os.fdopen(back, "wb"))
-            finally:
-                os._exit(1)
-        signal.pthread_sigmask(signal.SIG_SETMASK, heard)
-        os.close(there)
-        os.close(back)
-        self.stdin: IO[bytes] = os.fdopen(asking, "wb")
-        self.stdout: IO[bytes] = os.fdopen(answering, "rb")
+        calls, self_calls = os.pipe()
+        self_answers, answers = os.pipe()
+        parent = os.getpid()
+
+        def child() -> None:
+            os.close(self_calls)
+            os.close(self_answers)
+            # in a fresh context: neither listener nor executor of this process reach it
+            Context().run(_serve, parent, os.fdopen(calls, "rb"), os.fdopen(answers, "wb"))
+
+        self.pid = _fork(child, detached=True)
+        os.close(calls)
+        os.close(answers)
+        self.stdin: IO[bytes] = os.fdopen(self_calls, "wb")
+        self.stdout: IO[bytes] = os.fdopen(self_answers, "rb")
         self._is_over = False
 
     @staticmethod
-    def can_be() -> bool:
-        """Whether this process can be copied."""
+    def is_possible() -> bool:
+        """Return True if this process can be forked."""
         return hasattr(os, "fork") and threading.active_count() == 1
 
     @classmethod
-    def several(cls, count: int) -> tuple[Copy, ...]:
-        """So many, to share work that this process has begun; none where a library has threads, or may have some."""
+    def several(cls, count: int) -> tuple[ForkedWorker, ...]:
+        """Return `count` copies to share work that this process has begun; none where a library may have threads."""
         try:
             threads = len(os.listdir("/proc/self/task"))
         except OSError:
             return ()
-        return tuple(cls() for _ in range(count if threads == 1 and cls.can_be() else 0))
+        return tuple(cls() for _ in range(count if threads == 1 and cls.is_possible() else 0))
 
     def kill(self) -> None:
         """End it at once."""
@@ -159,27 +158,27 @@ class Copy:
             os.kill(self.pid, signal.SIGKILL)
 
     def wait(self) -> None:
-        """Until it has ended."""
+        """Wait until it has ended."""
         if not self._is_over:
             self._is_over = True
             os.waitpid(self.pid, 0)
 
 
-_Child: TypeAlias = subprocess.Popen[bytes] | Copy
+_Child: TypeAlias = subprocess.Popen[bytes] | ForkedWorker
 
 
 class Processes(Executor):
-    """Up to `count` processes, started as calls come, ended with the executor or whoever has it.
+    """Up to `count` processes, started as calls come, and ended with the executor or its process.
 
-    They have one thread each for their linear algebra and never hear Ctrl-C: who has them says when they end.
+    Each has one thread for linear algebra, and ignores Ctrl-C: the owner of the executor ends them.
 
     Parameters
     ----------
     first
-        Those that are there already, no more than `count`.
+        Processes that exist already, `count` at most.
     """
 
-    def __init__(self, count: int | None = None, first: Sequence[Copy] = ()) -> None:
+    def __init__(self, count: int | None = None, first: Sequence[ForkedWorker] = ()) -> None:
         self.count = count if count is not None else processors()
         self._first = list(first)
         self._calls: SimpleQueue[_Call | None] = SimpleQueue()
@@ -190,7 +189,7 @@ class Processes(Executor):
         self._closed = False
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """Ask for a call; what is called, and with what, has to be picklable."""
+        """Schedule a call of picklable arguments."""
         future: Future[T] = Future()
         call = pickle.dumps((fn, args, kwargs))
         with self._lock:
@@ -205,12 +204,12 @@ class Processes(Executor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes when all calls are answered, or at once where these are cancelled."""
+        """End the processes when all calls are answered, or at once with `cancel_futures`."""
         with self._lock:
             self._closed = True
             children, tenders = tuple(self._children), tuple(self._tenders)
         if cancel_futures:
-            # others take calls too, so that one that was there may be gone
+            # a worker may take the last call meanwhile
             with suppress(Empty):
                 while True:
                     call = self._calls.get_nowait()
@@ -225,7 +224,7 @@ class Processes(Executor):
         with self._lock:
             idle, self._first = self._first, []
         for child in idle:
-            self._ended(child)
+            self._end(child)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -235,32 +234,32 @@ class Processes(Executor):
 
     @property
     def pids(self) -> tuple[int, ...]:
-        """Of the processes that run."""
+        """Return the numbers of the processes that run."""
         with self._lock:
             return tuple(child.pid for child in self._children)
 
     def _tend(self) -> None:
-        """Hand call after call to one process; in one thread, for the process ends with the thread that started it."""
+        """Hand call after call to one process, from the thread that it ends with."""
         child: _Child | None = None
         while (call := self._calls.get()) is not None:
-            future, asked = call
+            future, request = call
             if future.set_running_or_notify_cancel():
                 try:
-                    child = self._started() if child is None else child
-                    is_answer, found = _exchanged(child, asked)
+                    child = self._start() if child is None else child
+                    is_answer, answer = _exchange(child, request)
                 except (OSError, EOFError, pickle.UnpicklingError) as error:
-                    self._ended(child)
+                    self._end(child)
                     child = None
                     died = WorkerDied("a process that was at work has died; is there memory enough?")
                     died.__cause__ = error
                     future.set_exception(died)
                 else:
-                    future.set_result(found) if is_answer else future.set_exception(found)
+                    future.set_result(answer) if is_answer else future.set_exception(answer)
             with self._lock:
                 self._open -= 1
-        self._ended(child)
+        self._end(child)
 
-    def _started(self) -> _Child:
+    def _start(self) -> _Child:
         with self._lock:
             if self._first:
                 return self._first.pop()
@@ -277,7 +276,7 @@ class Processes(Executor):
             child.kill()
         return child
 
-    def _ended(self, child: _Child | None) -> None:
+    def _end(self, child: _Child | None) -> None:
         if child is not None:
             with self._lock:
                 self._children.discard(child)
@@ -290,38 +289,38 @@ class Processes(Executor):
                         stream.close()
 
 
-def _exchanged(child: _Child, asked: bytes) -> tuple[bool, Any]:
+def _exchange(child: _Child, request: bytes) -> tuple[bool, Any]:
     assert child.stdin is not None
     assert child.stdout is not None
-    pickle.dump(asked, child.stdin)
+    pickle.dump(request, child.stdin)
     child.stdin.flush()
-    is_answer, found = pickle.load(child.stdout)
-    return bool(is_answer), found
+    is_answer, answer = pickle.load(child.stdout)
+    return bool(is_answer), answer
 
 
 def serve(parent: int) -> None:
-    """Answer calls from standard input on standard output, until whoever asks is gone."""
+    """Answer calls from standard input on standard output, until the parent process is gone."""
     _serve(parent, sys.stdin.buffer, os.fdopen(os.dup(1), "wb"))
 
 
-def _serve(parent: int, asked: IO[bytes], answers: IO[bytes]) -> NoReturn:
+def _serve(parent: int, requests: IO[bytes], answers: IO[bytes]) -> NoReturn:
     global _SERVES
     _SERVES = True
-    # what a library prints is no answer
+    # a library that prints must not write between the answers
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     end_with_parent(parent)
     calls: SimpleQueue[bytes] = SimpleQueue()
-    threading.Thread(target=_listen, args=(asked, calls), daemon=True).start()
+    threading.Thread(target=_listen, args=(requests, calls), daemon=True).start()
     while True:
         answers.write(_answered(calls.get()))
         answers.flush()
 
 
-def _listen(asked: IO[bytes], calls: SimpleQueue[bytes]) -> None:
-    """Take calls in, in a thread of its own: that nobody asks any more is noticed in the middle of a call too."""
+def _listen(requests: IO[bytes], calls: SimpleQueue[bytes]) -> None:
+    # in a thread of its own, so that the end of the parent ends a call too
     while True:
         try:
-            calls.put(pickle.load(asked))
+            calls.put(pickle.load(requests))
         except BaseException:
             os._exit(1)
 

@@ -1,4 +1,4 @@
-"""What a search tells of itself while it goes on: how far it is, the best value that it has, and its bound."""
+"""Progress of a search: how far it is, its best value, and its bound."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Step:
-    """How far a search is.
+    """Report of progress.
 
     Attributes
     ----------
     within
         Searches that this one is part of, the outermost first.
     what
-        It counts, in words.
+        Name of the counted pieces.
     done, whole
-        How many; none are known to come where `whole` is zero.
+        Number of pieces; `whole` is zero where the total is not known.
     value, bound
-        Best value so far, and what no design goes under, in the unit of the objective; infinite where not known.
+        Best value and lower bound so far, in the unit of the objective; infinite where not known.
     """
 
     within: tuple[str, ...]
@@ -37,7 +37,7 @@ class Step:
 
     @property
     def gap(self) -> float:
-        """Share of the value that is not proven; not a number where either is not known, or the value is zero."""
+        """Relative gap between value and bound; NaN where either is not known, or the value is zero."""
         known = math.isfinite(self.value) and math.isfinite(self.bound) and self.value
         return max(self.value - self.bound, 0.0) / abs(self.value) if known else math.nan
 
@@ -48,8 +48,8 @@ _within: ContextVar[tuple[str, ...]] = ContextVar("within", default=())
 
 
 @contextmanager
-def listening(listener: Listener | None) -> Iterator[None]:
-    """Searches within tell this listener; nobody where it is None."""
+def progress_listener(listener: Listener | None) -> Iterator[None]:
+    """Send the progress of searches within to a listener, or to nobody."""
     before = _listener.set(listener)
     try:
         yield
@@ -59,7 +59,7 @@ def listening(listener: Listener | None) -> Iterator[None]:
 
 @contextmanager
 def within(what: str) -> Iterator[None]:
-    """Searches within are part of this."""
+    """Name the search that all searches within are part of."""
     before = _within.set((*_within.get(), what))
     try:
         yield
@@ -67,15 +67,17 @@ def within(what: str) -> Iterator[None]:
         _within.reset(before)
 
 
-def tell(what: str, done: int = 0, whole: int = 0, value: float = math.inf, bound: float = -math.inf) -> None:
-    """Say how far a search is, to whoever listens; fields as in `Step`."""
+def report_progress(
+    what: str, done: int = 0, whole: int = 0, value: float = math.inf, bound: float = -math.inf
+) -> None:
+    """Report how far a search is; parameters as in `Step`."""
     listener = _listener.get()
     if listener is not None:
         listener(Step(_within.get(), what, done, whole, value, bound))
 
 
-def telling(what: str, items: Sequence[T]) -> Iterator[T]:
-    """Pieces of work, each told of before it is begun."""
+def with_progress(what: str, items: Sequence[T]) -> Iterator[T]:
+    """Yield pieces of work, and report each before it is begun."""
     for k, item in enumerate(items):
-        tell(what, k, len(items))
+        report_progress(what, k, len(items))
         yield item

@@ -1,4 +1,4 @@
-"""Where something changes, without a library that takes longer to load than a small problem takes."""
+"""Bisection, without a library that loads longer than a small problem takes."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ _MOST_HALVINGS = 200
 
 
 def rising_root(function: Callable[[float], float], below: float, above: float) -> float:
-    """Place where a rising function crosses zero, to the last digit of a float, by halving.
+    """Return the zero of a rising function to the last digit of a float, by bisection.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def rising_root(function: Callable[[float], float], below: float, above: float) 
 
 
 def parted(holds: Callable[[float], bool], start: float, end: float, halvings: int) -> tuple[float, float]:
-    """Where what holds from a start on ends: the last place known to hold, and the first known not to."""
+    """Bisect to the end of a property that holds from a start on: last place known to hold, first known not to."""
     for _ in range(halvings):
         middle = 0.5 * (start + end)
         start, end = (middle, end) if holds(middle) else (start, middle)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property, lru_cache, reduce
 from math import gcd, lcm
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +20,6 @@ MOST_CORNERS = 24
 """Of one function that are taken out in closed form."""
 BEHIND = 1e-3 * SAME_ANGLE
 """Angle behind a step at which corners are read [rad]: far over its rounding, and far under what a signal feels."""
-T = TypeVar("T")
 FEW = 9
 """Coefficients of a signal that is sampled wave by wave."""
 MAX_ORDER_DENOMINATOR = 1000
@@ -33,7 +32,7 @@ np.empty(1 << 20)
 
 
 def orders_equal(orders: ArrayLike, wanted: ArrayLike) -> NDArray[np.bool_]:
-    """Which orders are one of those wanted, shape of `orders`: the one rule of what the same order is."""
+    """Return a mask of the orders that are among those wanted; the one rule of equal orders."""
     return np.isin(_thousandths(orders), _thousandths(wanted))
 
 
@@ -42,7 +41,7 @@ def _thousandths(orders: ArrayLike) -> NDArray[np.float64]:
 
 
 def as_order(order: float) -> Fraction:
-    """An order, or a speed over crank speed, as the fraction that it is a rounding of."""
+    """Round an order, or a speed over crank speed, to a fraction."""
     return Fraction(order).limit_denominator(MAX_ORDER_DENOMINATOR)
 
 
@@ -66,12 +65,12 @@ class Spectrum:
 
     @property
     def period(self) -> float:
-        """2 pi / b [rad]."""
+        """Period 2 pi / b [rad]."""
         return math.tau / float(self.base)
 
     @cached_property
     def smooth(self) -> Spectrum:
-        """The signal without its corners: no order beyond its coefficients."""
+        """The signal without its kinks."""
         if self.corners is None:
             return self
         return Spectrum(
@@ -79,7 +78,7 @@ class Spectrum:
         )
 
     def later(self, turn: Turn, angle: float) -> Spectrum:
-        """The signal later by an angle [rad], which is also given as a share of its period."""
+        """Return the signal shifted later by an angle [rad], also given as a share of its period."""
         turns = phasors([-turn], np.arange(len(self.coefficients)))
         moved = self.coefficients * turns.reshape(-1, *(1,) * (self.coefficients.ndim - 1))
         corners = None if self.corners is None else self.corners.moved(angle).folded(self.period, 1)
@@ -87,34 +86,25 @@ class Spectrum:
 
     @property
     def series(self) -> Spectrum:
-        """Its orders alone: of averages the better, for samples of what bends are off by the square of their step."""
+        """The signal without closed-form kinks: averages of it are exact, samples near a kink are not."""
         return self if self.corners is None else Spectrum(self.base, self.coefficients)
 
     @property
     def bends(self) -> NDArray[np.float64]:
-        """Angles at which its slope jumps, shape (k,) [rad]."""
+        """Angles at which the slope jumps, shape (k,) [rad]."""
         return np.zeros(0) if self.corners is None else self.corners.bending
 
-    @property
-    def parts(self) -> tuple[Spectrum, ...]:
-        """Signals that it is the sum of."""
-        return (self,)
-
-    def once(self, what: str, asked: Any, made: Callable[[Spectrum], T]) -> T:  # noqa: ARG002
-        """What is made of it; a signal that many others have a part in keeps what was asked for last, by its name."""
-        return made(self)
-
     def holding(self, coefficients: NDArray[np.complex128]) -> Spectrum:
-        """The signal with other coefficients."""
+        """Return the signal with other coefficients."""
         return Spectrum(self.base, coefficients, self.corners)
 
     def each(self, linear: Callable[[NDArray[Any]], NDArray[Any]]) -> Spectrum:
-        """Through a real linear map of its values, given as a function of arrays (n, ...)."""
+        """Return the signal through a real linear map of values, a function of arrays (n, ...)."""
         corners = None if self.corners is None else self.corners.each(linear)
         return Spectrum(self.base, linear(self.coefficients), corners)
 
     def averaged(self, step: float) -> Spectrum:
-        """Averages under a triangle that falls to zero at an angle to either side: sinc^2 times each order (P7)."""
+        """Average under a triangle of half-width `step` [rad]: sinc^2 times each order (P7)."""
         share = np.sinc(self.orders * step / math.tau) ** 2
         return Spectrum(self.base, self.coefficients * share.reshape(-1, *(1,) * (self.coefficients.ndim - 1)))
 
@@ -124,18 +114,18 @@ class Spectrum:
         return np.asarray(np.arange(len(self.coefficients)) * float(self.base))
 
     def at(self, order: float) -> NDArray[np.complex128]:
-        """Coefficient of one order; zero where the signal holds none."""
+        """Return the coefficient of one order; zero if the signal has none."""
         found = np.flatnonzero(orders_equal(self.orders, order))
         return np.asarray(self.coefficients[found].sum(axis=0))
 
     def only(self, orders: ArrayLike) -> Spectrum:
-        """The signal with every other order at zero."""
+        """Return the signal with every other order at zero."""
         counted = orders_equal(self.orders, orders).reshape(-1, *(1,) * (self.coefficients.ndim - 1))
         return Spectrum(self.base, np.where(counted, self.coefficients, 0.0))
 
     @property
     def without_mean(self) -> Spectrum:
-        """The signal less its mean over the period (M7); its corners stay, for they have none."""
+        """The signal less its mean over the period (M7); kinks have no mean."""
         return self.holding(np.concatenate([np.zeros_like(self.coefficients[:1]), self.coefficients[1:]]))
 
     def sample(self, samples: int, behind: float = 0.0) -> NDArray[np.float64]:
@@ -174,7 +164,7 @@ class Spectrum:
         return _transformed(np.asarray(0.5 * half, dtype=complex), samples)
 
     def values(self, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at any crank angles [rad], shape (len(angles), ...)."""
+        """Return values at any crank angles [rad], shape (len(angles), ...)."""
         smooth = self.smooth.coefficients
         used = np.flatnonzero(smooth.reshape(len(smooth), -1).any(axis=1))
         waves = np.exp(1j * np.outer(angles, self.orders[used]))
@@ -183,25 +173,25 @@ class Spectrum:
 
     @property
     def integral(self) -> Spectrum:
-        """The integral over crank angle of all but the mean, itself without a mean."""
+        """Integral over the crank angle of the alternating part, without a mean."""
         whole = np.zeros_like(self.coefficients)
         whole[1:] = (self.coefficients[1:].T / (1j * self.orders[1:])).T
         return Spectrum(self.base, whole, None if self.corners is None else self.corners.moved(0.0, 1))
 
     @property
     def derivative(self) -> Spectrum:
-        """By the angle; where it jumps, the sum of its orders alone has one."""
+        """Derivative by the angle; where the signal jumps, that of its orders alone."""
         steep = (self.coefficients.T * (1j * self.orders)).T
         if self.corners is None or self.corners.jumps[:, 0].any():
             return Spectrum(self.base, steep)
         return Spectrum(self.base, steep, self.corners.derivative)
 
     def extended(self, count: int) -> Spectrum:
-        """With so many coefficients or more."""
+        """Return the signal with at least `count` coefficients."""
         return self + Spectrum(self.base, np.zeros((count, *self.coefficients.shape[1:]), dtype=complex))
 
     def rebased(self, base: Fraction) -> Spectrum:
-        """The same signal counted in a finer lowest order."""
+        """Return the same signal counted in a finer lowest order."""
         factor = self.base / base
         if factor.denominator != 1:
             raise ValueError(f"{base} does not divide {self.base}")
@@ -215,19 +205,19 @@ class Spectrum:
 
     @cached_property
     def step(self) -> int:
-        """Greatest common divisor of what its coefficients stand at, zero where none but the mean is."""
+        """Greatest common divisor of the indices of nonzero coefficients; zero for a constant."""
         used = np.logical_or.reduce(self.coefficients.reshape(len(self.coefficients), -1), axis=1)
         return gcd(*used.nonzero()[0].tolist())
 
     def repeats(self, also: tuple[Fraction, ...] = ()) -> Fraction:
-        """Lowest order of its own shortest period, which holds some further orders too."""
+        """Return the lowest order of the shortest period that also holds some further orders."""
         orders, step = [order for order in also if order > 0], self.step
         if step:
             orders.append(self.base * step)
         return common_base(orders or [Fraction(1)])
 
     def over(self, base: Fraction) -> Spectrum:
-        """The same signal over another period of its own, that of the lowest order `base`."""
+        """Return the signal over another period of it, with lowest order `base`."""
         if base is self.base or base == self.base:
             return self
         fine, step = self, times(base, self.base)
@@ -237,7 +227,7 @@ class Spectrum:
         return Spectrum(base, fine.coefficients[::step], corners)
 
     def kept(self, highest: float) -> Spectrum:
-        """The signal without the orders above `highest`; its corners are gone where any is left out."""
+        """Return the signal without orders above `highest`; it keeps its kinks only with all orders."""
         count = int(np.sum(_thousandths(self.orders) <= _thousandths(highest)))
         return self if count == len(self.coefficients) else Spectrum(self.base, self.coefficients[:count])
 
@@ -257,16 +247,70 @@ class Spectrum:
         return Spectrum(a.base, total, joined([a.corners, b.corners]))
 
 
+class Mapped(Spectrum):
+    """Signal through a real linear map to more components: samples of the source are mapped.
+
+    Attributes
+    ----------
+    source, linear
+        The signal, and the map as a function of arrays (n, ...).
+    """
+
+    source: Spectrum
+    linear: Callable[[NDArray[Any]], NDArray[Any]]
+
+    def __init__(self, source: Spectrum, linear: Callable[[NDArray[Any]], NDArray[Any]]) -> None:
+        vars(self).update(base=source.base, source=source, linear=linear)
+
+    @cached_property
+    def _whole(self) -> Spectrum:
+        return self.source.each(self.linear)
+
+    @property
+    def coefficients(self) -> NDArray[np.complex128]:
+        """Coefficients of the source, mapped."""
+        return self._whole.coefficients
+
+    @property
+    def corners(self) -> Corners | None:
+        """Kinks of the source, mapped."""
+        return self._whole.corners
+
+    @property
+    def step(self) -> int:
+        """Step of the source."""
+        return self.source.step
+
+    @property
+    def series(self) -> Spectrum:
+        """The signal without closed-form kinks."""
+        return Mapped(self.source.series, self.linear)
+
+    @property
+    def without_mean(self) -> Spectrum:
+        """The signal less its mean over the period."""
+        return Mapped(self.source.without_mean, self.linear)
+
+    def over(self, base: Fraction) -> Spectrum:
+        """Return the signal over another period."""
+        return Mapped(self.source.over(base), self.linear)
+
+    def sample(self, samples: int, behind: float = 0.0) -> NDArray[np.float64]:
+        """Return samples of the source, mapped."""
+        return self.linear(self.source.sample(samples, behind))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Spectrum, (self.base, self.coefficients, self.corners)
+
+
 @lru_cache(maxsize=32)
 def _waves(count: int, samples: int) -> NDArray[np.float64]:
-    """cos j phi and -sin j phi at equal steps over a period, shape (samples, 2 count)."""
     turns = np.outer(np.arange(samples), np.arange(count)) % samples
     waves = np.exp(2j * math.pi * np.arange(samples) / samples)[turns]
     return np.concatenate([waves.real, -waves.imag], axis=1)
 
 
 def _transformed(half: NDArray[np.complex128], samples: int) -> NDArray[np.float64]:
-    """c_0 + 2 Re sum_j c_j e^{i j phi} at equal steps; in memory place by place, as norms take their rows."""
     out = np.empty((samples, *half.shape[1:]))
     if half.ndim > 1:
         out = np.empty((half.shape[1], samples, *half.shape[2:])).swapaxes(0, 1)
@@ -275,23 +319,22 @@ def _transformed(half: NDArray[np.complex128], samples: int) -> NDArray[np.float
 
 
 def _common(a: Fraction, b: Fraction) -> Fraction:
-    """Greatest common divisor of two orders."""
     return Fraction(gcd(a.numerator, b.numerator), lcm(a.denominator, b.denominator))
 
 
 def times(order: Fraction, base: Fraction) -> int:
-    """How many times a lowest order another one is; zero where that is no whole number."""
+    """Return an order as a multiple of a lowest order; zero if it is no whole multiple."""
     whole, rest = divmod(order.numerator * base.denominator, order.denominator * base.numerator)
     return 0 if rest else whole
 
 
 def common_base(orders: Sequence[Fraction]) -> Fraction:
-    """The largest lowest order that all of these are multiples of."""
+    """Return the largest lowest order that all these are multiples of."""
     return reduce(_common, orders)
 
 
 def in_one_base(spectra: Sequence[Spectrum], *bases: Fraction) -> tuple[Fraction, NDArray[np.complex128]]:
-    """The lowest order of spectra, and of `bases`, and the coefficients counted in it, shape (spectra, n, ...)."""
+    """Return a common lowest order of spectra and `bases`, and all coefficients, shape (spectra, n, ...)."""
     base = common_base([*bases, *(spectrum.base for spectrum in spectra)])
     series = [spectrum.rebased(base).coefficients for spectrum in spectra]
     whole = max(map(len, series))
@@ -300,12 +343,12 @@ def in_one_base(spectra: Sequence[Spectrum], *bases: Fraction) -> tuple[Fraction
 
 
 def base_of(orders: Sequence[float]) -> Fraction:
-    """The largest lowest order of those that turn; one where none does."""
+    """Return the largest lowest order of the positive orders; one without any."""
     return common_base([as_order(order) for order in orders if order > 0.0] or [Fraction(1)])
 
 
 def spectrum_of(samples: NDArray[np.float64], base: Fraction) -> Spectrum:
-    """Coefficients of a real signal sampled over one period, shape (n, ...) to (n//2 + 1, ...)."""
+    """Return the spectrum of a real signal sampled over one period, shape (n, ...) to (n//2 + 1, ...)."""
     count = len(samples)
     coefficients = np.fft.rfft(samples, axis=0) * (2.0 / count)
     coefficients[0] /= 2.0
@@ -318,7 +361,7 @@ def bent_spectrum(
     signal: Callable[[NDArray[np.float64]], NDArray[np.float64]], samples: int, base: Fraction,
     breaks: NDArray[np.float64], most: int = MOST_CORNERS,
 ) -> Spectrum:  # fmt: skip
-    """Coefficients of a function of the angle whose derivatives jump (L5a).
+    """Return the spectrum of a function of the angle whose derivatives jump (L5a).
 
     Parameters
     ----------
@@ -345,7 +388,7 @@ def bent_spectrum(
 
 
 def order_amplitude(coefficient: NDArray[np.complex128]) -> NDArray[np.float64]:
-    """Largest magnitude of a vector that turns on its ellipse, Re c e^{i h phi} (M5).
+    """Return the largest magnitude of a vector on its ellipse, Re c e^{i h phi} (M5).
 
     Parameters
     ----------

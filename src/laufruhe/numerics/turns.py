@@ -1,4 +1,4 @@
-"""Angles as exact parts of a turn, so that a crank star that cancels gives zero.
+"""Angles as exact fractions of a turn, so that a crank star that cancels gives zero.
 
 Crank throws, banks and firing intervals are rational parts of a turn. Products of
 such an angle with an order stay rational, and their sines and cosines are read from
@@ -26,7 +26,7 @@ Turn: TypeAlias = Fraction | float
 
 @lru_cache(maxsize=4096)
 def as_turn(angle: float) -> Turn:
-    """Angle in radians as a part of a turn, exact where it is a rounded rational.
+    """Return an angle [rad] in turns, exact if it is a rounded rational.
 
     A float within four roundings of a fraction with a denominator of at most 20 000
     is taken for that fraction; any other stays a float.
@@ -37,25 +37,25 @@ def as_turn(angle: float) -> Turn:
 
 
 def within(turn: Turn, whole: int) -> Turn:
-    """The turn reduced to 0 ... whole; what a rounding leaves just under whole is zero."""
+    """Reduce turns to 0 ... whole; a rounding below whole is zero."""
     rest = turn % whole
     return rest if whole - rest > SAME_TURN else Fraction(0)
 
 
 @lru_cache(maxsize=4096)
 def direction(angle: float) -> Turn:
-    """An angle in radians as a part of one turn: equal for angles that point the same way."""
+    """Return an angle [rad] in turns within one turn: equal for equal directions."""
     return within(as_turn(angle), 1)
 
 
 def angle_of(turn: Turn) -> float:
-    """Radians of a part of a turn."""
+    """Return turns in radians."""
     return math.tau * float(turn)
 
 
 @lru_cache(maxsize=4096)
 def cis(turn: Turn) -> complex:
-    """e^{2 pi i turn}, with every symmetry of the circle kept to the last bit.
+    """Return e^{2 pi i turn}, with every symmetry of the circle exact to the last bit.
 
     A Fraction is exact at multiples of 1/8 and 1/12 turn, and mirrors exactly in the
     axes and the diagonals.
@@ -100,7 +100,7 @@ def _roots(denominator: int) -> NDArray[np.complex128]:
 
 
 def phasors(turns: Sequence[Turn], multiples: NDArray[np.int64]) -> NDArray[np.complex128]:
-    """e^{2 pi i m t} for every multiple m and turn t.
+    """Return e^{2 pi i m t} for every multiple m and turn t.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def star_sum(
 
 
 def star_orders(weights: NDArray[np.float64], turns: tuple[Turn, ...], count: int) -> NDArray[np.complex128]:
-    """`star_sum` of the multiples 0 ... count - 1; what it is of the same turns is kept."""
+    """Return `star_sum` of the multiples 0 ... count - 1; phasors of the same turns are cached."""
     return _star_sum(_waves(turns, count), weights)
 
 
@@ -162,7 +162,7 @@ def _star_sum(waves: NDArray[np.complex128], weights: NDArray[np.float64]) -> ND
 
 
 def cancelling_sums(values: NDArray[np.complex128], indices: tuple[int, ...]) -> NDArray[np.complex128]:
-    """Sums of the values (n, c) of each index, shape (largest + 1, c), zero under the rounding of their own terms."""
+    """Sum the values (n, c) of each index, shape (largest + 1, c); sums below their rounding are zero."""
     # every sum as a product with zeros and ones: a few values cost a few calls
     members, roundings = _members(indices)
     parts = values.view(float)
@@ -171,7 +171,6 @@ def cancelling_sums(values: NDArray[np.complex128], indices: tuple[int, ...]) ->
 
 @lru_cache(maxsize=256)
 def _members(indices: tuple[int, ...]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """One, and the rounding of a sum, where a value is of an index, each of shape (largest + 1, n)."""
     members = np.asarray(np.arange(max(indices) + 1)[:, None] == np.array(indices), dtype=float)
     members.setflags(write=False)
     return members, _rounding(len(indices)) * members
@@ -179,7 +178,6 @@ def _members(indices: tuple[int, ...]) -> tuple[NDArray[np.float64], NDArray[np.
 
 @lru_cache(maxsize=16)
 def _both_parts(count: int) -> NDArray[np.float64]:
-    """Adds up real and imaginary part of so many numbers, for both; shape (2 count, 2 count)."""
     return np.asarray(np.kron(np.eye(count), np.ones((2, 2))), dtype=float)
 
 
@@ -188,6 +186,5 @@ def _rounding(count: int) -> float:
 
 
 def _flushed(sums: NDArray[np.float64], least: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Sums (m, 2 c) of real and imaginary parts as complex numbers (m, c), what cannot be told from zero at zero."""
     sums[np.abs(sums) <= least] = 0.0
     return sums.view(complex)

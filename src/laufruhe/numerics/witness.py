@@ -1,4 +1,4 @@
-"""Known designs as witnesses of bounds: a lower bound over the objective of a design that exists is an error.
+"""Known designs as witnesses of bounds: a lower bound above the value of a design that exists is an error.
 
 Bounds are raw: nobody lowers one to a value. Each is compared with what is known, and what contradicts is reported
 to the solve that asked, which then withholds its proof. Where nobody collects reports, and wherever the environment

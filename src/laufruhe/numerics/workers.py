@@ -1,25 +1,29 @@
-"""Who does pieces of work: processes on this machine, a cluster, or whatever has the interface of an executor.
+"""Executors of pieces of work: processes of this machine, a cluster, or any other executor.
 
-All that runs side by side asks here: points of studies, problems of a trade, boxes, stars, starts. Who works changes
-how long it takes, never what is found.
+All concurrent work goes through here: points of studies, problems of a trade, boxes, stars, starts. The executor
+changes how long a search takes, never what it finds.
+
+`Speculation` works out the likely next steps of a search ahead. One process still decides which step follows, and
+takes the answer that others may have made already, so answers, their order and proofs are the same to the last bit.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from contextvars import ContextVar
 from importlib import import_module
-from itertools import count, takewhile
-from typing import Generic, NamedTuple, ParamSpec, TypeVar
+from itertools import count, islice, takewhile
+from pickle import PicklingError
+from typing import Any, Generic, NamedTuple, ParamSpec, TypeVar
 
 from laufruhe.errors import BoundError, SolverError
 from laufruhe.numerics.budget import in_time, left, limited, passed
 from laufruhe.numerics.cores import processors
-from laufruhe.numerics.processes import Copy, Processes
-from laufruhe.numerics.progress import tell
+from laufruhe.numerics.processes import ForkedWorker, Processes
+from laufruhe.numerics.progress import report_progress
 from laufruhe.numerics.witness import collected, report
 
 P = ParamSpec("P")
@@ -27,23 +31,23 @@ T = TypeVar("T")
 A = TypeVar("A")
 
 AHEAD = 3
-"""Pieces that are asked for at once, for each worker: none waits for the next one."""
+"""Pieces that are submitted at once for each worker, so that none waits for the next one."""
 LOSSES = 3
-"""Times that one piece may be lost with its worker; what ends several is the fault of the piece."""
+"""Times that one piece may be lost with its worker before the piece is to blame."""
 WORTH_PROCESSES = 4.0
 """Processor seconds of work that pay for starting processes."""
 LONGEST_WAIT = 1e9
 
-_given: ContextVar[Executor | None] = ContextVar("given", default=None)
+_current: ContextVar[Executor | None] = ContextVar("current", default=None)
 
 
-class Here(Executor):
-    """The process itself: a call is answered when it is asked for."""
+class SerialExecutor(Executor):
+    """Executor without workers: `submit` returns when the call is done."""
 
     count = 1
 
     def submit(self, fn: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
-        """The call, done."""
+        """Do the call."""
         future: Future[T] = Future()
         try:
             future.set_result(fn(*args, **kwargs))
@@ -52,7 +56,7 @@ class Here(Executor):
         return future
 
 
-HERE = Here()
+SERIAL = SerialExecutor()
 
 
 class TimeIsOver(SolverError):
@@ -60,203 +64,265 @@ class TimeIsOver(SolverError):
 
 
 class WorkersGone(SolverError):
-    """Nobody works any more, or a piece ends each of its workers."""
+    """Loss of all workers, or of every worker that had one piece."""
 
 
 @contextmanager
 def working_on(executor: Executor | None) -> Iterator[None]:
-    """Pieces of what is done within are handed to an executor; with None each search starts processes as it needs."""
-    before = _given.set(executor)
+    """Hand the pieces of all work within to an executor; with None each search starts processes as it needs."""
+    before = _current.set(executor)
     try:
         yield
     finally:
-        _given.reset(before)
+        _current.reset(before)
 
 
-def given() -> Executor | None:
-    """The executor that the work within was given to."""
-    return _given.get()
+def current_executor() -> Executor | None:
+    """Return the executor of `working_on`, or None."""
+    return _current.get()
 
 
 @contextmanager
 def executor_for(most: int | None = None) -> Iterator[Executor]:
-    """The executor that was given, or up to `most` processes of this machine."""
-    executor = _given.get()
+    """Yield the current executor, or else up to `most` processes of this machine."""
+    executor = _current.get()
     if executor is not None:
         yield executor
         return
-    with Processes(most) as own:
-        yield own
+    with Processes(most) as processes:
+        yield processes
 
 
-def imported(*_: Callable[..., object], libraries: Sequence[str] = ()) -> None:
-    """Import libraries; a process that is asked for this has imported what the works come from, too."""
+def _import(*_: Callable[..., object], libraries: Sequence[str] = ()) -> None:
+    # unpickling the works has imported their modules already
     for name in libraries:
         import_module(name)
 
 
 @contextmanager
-def at_hand(*works: Callable[..., object], libraries: Sequence[str] = ()) -> Iterator[None]:
-    """For searches that follow one another: processes of this machine that start at once and end with the last search.
+def worker_pool(*works: Callable[..., object], libraries: Sequence[str] = ()) -> Iterator[None]:
+    """Start processes at once for searches that follow one another, and end them with the last one.
 
-    Where an executor was given, or there is one processor, nothing is started.
+    Nothing is started where an executor is current, or there is one processor.
 
     Parameters
     ----------
     works
-        What they will be asked for.
+        Functions that the processes will be asked for.
     libraries
-        Names of what the works import late.
+        Names of what these import late.
     """
-    if _given.get() is not None or processors() == 1:
+    workers = processors()
+    if _current.get() is not None or workers == 1:
         yield
         return
-    # what has imported all that the search needs begins at once
-    count = processors()
-    own = Processes(count, Copy.several(count))
+    # a copy has imported all that the search needs, and begins at once
+    pool = Processes(workers, ForkedWorker.several(workers))
     try:
-        for _ in range(count):
-            own.submit(imported, *works, libraries=libraries)
-        with working_on(own):
+        for _ in range(workers):
+            pool.submit(_import, *works, libraries=libraries)
+        with working_on(pool):
             yield
     finally:
-        # nobody waits for what is at work
-        own.shutdown(cancel_futures=True)
+        pool.shutdown(cancel_futures=True)
 
 
-def count_of(executor: Executor | None = None) -> int:
-    """How many pieces an executor does side by side; of the one given, or the processes that would be, when None."""
-    executor = _given.get() if executor is None else executor
+def worker_count(executor: Executor | None = None) -> int:
+    """Return how many pieces an executor does side by side: the given one, the current one, or processes."""
+    executor = _current.get() if executor is None else executor
     if executor is None:
         return processors()
     known = getattr(executor, "count", None) or getattr(executor, "_max_workers", None)
     return known if isinstance(known, int) else processors()
 
 
-def each(
+def unordered_map(
     work: Callable[[T], A], pieces: Iterable[T], executor: Executor, patient: bool = False
 ) -> Generator[tuple[int, A], None, None]:
-    """What becomes of every piece, with its number, as it comes; the error of the first one that fails.
+    """Yield (number, answer) of every piece as it comes; raise the error of the first piece that fails.
 
-    Pieces are taken as workers get free. One that is lost with its worker is asked for again.
+    Pieces are taken as workers become free. A piece that is lost with its worker is submitted again.
 
     Parameters
     ----------
     patient
-        At the time limit (`laufruhe.numerics.budget`) wait for the pieces that were begun, which know of it; there are
-        no answers of the others.
+        At the time limit (`laufruhe.numerics.budget`) wait for pieces that were begun, and drop the others.
 
     Raises
     ------
     TimeIsOver
         At the time limit, unless patient.
     WorkersGone
-        If a piece is lost again and again, or nobody works any more.
+        If a piece is lost again and again, or no worker is left.
     """
     rest = enumerate(in_time(pieces) if patient else pieces)
-    asked = _Asked(work, executor)
+    pending: dict[Future[Answer[A]], tuple[int, T, int]] = {}
+
+    def submit(number: int, piece: T, losses: int = 0) -> None:
+        try:
+            future = executor.submit(_answer_of, time.time() + left(), work, piece)
+        except (RuntimeError, OSError) as error:
+            raise _workers_gone(executor, error) from None
+        pending[future] = (number, piece, losses)
+
     try:
         while True:
-            while len(asked.pieces) < AHEAD * count_of(executor) and (following := next(rest, None)) is not None:
-                asked.ask(*following)
-            if not asked.pieces:
+            while len(pending) < AHEAD * worker_count(executor) and (following := next(rest, None)) is not None:
+                submit(*following)
+            if not pending:
                 return
             seconds = LONGEST_WAIT if patient and passed() else min(max(left(), 0.0), LONGEST_WAIT)
-            for future in wait(asked.pieces, seconds, FIRST_COMPLETED).done:
-                yield from asked.answers(future)
-            if passed() and asked.pieces and not patient:
-                raise TimeIsOver("the time limit is over")
-            if passed():
-                asked.leave()
+            for future in wait(pending, seconds, FIRST_COMPLETED).done:
+                number, piece, losses = pending.pop(future)
+                try:
+                    answer = _reported(future.result())
+                except (CancelledError, BrokenExecutor, *getattr(executor, "losses", ())) as lost:
+                    if losses + 1 >= LOSSES:
+                        raise _workers_gone(executor, lost) from None
+                    submit(number, piece, losses + 1)
+                else:
+                    yield number, answer
+            if passed() and pending:
+                if not patient:
+                    raise TimeIsOver("the time limit is over")
+                pending = {future: piece for future, piece in pending.items() if not future.cancel()}
     finally:
-        for future in asked.pieces:
+        for future in pending:
             future.cancel()
 
 
-def in_turn(work: Callable[[T], A], pieces: Sequence[T], what: str) -> list[A]:
-    """Answers in the order of the pieces, those that time allows; the first ones tell whether processes are worth it.
+def ordered_map(work: Callable[[T], A], pieces: Sequence[T], what: str) -> list[A]:
+    """Return the answers in the order of the pieces, as many as time allows.
+
+    The time of the first pieces decides whether processes are started.
 
     Parameters
     ----------
     what
-        They are, in words, for who listens to progress.
+        Name of the pieces in reports of progress.
     """
-    began, found = time.process_time(), list[A]()
+    began, answers = time.process_time(), list[A]()
     for piece in in_time(pieces):
-        rest = len(pieces) - len(found)
-        pays = (time.process_time() - began) * rest > WORTH_PROCESSES * len(found)
-        if found and pays and count_of() > 1 and left() > WORTH_PROCESSES:
+        rest = len(pieces) - len(answers)
+        pays = (time.process_time() - began) * rest > WORTH_PROCESSES * len(answers)
+        if answers and pays and worker_count() > 1 and left() > WORTH_PROCESSES:
             break
-        tell(what, len(found), len(pieces))
-        found.append(work(piece))
-    if found and len(found) < len(pieces) and not passed():
+        report_progress(what, len(answers), len(pieces))
+        answers.append(work(piece))
+    if answers and len(answers) < len(pieces) and not passed():
         later: dict[int, A] = {}
-        others = pieces[len(found) :]
+        others = pieces[len(answers) :]
         with (
-            executor_for(min(len(others), count_of())) as executor,
-            closing(each(work, others, executor, patient=True)) as answers,
+            executor_for(min(len(others), worker_count())) as executor,
+            closing(unordered_map(work, others, executor, patient=True)) as results,
         ):
-            for number, answer in answers:
+            for number, answer in results:
                 later[number] = answer
-                tell(what, len(found) + len(later), len(pieces))
-        # where time was over, those before the first that nobody began
-        found += [later[number] for number in takewhile(later.__contains__, count())]
-    return found
-
-
-class _Asked(Generic[T, A]):
-    """Pieces that an executor was asked for, their numbers, and how often each was lost."""
-
-    def __init__(self, work: Callable[[T], A], executor: Executor) -> None:
-        self._work, self._executor = work, executor
-        self.pieces: dict[Future[Answer[A]], tuple[int, T, int]] = {}
-
-    def ask(self, number: int, piece: T, losses: int = 0) -> None:
-        """Hand a piece out."""
-        try:
-            future = self._executor.submit(worked, time.time() + left(), self._work, piece)
-        except (RuntimeError, OSError) as error:
-            raise _nobody(self._executor, error) from None
-        self.pieces[future] = (number, piece, losses)
-
-    def leave(self) -> None:
-        """Leave out what nobody has begun."""
-        self.pieces = {future: piece for future, piece in self.pieces.items() if not future.cancel()}
-
-    def answers(self, future: Future[Answer[A]]) -> Iterator[tuple[int, A]]:
-        """What has become of a piece; nothing where it was lost and is asked for again."""
-        number, piece, losses = self.pieces.pop(future)
-        try:
-            answer = reported(future.result())
-        except (CancelledError, BrokenExecutor, *getattr(self._executor, "losses", ())) as lost:
-            if losses + 1 >= LOSSES:
-                raise _nobody(self._executor, lost) from None
-            self.ask(number, piece, losses + 1)
-        else:
-            yield number, answer
+                report_progress(what, len(answers) + len(later), len(pieces))
+        # at the time limit, those before the first piece without an answer
+        answers += [later[number] for number in takewhile(later.__contains__, count())]
+    return answers
 
 
 class Answer(NamedTuple, Generic[A]):
-    """An answer, and the contradictions that its worker met: no report leaves its process by itself."""
+    """An answer with the contradictions that its worker met, which no other channel brings out of its process."""
 
     answer: A
     reports: tuple[BoundError, ...]
 
 
-def worked(until: float, work: Callable[[T], A], piece: T) -> Answer[A]:
-    """A piece, where it is done, until a time of day: there it starts no workers of its own."""
-    with limited(until - time.time()), working_on(HERE), collected() as reports:
+def _answer_of(until: float, work: Callable[[T], A], piece: T) -> Answer[A]:
+    """Do a piece until a time of day, in the worker, which starts no workers itself."""
+    with limited(until - time.time()), working_on(SERIAL), collected() as reports:
         answer = work(piece)
     return Answer(answer, tuple(reports))
 
 
-def reported(found: Answer[A]) -> A:
-    """Return an answer; what its worker had to report is reported here."""
-    for error in found.reports:
+def _reported(answer: Answer[A]) -> A:
+    for error in answer.reports:
         report(error)
-    return found.answer
+    return answer.answer
 
 
-def _nobody(executor: Executor, error: BaseException) -> WorkersGone:
-    said = getattr(executor, "gone", "a worker was killed again and again")
-    return WorkersGone(f"{said} ({error})" if str(error) else str(said))
+def _workers_gone(executor: Executor, error: BaseException) -> WorkersGone:
+    text = getattr(executor, "gone", "a worker was killed again and again")
+    return WorkersGone(f"{text} ({error})" if str(error) else str(text))
+
+
+class Speculation(Generic[T, A]):
+    """Answers to one kind of step, some made ahead; processes start once the search has taken `worth` seconds."""
+
+    def __init__(self, work: Callable[[T], A], worth: float) -> None:
+        self._work, self._worth = work, worth
+        self._began = time.perf_counter()
+        self._executor: Executor | None = None
+        self._processes: Processes | None = None
+        self._starting: list[Future[None]] = []
+        self._pending: dict[Hashable, Future[Answer[A]]] = {}
+        self.hits = 0
+
+    def prefetch(self, steps: Iterable[tuple[Hashable, T]]) -> None:
+        """Begin steps that may follow, the likeliest first, as many as workers are free."""
+        executor = self._executor or self._workers()
+        if executor is None:
+            return
+        new = ((key, step) for key, step in steps if key not in self._pending)
+        # without workers, and for steps that cannot be pickled, `result` does the work
+        with suppress(RuntimeError, OSError):
+            begun: list[Future[Any]] = [*self._starting, *self._pending.values()]
+            free = worker_count(executor) - sum(not future.done() for future in begun)
+            for key, step in islice(new, max(free, 0)):
+                with suppress(PicklingError, AttributeError, TypeError):
+                    self._pending[key] = executor.submit(_answer_of, time.time() + left(), self._work, step)
+
+    def _workers(self) -> Executor | None:
+        current = current_executor()
+        if worker_count() == 1 or (current is None and time.perf_counter() - self._began <= self._worth):
+            return None
+        if current is None:
+            current = self._processes = Processes()
+            # no step waits for a process that still starts
+            self._starting = [current.submit(_import, self._work) for _ in range(worker_count(current))]
+        self._executor = current
+        return current
+
+    def result(self, key: Hashable, step: T) -> A:
+        """Return the answer to a step, made ahead or now."""
+        future = self._pending.pop(key, None)
+        if future is None:
+            return self._work(step)
+        try:
+            answer = future.result()
+        except Exception:
+            # a step that was lost with its worker; an error of the step itself comes again here
+            return self._work(step)
+        self.hits += 1
+        return _reported(answer)
+
+    def discard(self) -> None:
+        """Drop the steps that were begun and are not needed any more."""
+        for future in self._pending.values():
+            future.cancel()
+        self._pending.clear()
+
+    def end(self) -> None:
+        """Drop all steps, and end the processes that were started for them."""
+        self.discard()
+        if self._processes is not None:
+            self._processes.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def speculation(work: Callable[[T], A], worth: float = WORTH_PROCESSES) -> Iterator[Speculation[T, A]]:
+    """Yield the speculation of one search; its processes end with it.
+
+    Parameters
+    ----------
+    worth
+        Seconds that a search has taken when processes are started for it.
+    """
+    ahead = Speculation(work, worth)
+    try:
+        yield ahead
+    finally:
+        ahead.end()

@@ -1,1 +1,1 @@
-"""What the engine does: kinematics, gas, shaking loads, mount forces, metrics."""
+"""Physics of the engine: kinematics, gas, shaking loads, mount forces, metrics."""

@@ -1,4 +1,4 @@
-"""What counterweights balance of the pistons on a throw, as the workshop counts it (L9)."""
+"""Balance factor of counterweights, as the workshop counts it (L9)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class BalanceFactor:
-    """Of the counterweights on one throw.
+    """Balance factor of the counterweights on one throw.
 
     Attributes
     ----------
@@ -30,7 +30,7 @@ class BalanceFactor:
 
 
 def balance_factors(engine: Engine, and_of_none: bool = False) -> tuple[BalanceFactor, ...]:
-    """Balance factors of throws that have a counterweight; each weight counts for the nearest throws of its shaft (L9).
+    """Return the factors of throws with a counterweight; each weight counts for the nearest throws of its shaft (L9).
 
     A weight of nothing counts as none, unless `and_of_none`.
 
@@ -42,7 +42,6 @@ def balance_factors(engine: Engine, and_of_none: bool = False) -> tuple[BalanceF
 
 
 def _on_shaft(engine: Engine, shaft: Shaft, and_of_none: bool) -> list[BalanceFactor]:
-    """Of the throws of one shaft."""
     throws = _throws([part for part in engine.slider_cranks if part.shaft == shaft])
     places = np.array([throw[0].x for throw in throws])
     opposite, counted = np.zeros(len(throws)), np.zeros(len(throws), dtype=bool)
@@ -66,7 +65,6 @@ def _on_shaft(engine: Engine, shaft: Shaft, and_of_none: bool) -> list[BalanceFa
 
 
 def _throws(parts: Sequence[SliderCrank]) -> list[list[SliderCrank]]:
-    """Parts that work on one pin, from the front: those of one place and angle."""
     found: dict[tuple[float, object], list[SliderCrank]] = {}
     for part in parts:
         found.setdefault((round(part.x, 9), direction(part.throw)), []).append(part)

@@ -43,12 +43,12 @@ Felt: TypeAlias = Callable[[SliderCrank, Array, ComplexArray, bool], tuple[Array
 
 
 def has_bearing_loads(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
-    """Whether loads inside the crankcase are modelled: of what is known to press its pin, at even crank speed."""
+    """Return True if loads inside the crankcase are modelled: known pin loads, at even crank speed."""
     return not fidelity.is_uneven and all(part.has_pin_loads for part in engine.slider_cranks)
 
 
 def pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Force of every rod on its pin, of a hinged one on its knuckle pin (B1-B3, B11).
+    """Return the force of every rod on its pin, of a hinged one on its knuckle pin (B1-B3, B11).
 
     Returns
     -------
@@ -66,12 +66,12 @@ def pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT
 
 
 def crank_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """What every cylinder brings to its crank pin, a hinged one through the master rod, as `pin_forces` (B3, B11)."""
+    """Return the force of every cylinder on its crank pin, as `pin_forces`; hinged rods act on the master (B3, B11)."""
     return _of_parts(_of_crank, engine, point, fidelity)
 
 
 def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """What drives every piston pin along its cylinder, and how its rod leans on the wall (B1, B2, B11).
+    """Return axial and side force on every piston pin (B1, B2, B11).
 
     Returns
     -------
@@ -93,7 +93,6 @@ def piston_pin_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity 
 
 
 def _carried(parts: Sequence[SliderCrank]) -> Array | None:
-    """Which rods are hinged to which, shape (masters, cylinders); None where none is."""
     found = np.array([[part.is_hinged_to(master) for part in parts] for master in parts], dtype=float)
     return found if found.any() else None
 
@@ -109,7 +108,7 @@ def _check_even(fidelity: Fidelity) -> None:
 
 
 def main_bearing_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Force of the shafts on every main bearing, linear in their unbalances (B4).
+    """Return the force of the shafts on every main bearing, linear in their unbalances (B4).
 
     Returns
     -------
@@ -131,14 +130,13 @@ def _of_rods(
     cycle: Cycle, parts: tuple[SliderCrank, ...], bearings: tuple[Bearing, ...], speed: float, gas: GasModel | None,
     fidelity: Fidelity,
 ) -> Spectrum:  # fmt: skip
-    """What the rods bring to every main bearing: the same whatever is balanced."""
     pins = _side_by_side(_of_crank, cycle, parts, speed, gas, fidelity)
     shares = shares_of(bearings, tuple((part.shaft, part.x) for part in parts), fidelity.crankshaft)
     return pins.each(partial(np.einsum, "bp,npd->nbd", shares))
 
 
 def _of_rotors(engine: Engine, speed: float, fidelity: Fidelity) -> Spectrum:
-    """What webs, weights and throws add to every main bearing, each of the one order that its shaft turns with."""
+    """Return the main bearing forces of webs, weights and throws, each of the order of its shaft."""
     bearings = engine.bearings
     shafts = {bearing.shaft for bearing in bearings}
     rotors = [rotor for rotor in engine.rotors if rotor.shaft in shafts]
@@ -151,7 +149,7 @@ def _of_rotors(engine: Engine, speed: float, fidelity: Fidelity) -> Spectrum:
 
 
 def hammer_blows(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Vertical force of all that turns with an axle on the rail under each of its wheels (B9).
+    """Return the vertical force on the rail under each wheel, of all that turns with an axle (B9).
 
     The wheels stand where the main bearings do. What reciprocates is left out: it drives the frame, not the axle.
 
@@ -165,17 +163,17 @@ def hammer_blows(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 
 
 def bearing_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """One over the projected area of every main bearing [1/m2] (B5; textbook, example 3)."""
+    """Return the reciprocal projected area of every main bearing [1/m2] (B5; textbook, example 3)."""
     return np.array([1.0 / bearing.area for bearing in engine.bearings])
 
 
 def crank_pin_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """One over the projected area of every rod's bearing on its pin [1/m2] (B5; textbook, example 3)."""
+    """Return the reciprocal projected area of every big end [1/m2] (B5; textbook, example 3)."""
     return np.array([1.0 / part.big_end_area for part in engine.slider_cranks])
 
 
 def drag_factors(engine: Engine, point: OperatingPoint) -> Array:
-    """Coefficient of friction times speed of the journal of every main bearing [m/s] (B7).
+    """Return coefficient of friction times journal speed of every main bearing [m/s] (B7).
 
     Times the force it is the power that turns to heat there.
     """
@@ -187,18 +185,15 @@ def _of_rotor(rotor: Rotor, speed: float, cycle: Cycle) -> Spectrum:
 
 
 def _of_piston_pin(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
-    """P and N of one cylinder, shape (n, 2) (B1, B2)."""
     return _felt(cycle, part, speed, gas, fidelity, _at_piston)
 
 
 def _of_hinge(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
-    """By how much more the piston of the master rod leans on its wall, shape (n, 1) (B11)."""
     return _felt(cycle, part, speed, gas, fidelity, _at_master)
 
 
 @lru_cache(maxsize=256)
 def _of_rod(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
-    """Force of one rod on its pin, shape (n, 3) (B3)."""
     load = _felt(cycle, part, speed, gas, fidelity, _at_pin)
     y, z = cis(as_turn(part.bank)).imag, cis(as_turn(part.bank)).real
     turned = load.each(lambda own: own @ np.array([[0.0, y, z], [0.0, z, -y]]))
@@ -210,7 +205,6 @@ def _of_rod(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None,
 
 @lru_cache(maxsize=256)
 def _of_crank(cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity) -> Spectrum:
-    """What one cylinder brings to its crank pin, shape (n, 3) (B3, B11)."""
     found = _of_rod(cycle, part, speed, gas, fidelity)
     if part.master_bank is not None:
         wall = 1j * cis(as_turn(part.master_bank))
@@ -238,7 +232,7 @@ def _at_master(part: SliderCrank, alpha: Array, force: ComplexArray, with_masses
 def _felt(
     cycle: Cycle, part: SliderCrank, speed: float, gas: GasModel | None, fidelity: Fidelity, felt: Felt
 ) -> Spectrum:
-    """What is felt of masses and gas of one cylinder, shape (n, d) (B1, B2)."""
+    """Return what `seen` takes of the masses and gas of one cylinder, shape (n, d) (B1, B2)."""
     if not part.has_pin_loads:
         raise ModelError(f"{part.name}: loads of its rod are not modelled; ask for forces on the block or the mounts")
     ratio = part.shaft.ratio
@@ -254,7 +248,7 @@ def _felt(
 
 @lru_cache(maxsize=256)
 def _inertia_orders(part: SliderCrank, fidelity: Fidelity, felt: Felt) -> ComplexArray:
-    """What is felt of the masses at unit speed of the crank, by order of its own angle, shape (n, d) (B1, B2)."""
+    """Return the inertia part at unit speed of the crank, by order of its own angle, shape (n, d) (B1, B2)."""
     is_short = fidelity.kinematics == "two-order" and type(part) is SliderCrank
 
     def loads(alpha: Array) -> tuple[Array, ...]:
@@ -277,7 +271,7 @@ def _inertia_orders(part: SliderCrank, fidelity: Fidelity, felt: Felt) -> Comple
 
 @lru_cache(maxsize=256)
 def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fidelity, felt: Felt) -> Spectrum:
-    """What is felt of the gas over the crank angle of the engine, shape (n, d) (B1, B2)."""
+    """Return the gas part over the crank angle of the engine, shape (n, d) (B1, B2)."""
 
     def loads(angles: Array) -> Array:
         total: Array | float = 0.0

@@ -1,4 +1,4 @@
-"""How the main bearings beside a load share it: a crankshaft cut in its journals, or one beam (B4, B6)."""
+"""Distribution of a load to the main bearings: crankshaft cut in its journals, or one beam (B4, B6)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from laufruhe.numerics.arrays import Array
 
 @lru_cache(maxsize=256)
 def shares_of(bearings: tuple[Bearing, ...], places: tuple[tuple[Shaft, float], ...], crankshaft: str) -> Array:
-    """Share of a load at each place of a shaft that each bearing carries, shape (bearings, places) (B4, B6)."""
+    """Return the share of a load at each place that each bearing carries, shape (bearings, places) (B4, B6)."""
     shares = np.zeros((len(bearings), len(places)))
     for shaft in dict.fromkeys(bearing.shaft for bearing in bearings):
         rows = [k for k, bearing in enumerate(bearings) if bearing.shaft == shaft]
@@ -26,7 +26,7 @@ def shares_of(bearings: tuple[Bearing, ...], places: tuple[tuple[Shaft, float], 
 
 
 def lever_shares(bearings: Sequence[float], places: Sequence[float]) -> Array:
-    """Share of a load at each place that each bearing carries, shape (bearings, places) (B4).
+    """Return the shares by the lever rule, shape (bearings, places) (B4).
 
     A load beside all bearings hangs over: the two nearest carry it, the far one upwards.
     """
@@ -45,7 +45,7 @@ def lever_shares(bearings: Sequence[float], places: Sequence[float]) -> Array:
 
 
 def beam_shares(bearings: Sequence[float], places: Sequence[float]) -> Array:
-    """As `lever_shares`, of a continuous beam of one stiffness on supports that do not give way (B6).
+    """Return the shares of a continuous uniform beam on rigid supports, as `lever_shares` (B6).
 
     Bending between bearings and loads is a cubic exactly, so that a beam element each is exact.
     """

@@ -1,4 +1,4 @@
-"""Where the load of a cycle wears a main bearing (B10)."""
+"""Wear of a main bearing by the load of a cycle (B10)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SIDES = math.radians(60.0)
 
 
 def wear_of(path: ComplexArray, angles: Array) -> Array:
-    """Load of every direction over the cycle as a share of the most loaded (B10).
+    """Return the load of every direction over the cycle as a share of the largest (B10).
 
     Parameters
     ----------

@@ -24,11 +24,10 @@ Stars = NDArray[np.uint8]
 # rows of a table of joined throws: small enough for the second-level cache
 _TABLE_ROWS = 300
 _CHUNK = 1 << 15
-_EPS = float(np.finfo(float).eps)
 
 
 def star_sums(stars: Stars, phases: int, places: Sequence[float], orders: Sequence[int]) -> NDArray[np.complex128]:
-    """F_h and C_h of many stars (S1).
+    """Return F_h and C_h of many stars (S1).
 
     Parameters
     ----------
@@ -62,30 +61,15 @@ def star_sums(stars: Stars, phases: int, places: Sequence[float], orders: Sequen
     return out.view(complex).reshape(len(stars), len(orders), 2)
 
 
-def score_stars(stars: Stars, phases: int, places: Sequence[float], orders: Sequence[int]) -> tuple[Array, Array]:
-    """|F_h| and |C_h| of many stars, zero where they are rounding of their own terms (S1).
-
-    Returns
-    -------
-    Two arrays of shape (n, orders): forces in forces of one throw, couples in force times
-    the unit of the places.
-    """
-    sums = star_sums(stars, phases, places, orders)
-    size = np.sqrt(np.square(sums.real) + np.square(sums.imag))
-    floor = 2.0 * (len(places) + 2) * _EPS * np.array([float(len(places)), float(np.abs(places).sum())])
-    size[size <= floor] = 0.0
-    return size[..., 0], size[..., 1]
-
-
 def phase_waves(phases: int, orders: Sequence[int]) -> NDArray[np.complex128]:
-    """e^{i h theta} of every step, shape (orders, phases), with the symmetries of the circle."""
+    """Return e^{i h theta} of every step, shape (orders, phases), with the symmetries of the circle."""
     return phasors([Fraction(p, phases) for p in range(phases)], np.array(orders, dtype=np.int64))
 
 
 def _joined_tables(
     phases: int, places: Sequence[float], orders: Sequence[int]
 ) -> tuple[list[Array], list[tuple[int, ...]]]:
-    """Contributions of neighbouring throws taken together, one row for each of their joint steps."""
+    """Return tables of contributions of groups of throws, one row for each of their joint steps."""
     waves = phase_waves(phases, orders).T
     single = [np.stack([waves, x * waves], axis=-1).reshape(phases, -1).view(float) for x in places]
     width = 1
@@ -102,7 +86,7 @@ def _joined_tables(
 
 
 def images(stars: Stars, phases: int, mirror: bool, reflect: bool) -> list[Stars]:
-    """A star and its equals: front and back swapped, and turned the other way round (S2).
+    """Return a star and its equals: front and back swapped, and turned the other way round (S2).
 
     Every image is turned so that its first throw stands at step 0.
     """
@@ -116,7 +100,7 @@ def images(stars: Stars, phases: int, mirror: bool, reflect: bool) -> list[Stars
 
 
 def canonical(stars: Stars, phases: int, mirror: bool, reflect: bool) -> Stars:
-    """The first in dictionary order among a star's images, shape (n, throws) (S2)."""
+    """Return the first in dictionary order among a star's images, shape (n, throws) (S2)."""
     best, *others = images(stars, phases, mirror, reflect)
     for other in others:
         differs = best != other

@@ -18,7 +18,7 @@ from laufruhe.physics.wrench import ROLL
 
 
 def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Torque of gas, pistons and rods on the crankshaft at even speed, as it drives the engine's output (T1).
+    """Return the torque of gas, pistons and rods on the crankshaft at even speed, as it drives the output (T1).
 
     Returns
     -------
@@ -45,23 +45,18 @@ def _cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fid
 
 
 def _of_masses(part: SliderCrank, fidelity: Fidelity) -> Effect:
-    """Torque at unit speed of the mechanism's own crank, in the sense of the output."""
+    """Return the torque at unit speed of the mechanism's own crank, in the sense of the output (T1)."""
     is_rigid, is_short = fidelity.rod == "rigid", fidelity.kinematics == "two-order"
-    alike = "torque", replace(part, name="", x=0.0, throw=0.0, bank=0.0, firing_angle=0.0), is_rigid, is_short
-    return Effect(Direction.ROLL, 1.0, alike, lambda: _short(part, is_rigid) if is_short else _orders(part, is_rigid))
+    key = "torque", replace(part, name="", x=0.0, throw=0.0, bank=0.0, firing_angle=0.0), is_rigid, is_short
 
-
-def _short(part: SliderCrank, is_rigid: bool) -> ComplexArray:
-    """Of two-order kinematics, to first order in lambda (T1); as many orders of any other mechanism."""
-    if type(part) is not SliderCrank:
-        return _orders(part, is_rigid)[: TWO_ORDER_ROLL + 1]
-    size = part.reciprocating_mass * part.crank_radius**2 * part.shaft.ratio
-    return size * two_order_roll(part.rod_ratio)
-
-
-def _orders(part: SliderCrank, is_rigid: bool) -> ComplexArray:
     def torque(alpha: np.ndarray) -> tuple[np.ndarray]:
         _, slope = reduced(part.motion(np, alpha), is_rigid)
         return (-0.5 * part.shaft.ratio * slope,)
 
-    return np.asarray(resolved_orders(torque, np.ones((1, 1)), part.name)[0])
+    def series() -> ComplexArray:
+        if is_short and type(part) is SliderCrank:
+            return part.reciprocating_mass * part.crank_radius**2 * part.shaft.ratio * two_order_roll(part.rod_ratio)
+        table = np.asarray(resolved_orders(torque, np.ones((1, 1)), part.name)[0])
+        return table[: TWO_ORDER_ROLL + 1] if is_short else table
+
+    return Effect(Direction.ROLL, 1.0, key, series)

@@ -25,25 +25,24 @@ JUMP_WIDTH = 1e-11
 
 
 def swept_volume(part: SliderCrank, angles: Array) -> Array:
-    """Volume swept from the highest piston position, over the displacement (G1); 0 to 1, shape of `angles`."""
+    """Return the volume swept from the highest piston position over the displacement (G1), shape of `angles`."""
     highest = part.travel(np, np.asarray(part.dead_centres[0]))
     return np.asarray((part.travel(np, part.fires_at + _ratio(part) * angles) - highest) / part.stroke)
 
 
 def chamber_volume(part: SliderCrank, since: Array) -> Array:
-    """Volume of a chamber over its least [m3], some crank angles after it fired [rad] (Y3)."""
+    """Return the volume of a chamber above its least [m3], at crank angles after its firing [rad] (Y3)."""
     own = part.swept.chamber
     return own.piston_area * own.stroke * swept_volume(own, part.swept.pace * (since - part.swept.late))
 
 
 def dead_centres(part: SliderCrank) -> tuple[float, float]:
-    """Angles gamma of the highest piston position and of the lowest after it [rad] (G2)."""
+    """Return the angles gamma of the highest piston position, and of the lowest after it [rad] (G2)."""
     top, bottom = (_ratio(part) * (alpha - part.fires_at) for alpha in part.dead_centres)
     return top, bottom % math.tau
 
 
 def _ratio(part: SliderCrank) -> float:
-    """Of its crank, 1 or -1: alpha = n gamma from the dead centre that it fires at (C5)."""
     ratio = part.shaft.ratio
     if abs(ratio) != 1.0:
         raise ModelError(
@@ -55,7 +54,7 @@ def _ratio(part: SliderCrank) -> float:
 
 @dataclass(frozen=True)
 class ChargedCylinder:
-    """Volumes of a cylinder over its cycle, and when its valves open.
+    """Volumes of a cylinder over its cycle, and its valve events.
 
     The closed period runs from the lowest piston position before firing to that after
     it, lowest - 2 pi to lowest; exhaust and intake strokes follow in a four-stroke cycle.
@@ -67,20 +66,20 @@ class ChargedCylinder:
 
     @property
     def smallest(self) -> float:
-        """V_c / V_h."""
+        """Clearance ratio V_c / V_h."""
         return 1.0 / (self.gas.compression_ratio - 1.0)
 
     @property
     def largest(self) -> float:
-        """(V_c + V_h) / V_h."""
+        """Ratio (V_c + V_h) / V_h."""
         return self.gas.compression_ratio / (self.gas.compression_ratio - 1.0)
 
     def volume(self, angles: Array) -> Array:
-        """V / V_h (G1)."""
+        """Return V / V_h (G1)."""
         return self.smallest + swept_volume(self.part, angles)
 
     def pressure(self, closed: Callable[[Array], Array], angles: Array) -> Array:
-        """Pressure over the cycle from that of the closed period, the mean of both sides at a jump [Pa].
+        """Return the pressure over the cycle from that of the closed period, at a jump the mean of both sides [Pa].
 
         There is none but at a dead centre: valves open and close there, and heat is added there at once.
         """
@@ -102,10 +101,10 @@ class ChargedCylinder:
 
 
 def gas_exchange_pressure(gas: Charge, cycle: Cycle) -> float:
-    """Mean pressure of the exhaust and intake strokes [Pa]; none in a two-stroke cycle (G6, G11)."""
+    """Return the mean pressure of exhaust and intake strokes [Pa]; zero in a two-stroke cycle (G6, G11)."""
     return gas.intake_pressure - gas.exhaust_pressure if cycle is Cycle.FOUR_STROKE else 0.0
 
 
 def in_bar(pressure: float) -> str:
-    """A pressure as an error message shows it."""
+    """Return a pressure as text in bar."""
     return f"{pressure * 1e-5:.6g} bar"

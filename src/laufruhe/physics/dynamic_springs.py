@@ -1,4 +1,4 @@
-"""Springs of a mounting whose stiffness depends on frequency: what they add to that at rest (E50, E51)."""
+"""Frequency-dependent springs of a mounting: stiffness beyond that at rest (E50, E51)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 
 @dataclass(frozen=True, eq=False)
 class DynamicSprings:
-    """Of a mounting, all along their own axes.
+    """Frequency-dependent springs of a mounting, along their own axes.
 
     Attributes
     ----------
@@ -36,26 +36,26 @@ class DynamicSprings:
 
     @property
     def has_law(self) -> bool:
-        """Whether all of them move in time as they do in frequency: of what was measured nobody knows."""
+        """True if all of them have equations in time; measured stiffness has none."""
         return all(isinstance(law, FluidTrack) for law in self.laws)
 
     def added(self, omegas: Array) -> ComplexArray:
-        """Stiffness over that at rest, shape (frequencies, n) [N/m]."""
+        """Return the stiffness beyond that at rest, shape (frequencies, n) [N/m]."""
         found = [law.at(np.asarray(omegas, dtype=float)) - law.static for law in self.laws]
         return np.array(found, dtype=complex).reshape(len(self.laws), len(omegas)).T
 
     def impedance(self, omegas: Array, shapes: Any) -> ComplexArray:
-        """What they add to the impedance, in coordinates of these shapes (6, k), shape (frequencies, k, k)."""
+        """Return the added impedance in coordinates of shapes (6, k), shape (frequencies, k, k)."""
         seen = self.rows @ shapes
         return np.asarray(np.einsum("wn,ni,nj->wij", self.added(omegas), seen, seen))
 
     def forces(self, omegas: Array, shapes: Any) -> ComplexArray:
-        """What they add to the forces of the mounts, from coordinates of these shapes, (frequencies, 3 mounts, k)."""
+        """Return the added mount forces per coordinate of shapes (6, k), shape (frequencies, 3 mounts, k)."""
         return np.asarray(np.einsum("wn,rn,nj->wrj", self.added(omegas), self.directions, self.rows @ shapes))
 
 
 def dynamic_springs(mounts: Sequence[Mount], motions: Array) -> DynamicSprings:
-    """Of mounts at places of these motions G, shape (mounts, 3, 6)."""
+    """Return the frequency-dependent springs of mounts with motions G, shape (mounts, 3, 6)."""
     found = [(place, spring, law) for place, spring in every_spring(mounts) for law in spring.dynamic]
     axes = np.array([spring.orientation[law.axis] for _, spring, law in found]).reshape(-1, 3)
     rows = np.array([axis @ motions[place] for axis, (place, _, _) in zip(axes, found, strict=True)]).reshape(-1, 6)

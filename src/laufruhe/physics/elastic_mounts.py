@@ -36,12 +36,12 @@ RESONANCE = 1e-8
 
 
 class ResonanceError(ModelError):
-    """An order excites a mode at its own frequency, and nothing damps it."""
+    """Error of an order that excites an undamped mode at its natural frequency."""
 
 
 @dataclass(frozen=True, eq=False)
 class ElasticMounting:
-    """The linear map from the wrench on the block to motion and forces, at any speed.
+    """Linear map from the wrench on the block to motion and forces, at any speed.
 
     Attributes
     ----------
@@ -60,14 +60,14 @@ class ElasticMounting:
 
     @cached_property
     def motions(self) -> Array:
-        """G of every mount, shape (mounts, 3, 6) (E1)."""
+        """Motion G of every mount, shape (mounts, 3, 6) (E1)."""
         centre = np.array(self.block.centre_of_gravity)
         arms = [np.array(mount.position) - centre for mount in self.mounts]
         return np.array([point_motion(NUMBERS, arm) for arm in arms]).reshape(-1, 3, 6)
 
     @cached_property
     def springs(self) -> Array:
-        """k of every mount in the axes of C2, shape (mounts, 3, 3) [N/m] (E2)."""
+        """Stiffness of every mount in the axes of C2, shape (mounts, 3, 3) [N/m] (E2)."""
         return np.array([mount.stiffness_matrix for mount in self.mounts]).reshape(-1, 3, 3)
 
     @cached_property
@@ -81,17 +81,17 @@ class ElasticMounting:
         return np.array([mount.damping_matrix for mount in self.mounts]).reshape(-1, 3, 3)
 
     def total(self, each: Array) -> Array:
-        """Sum of G' k G over the mounts, shape (6, 6) (E3)."""
+        """Return the sum of G' k G over the mounts, shape (6, 6) (E3)."""
         return np.asarray(sum(carried(g, k) for g, k in zip(self.motions, each, strict=True)))
 
     @cached_property
     def stiffness(self) -> Array:
-        """K, shape (6, 6) (E3)."""
+        """Stiffness matrix K, shape (6, 6) (E3)."""
         return self.total(self.springs)
 
     @cached_property
     def dynamic(self) -> DynamicSprings:
-        """Springs whose stiffness depends on frequency (E50, E51)."""
+        """Frequency-dependent springs (E50, E51)."""
         return dynamic_springs(self.mounts, self.motions)
 
     @cached_property
@@ -105,7 +105,6 @@ class ElasticMounting:
 
     @cached_property
     def _met(self) -> NDArray[np.bool_]:
-        """Modes that springs whose stiffness depends on frequency couple, shape (6, 6)."""
         seen = np.abs(self.dynamic.rows @ self.modes.shapes)
         felt = (seen > UNDRIVEN * seen.max(axis=1, keepdims=True, initial=0.0)).astype(int)
         return np.asarray(felt.T @ felt > 0)
@@ -115,19 +114,17 @@ class ElasticMounting:
         return self._modal(self.total(self.dampers))
 
     def _modal(self, matrix: Array) -> Array:
-        """A matrix in coordinates of the modes, without the roundings that would couple them."""
         shapes = self.modes.shapes
         out = np.asarray(shapes.T @ matrix @ shapes)
         return np.where(np.abs(out) > UNDRIVEN * np.abs(out).max(initial=0.0), out, 0.0)
 
     @cached_property
     def _about_centre(self) -> Array:
-        """From the wrench about the origin to the drive of every mode, shape (6 modes, 6)."""
         moved = moved_wrench(NUMBERS, self.block.centre_of_gravity)
         return np.asarray(self.modes.shapes.T @ moved)
 
     def drives(self, wrenches: ComplexArray) -> ComplexArray:
-        """Drive of every mode by wrenches about the origin, shape (n, 6) to (n, 6), roundings left out."""
+        """Return the drive of every mode by wrenches about the origin, shape (n, 6) to (n, 6), roundings removed."""
         drive = wrenches @ self._about_centre.T
         # what cancels in the sum counts against the size of its terms
         size = np.abs(wrenches) @ np.abs(self._about_centre).T
@@ -136,12 +133,11 @@ class ElasticMounting:
 
     @cached_property
     def _answers(self) -> NDArray[np.bool_]:
-        """Which modes answer, shape (6,)."""
         kept = range(1, 7) if self.answering is None else self.answering
         return np.isin(np.arange(1, 7), list(kept))
 
     def excited(self, wrench: Spectrum) -> tuple[int, ...]:
-        """Modes that a wrench drives, directly or through damping (E12)."""
+        """Return the modes that a wrench drives, directly or through damping (E12)."""
         return self._reached(self.drives(wrench.coefficients))
 
     def _reached(self, drive: ComplexArray) -> tuple[int, ...]:
@@ -154,7 +150,7 @@ class ElasticMounting:
             reached = further
 
     def responses(self, omegas: Array, wrenches: ComplexArray) -> ComplexArray:
-        """Amplitudes of the modes, wrench by wrench (E4).
+        """Return the modal amplitudes of each wrench (E4).
 
         Parameters
         ----------
@@ -177,7 +173,7 @@ class ElasticMounting:
         return self.driven(omegas, self.drives(wrenches))
 
     def driven(self, omegas: Array, drive: ComplexArray) -> ComplexArray:
-        """As `responses`, of drives of the modes that are known already, shape (n, 6) (E4)."""
+        """Return the modal amplitudes of known drives of the modes, shape (n, 6), as `responses` (E4)."""
         kept = list(self._reached(drive))
         out = np.zeros(drive.shape, dtype=complex)
         if not kept:
@@ -221,20 +217,20 @@ class ElasticMounting:
         )
 
     def motion(self, wrench: Spectrum, speed: float) -> Spectrum:
-        """Motion (u, theta) of the centre of gravity, shape (n, 6) [m, rad]."""
+        """Return the motion (u, theta) of the centre of gravity, shape (n, 6) [m, rad]."""
         return Spectrum(wrench.base, self._modal_motion(wrench, speed) @ self.modes.shapes.T)
 
     def travel(self, wrench: Spectrum, speed: float) -> Spectrum:
-        """Displacement of the engine at every mount, shape (n, mounts, 3) [m]."""
+        """Return the displacement of the engine at every mount, shape (n, mounts, 3) [m]."""
         return Spectrum(wrench.base, np.einsum("mij,nj->nmi", self._travels, self._modal_motion(wrench, speed)))
 
     def forces(self, wrench: Spectrum, speed: float) -> Spectrum:
-        """Forces of the engine on its mounts, shape (n, mounts, 3) [N] (C7, E5)."""
+        """Return the forces of the engine on its mounts, shape (n, mounts, 3) [N] (C7, E5)."""
         amplitudes = self._modal_motion(wrench, speed)
         return Spectrum(wrench.base, self.mount_forces(wrench.orders * speed, amplitudes))
 
     def mount_forces(self, omegas: Array, amplitudes: ComplexArray) -> ComplexArray:
-        """Mount forces of modal amplitudes (n, 6), shape (n, mounts, 3) (E5)."""
+        """Return the mount forces of modal amplitudes (n, 6), shape (n, mounts, 3) (E5)."""
         elastic, lossy, viscous = (matrix.reshape(-1, 6).T for matrix in self._force_maps)
         out = amplitudes @ (elastic + 1j * lossy)
         still = omegas == 0.0
@@ -248,7 +244,7 @@ class ElasticMounting:
         return np.asarray(out.reshape(len(omegas), -1, 3))
 
     def resonant(self, wrench: Spectrum, speed: float) -> tuple[NDArray[np.bool_], str]:
-        """Orders of a wrench whose answer has no size, shape (n,), and the first of them in words."""
+        """Return a mask of orders with an infinite response, shape (n,), and the first of them in words."""
         struck, why = np.zeros(len(wrench.coefficients), dtype=bool), ""
         for k in np.flatnonzero(np.any(wrench.coefficients != 0.0, axis=1)):
             try:
@@ -301,7 +297,7 @@ def _coupled(matrix: Array) -> bool:
 def elastic_mounting(
     block: Block, mounts: Sequence[Mount], answering: tuple[int, ...] | None = None
 ) -> ElasticMounting:
-    """A block on its mounts; of its modes those that answer, all when None.
+    """Return the mounting of a block; `answering` selects modes, all when None.
 
     Raises
     ------
@@ -315,12 +311,11 @@ def elastic_mounting(
 
 @lru_cache(maxsize=4)
 def _elastic_mounting(block: Block, mounts: tuple[Mount, ...], answering: tuple[int, ...] | None) -> ElasticMounting:
-    """One and the same for all that is asked of one design: its modes are found once."""
     return ElasticMounting(block, mounts, answering)
 
 
 def single_transmissibility(ratio: Array, loss_factor: float = 0.0, damping_ratio: float = 0.0) -> Array:
-    """Foundation over exciting force of one mass on one spring (E11; Fig. 31).
+    """Return foundation force over exciting force of one mass on one spring (E11; Fig. 31).
 
     Parameters
     ----------

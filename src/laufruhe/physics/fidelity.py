@@ -1,4 +1,4 @@
-"""What of the physics is kept: choices with names, each free of the others (F1).
+"""Physics options of a model, each independent of the others (F1).
 
 `fidelity.knobs` says of every field how a problem file tells it, what it costs and when it pays.
 """
@@ -21,7 +21,7 @@ MODES = 6
 
 
 class ChoiceError(ModelError):
-    """A choice that means nothing, or contradicts another."""
+    """Invalid or contradictory fidelity option."""
 
     def __init__(self, key: str, value: Any, rule: str, remedy: str) -> None:
         self.key, self.rule, self.remedy = key, rule, remedy
@@ -30,7 +30,7 @@ class ChoiceError(ModelError):
 
 @dataclass(frozen=True)
 class Fidelity:
-    """What of the physics is kept.
+    """Physics options of a model.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class Fidelity:
 
     @property
     def is_uneven(self) -> bool:
-        """Whether the crank speed varies within the cycle."""
+        """True if the crank speed varies within the cycle."""
         return math.isfinite(self.crank_inertia)
 
     @property
@@ -106,24 +106,24 @@ class Fidelity:
         return self.samples if self.gas_samples is None else self.gas_samples
 
     def gas_of(self, point: OperatingPoint) -> GasModel | None:
-        """The working gas that loads the engine."""
+        """Return the working gas that loads the engine, or None."""
         return point.gas if self.gas else None
 
     def kept_of_gas(self, torque: Spectrum) -> Spectrum:
-        """Torque of the gas without the orders that are not kept of it."""
+        """Return the gas torque without truncated orders."""
         return torque if self.gas_orders is None else torque.kept(self.gas_orders)
 
     def kept(self, loads: Spectrum, least: float = 1.0) -> Spectrum:
-        """Loads without the orders that are not kept; those up to `least` are."""
+        """Return the loads without truncated orders; those up to `least` stay."""
         return loads if self.orders is None else loads.kept(max(self.orders, least))
 
     def local_orders(self, ratio: float) -> int | None:
-        """Last order kept in the angle of a crank of this ratio to the crankshaft."""
+        """Return the last order in the angle of a crank of this ratio, or None."""
         return None if self.orders is None else max(1, math.ceil(self.orders / abs(ratio)))
 
     @property
     def summary(self) -> str:
-        """The choices in words, those that are usual left out."""
+        """Options that are not the default, in words."""
         modes = "no mode" if not self.modes else "modes " + ", ".join(map(str, self.modes))
         words = (
             (True, f"{self.kinematics} kinematics"),

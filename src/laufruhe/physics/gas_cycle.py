@@ -1,4 +1,4 @@
-"""Cylinder pressure over the working cycle, whatever describes it (G1-G12).
+"""Cylinder pressure over the working cycle from any gas model (G1-G12).
 
 Every model meets the indicated mean pressure wanted of the whole cycle: that of a
 four-stroke cycle includes its gas exchange.
@@ -26,7 +26,7 @@ OneChamber: TypeAlias = Seiliger | Wiebe | PressureTrace
 
 
 def pressure_at(gas: OneChamber, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Absolute cylinder pressure [Pa] at crank angles from the firing dead centre [rad], shape of `angles`.
+    """Return the absolute cylinder pressure [Pa] at crank angles after firing [rad], shape of `angles`.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def _worked(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> tuple[OneChambe
 
 
 def check_chamber(gas: GasModel, part: SliderCrank) -> None:
-    """Refuse a compression that the shape of a chamber has no room for (Y2).
+    """Refuse a compression ratio that the shape of a chamber does not allow (Y2).
 
     Raises
     ------
@@ -67,14 +67,14 @@ def check_chamber(gas: GasModel, part: SliderCrank) -> None:
 
 
 def thrust_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Force of the gas on a piston rod, along the axis and away from the crank [N], as `pressure_at` (B1, G14)."""
+    """Return the gas force on a piston rod along the axis, away from the crank [N], as `pressure_at` (B1, G14)."""
     if isinstance(gas, Chambers):
         return chambers_thrust(gas, part, angles)
     return np.asarray(-part.swept.piston.piston_area * (pressure_at(gas, part, cycle, angles) - gas.crankcase_pressure))
 
 
 def alike_under(gas: GasModel, part: SliderCrank) -> Hashable:
-    """Equal where the gas drives two cylinders alike, each from its own dead centre."""
+    """Return a key that is equal for cylinders with equal gas forces over their own angle."""
     return (
         part.path,
         part.facing,
@@ -83,7 +83,7 @@ def alike_under(gas: GasModel, part: SliderCrank) -> Hashable:
 
 
 def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> NDArray[np.float64]:
-    """Angles from the firing dead centre at which a derivative of the pressure jumps [rad] (G13).
+    """Return the angles after firing at which a derivative of the pressure jumps [rad] (G13).
 
     Ends of strokes, where valves open and heat comes at once; cut-off; begin and end of a burn; points of a trace.
     """
@@ -93,7 +93,6 @@ def pressure_breaks(gas: GasModel, part: SliderCrank, cycle: Cycle) -> NDArray[n
 
 
 def _breaks_of_one(gas: OneChamber, part: SliderCrank, cycle: Cycle) -> NDArray[np.float64]:
-    """Those of the chamber that fires at the dead centre."""
     gas, own, cycle, pace = _worked(gas, part, cycle)
     if isinstance(gas, PressureTrace):
         return np.array(gas.angles)

@@ -20,7 +20,7 @@ from laufruhe.physics.wrench import ROLL
 
 
 def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Roll moment of the gas, the reaction to its crank torque (L5; eq. 1). No net force."""
+    """Return the wrench of the gas: a roll moment, the reaction to its crank torque (L5; eq. 1)."""
     turns = engine.cycle.turns
     # equal mechanisms differ only in when they fire
     alike: dict[Hashable, list[SliderCrank]] = defaultdict(list)
@@ -42,38 +42,33 @@ def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spec
 
 
 def gas_coefficients(gas: GasModel, part: SliderCrank, cycle: Cycle, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Roll moment of one cylinder's gas [N m] by order, from its firing dead centre on (L5), shape (n,).
+    """Return the roll moment of one cylinder's gas [N m] by order, counted from its firing (L5), shape (n,).
 
     A cylinder that fires at phi_k has these coefficients times e^{-i h phi_k}.
     """
-    driven = _Driven((type(part), alike_under(gas, part), part.shaft.ratio), part)
-    return fidelity.kept_of_gas(_one_cylinder(gas, driven, cycle, fidelity.gas_steps))
+    key = _CylinderKey((type(part), alike_under(gas, part), part.shaft.ratio), part)
+    return fidelity.kept_of_gas(_one_cylinder(gas, key, cycle, fidelity.gas_steps))
 
 
 @dataclass(frozen=True)
-class _Driven:
-    """A cylinder as the gas knows it: equal whatever it weighs, wherever it stands, whenever it fires."""
+class _CylinderKey:
+    """Cache key of a cylinder: equal for equal gas forces, at any mass, place and firing angle."""
 
     alike: Hashable
     part: SliderCrank = field(compare=False)
 
 
 @lru_cache(maxsize=64)
-def _one_cylinder(gas: GasModel, driven: _Driven, cycle: Cycle, samples: int) -> Spectrum:
-    """The same at every speed, its corners taken out before the transform (L5a)."""
-    part = driven.part
-    found = bent_spectrum(
-        lambda angles: _torque_at(gas, part, cycle, angles),
-        samples,
-        cycle.base_order,
-        pressure_breaks(gas, part, cycle),
-    )
-    found.coefficients.setflags(write=False)
-    return found
+def _one_cylinder(gas: GasModel, key: _CylinderKey, cycle: Cycle, samples: int) -> Spectrum:
+    # its kinks are taken out before the transform (L5a)
+    part, breaks = key.part, pressure_breaks(gas, key.part, cycle)
+    torque = bent_spectrum(lambda angles: _torque_at(gas, part, cycle, angles), samples, cycle.base_order, breaks)
+    torque.coefficients.setflags(write=False)
+    return torque
 
 
 def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> Array:
-    """Torque of one cylinder's gas on the engine's output, n P ds/dalpha, P = -A (p - p_crankcase) (L5).
+    """Return the torque of one cylinder's gas on the output, n P ds/dalpha, P = -A (p - p_crankcase) (L5).
 
     Returns
     -------
@@ -83,13 +78,12 @@ def gas_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, samples: int) -> 
 
 
 def _torque_at(gas: GasModel, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
-    """As `gas_torque`, at any crank angles from the firing dead centre [rad]."""
     torques = [chamber_torque(gas, part, cycle, angles + lag) for lag in part.swept.lags]
     return np.asarray(np.sum(torques, axis=0))
 
 
 def chamber_torque(gas: GasModel, part: SliderCrank, cycle: Cycle, since: Array) -> Array:
-    """Torque of what fired some crank angles ago [rad], of a piston or of one chamber of a rotor [N m] (L5, Y4)."""
+    """Return the torque of a piston or one rotor chamber at crank angles after it fired [N m] (L5, Y4)."""
     own, pace = part.swept.piston, part.swept.pace
     alpha = own.fires_at + own.shaft.ratio * pace * since
     return np.asarray(pace * own.shaft.ratio * thrust_at(gas, part, cycle, since) * own.velocity(np, alpha))

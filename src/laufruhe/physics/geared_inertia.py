@@ -1,4 +1,4 @@
-"""What inertia on geared shafts takes off the roll moment, or adds to it (L8).
+"""Roll moment of inertia on geared shafts (L8).
 
     Mx = (1/n - 1) s (T - mean of T),      s = n^2 J_n / J
 
@@ -16,12 +16,12 @@ from laufruhe.physics.wrench import ROLL
 
 
 def geared_factor(engine: Engine) -> float:
-    """Sum of (1/n - 1) s over the shafts."""
+    """Return the sum of (1/n - 1) s over the shafts."""
     return sum(((1.0 / geared.ratio - 1.0) * geared.share for geared in engine.geared), 0.0)
 
 
 def geared_moment(engine: Engine, torque: Spectrum) -> Spectrum:
-    """Wrench on the block, shape (n, 6), of a torque of the crank of shape (n,) at even speed [N m] (L8)."""
+    """Return the wrench on the block, shape (n, 6), of a crank torque (n,) at even speed [N m] (L8)."""
     mean = torque.coefficients[:1]
     alternating = torque + Spectrum(torque.base, -mean)
     factor = geared_factor(engine)

@@ -26,7 +26,7 @@ FINE = 4
 
 @dataclass(frozen=True, eq=False)
 class Swing:
-    """What makes the speed of one engine at one operating point vary.
+    """Causes of the speed fluctuation of an engine at one operating point.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Swing:
     bent_inertia: Array
 
     def speeds(self, inertia: float) -> Array:
-        """Crank speed over the cycle with this inertia beside pistons and rods [rad/s] (F2-F4).
+        """Return the crank speed over the cycle with an inertia beside pistons and rods [rad/s] (F2-F4).
 
         Raises
         ------
@@ -62,7 +62,7 @@ class Swing:
         return np.asarray(np.sqrt(2.0 * np.maximum(energy + work, 0.0) / total))
 
     def irregularity(self, inertia: float) -> float:
-        """Largest less smallest speed over the mean (T3; textbook eq. 24); infinite where the crank would stop."""
+        """Return the speed range over the mean speed (T3; textbook eq. 24); infinite if the crank would stop."""
         try:
             speeds = self.speeds(inertia)
         except ModelError:
@@ -70,7 +70,7 @@ class Swing:
         return float((speeds.max() - speeds.min()) / self.speed)
 
     def least_inertia(self, degree: float) -> float:
-        """Least inertia beside pistons and rods that keeps the degree of irregularity [kg m2] (T3).
+        """Return the least inertia beside pistons and rods for a degree of irregularity [kg m2] (T3).
 
         Zero where none is needed. The degree falls as the inertia grows.
         """
@@ -83,7 +83,7 @@ class Swing:
 
 
 def swing_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Swing:
-    """Work and inertia over the cycle; rotors, mounts and the flywheel itself are not in them."""
+    """Return work and inertia over the cycle; rotors, mounts and flywheel are not part of them."""
     bare = replace(engine, rotors=(), mounts=(), bearings=(), flywheel=None, extras=(), geared=())
     return _found_swing(bare, point, fidelity)
 
@@ -99,5 +99,5 @@ def _found_swing(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
 
 
 def irregularity(engine: Engine, point: OperatingPoint, inertia: float, fidelity: Fidelity = EXACT) -> float:
-    """Degree of irregularity with an inertia beside pistons and rods [kg m2] (T3)."""
+    """Return the degree of irregularity with an inertia beside pistons and rods [kg m2] (T3)."""
     return swing_of(engine, point, fidelity).irregularity(inertia)

@@ -1,4 +1,4 @@
-"""What a mechanism loads its block with, by order of its own crank angle (L2-L4, L7).
+"""Loads of a mechanism on the block by order of its own crank angle (L2-L4, L7).
 
 Every mechanism says how its masses move (`SliderCrank.motion`). Momentum and angular momentum
 of that motion are its loads, whatever it is; where closed forms are known, as of the plain
@@ -29,7 +29,7 @@ _MOST_STEPS = 1 << 16
 
 
 class Direction(IntEnum):
-    """Of a load in the frame of its cylinder: along the axis, across it towards +i e^{i beta}, about the crank."""
+    """Direction of a load in the frame of its cylinder: axial, towards +i e^{i beta}, or about the crank."""
 
     AXIAL = 0
     TRANSVERSE = 1
@@ -38,7 +38,7 @@ class Direction(IntEnum):
 
 @dataclass(frozen=True)
 class Effect:
-    """One load of a mechanism.
+    """Load of a mechanism.
 
     Attributes
     ----------
@@ -57,19 +57,19 @@ class Effect:
 
 
 def effects_of(part: SliderCrank, fidelity: Fidelity) -> list[Effect]:
-    """Loads of point masses and rods."""
+    """Return the loads of point masses and rods."""
     masses, rods = _all_effects(part, fidelity)
     return [effect for effect in (*masses, *rods) if effect.size != 0.0]
 
 
 def mass_effects(part: SliderCrank, fidelity: Fidelity) -> list[Effect]:
-    """Loads of the point masses (L2, L3, L7)."""
+    """Return the loads of the point masses (L2, L3, L7)."""
     masses, _ = _all_effects(part, fidelity)
     return [effect for effect in masses if effect.size != 0.0]
 
 
 def rod_effects(part: SliderCrank, fidelity: Fidelity) -> list[Effect]:
-    """Roll moment of what point masses leave of the rods' inertia (L4, L7)."""
+    """Return the roll moments that point masses leave out of the rods' inertia (L4, L7)."""
     _, rods = _all_effects(part, fidelity)
     return [effect for effect in rods if effect.size != 0.0]
 
@@ -80,7 +80,7 @@ def _all_effects(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, .
 
 
 def momentum_loads(part: SliderCrank, motion: Motion, square: Any, turning: Any = 0.0) -> tuple[Any, Any, Any]:
-    """Force on the block in the turned plane, roll moment of its point masses and of its swings (L7).
+    """Return the force on the block in the turned plane, and roll moments of point masses and of swings (L7).
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def momentum_loads(part: SliderCrank, motion: Motion, square: Any, turning: Any 
 
 
 def reduced(motion: Motion, with_rods: bool = True) -> tuple[Any, Any]:
-    """Inertia that a motion reduces to its own crank [kg m2], and its derivative by the angle of that (F3)."""
+    """Return the inertia of a motion reduced to its own crank [kg m2], and its derivative by that angle (F3)."""
     inertia, slope = 0.0, 0.0
     for mass, (_, velocity, acceleration) in motion.points:
         inertia = inertia + mass * np.abs(velocity) ** 2
@@ -111,7 +111,7 @@ def reduced(motion: Motion, with_rods: bool = True) -> tuple[Any, Any]:
 
 def cylinder_wrench(part: SliderCrank, motion: Motion, axis: Any, square: Any, turning: Any = 0.0,
                     with_rods: bool = True) -> Any:  # fmt: skip
-    """Wrench of `momentum_loads`, shape (6, ...), of a cylinder whose axis is a unit number (C4)."""
+    """Return the wrench of `momentum_loads`, shape (6, ...), for a cylinder axis as a unit number (C4)."""
     force, roll, rods = momentum_loads(part, motion, square, turning)
     force = force * axis
     wrench = plane_wrench(force.imag, force.real, part.x, part.shaft)
@@ -120,7 +120,7 @@ def cylinder_wrench(part: SliderCrank, motion: Motion, axis: Any, square: Any, t
 
 
 def two_order_roll(rod_ratio: float) -> ComplexArray:
-    """(cos a + lam cos 2a)(-1)(sin a + lam/2 sin 2a), to first order in lam: roll moment (L3) and torque (T1)."""
+    """Return (cos a + lam cos 2a)(-1)(sin a + lam/2 sin 2a) to first order in lam: roll moment (L3) and torque (T1)."""
     return 1j * np.array([0.0, -rod_ratio / 4.0, 0.5, 0.75 * rod_ratio])
 
 
@@ -160,7 +160,6 @@ CLOSED_FORMS: dict[type[SliderCrank], Callable[..., tuple[tuple[Effect, ...], tu
 
 
 def _highest(part: SliderCrank, fidelity: Fidelity) -> int:
-    """Last order of the local crank angle that is kept: all that matter, or fewer."""
     needed = order_coefficients.orders_needed(part.rod_ratio, part.offset_ratio)
     asked = fidelity.local_orders(part.shaft.ratio)
     return needed if asked is None else min(needed, asked)
@@ -182,7 +181,7 @@ def _of_momentum(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, .
 
 @lru_cache(maxsize=1024)
 def momentum_orders(part: SliderCrank) -> ComplexArray:
-    """Loads at unit speed of its crank by a transform of the exact motion, as many orders as matter (L7).
+    """Return the loads at unit crank speed by a transform of the exact motion, as many orders as matter (L7).
 
     Returns
     -------
@@ -207,7 +206,7 @@ def momentum_orders(part: SliderCrank) -> ComplexArray:
 
 
 def resolved_orders(rows: Callable[[NDArray[np.float64]], Sequence[Any]], scale: Any, name: str) -> ComplexArray:
-    """Coefficients of periodic functions of the crank's own angle, as many orders as matter.
+    """Return coefficients of periodic functions of the crank's own angle, as many orders as matter.
 
     Parameters
     ----------

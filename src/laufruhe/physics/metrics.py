@@ -19,16 +19,16 @@ class CycleMeasures:
     rms: float
 
     def times(self, factor: float) -> CycleMeasures:
-        """In another unit."""
+        """Return the measures in another unit."""
         return CycleMeasures(factor * self.mean, factor * self.max, factor * self.rms)
 
 
 def cycle_measures(samples: Array) -> CycleMeasures:
-    """Of |F(phi)| from samples (n, components) at equal steps (M4; Hasselgruber, Figs. 10-28)."""
+    """Return mean, maximum and rms of |F(phi)| from samples (n, components) (M4; Hasselgruber, Figs. 10-28)."""
     size = lengths(samples)
     return CycleMeasures(float(size.mean()), float(size.max()), float(np.sqrt(np.mean(size**2))))
 
 
 def turning_parts(lateral: complex, vertical: complex) -> tuple[float, float]:
-    """Amplitudes of the parts of z + i y that turn with the crank, as e^{ix}, and against it (C4, C8)."""
+    """Return the amplitudes of the parts of z + i y that turn with the crank, as e^{ix}, and against it (C4, C8)."""
     return 0.5 * float(abs(vertical + 1j * lateral)), 0.5 * float(abs(vertical - 1j * lateral))

@@ -1,4 +1,4 @@
-"""Natural modes of a block on its mounts, and what they say (E6-E10)."""
+"""Natural modes of a block on its mounts, and static motion (E6-E10)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PURE = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Modes:
-    """Undamped natural modes, the lowest first (E6).
+    """Undamped natural modes in ascending order (E6).
 
     Attributes
     ----------
@@ -47,22 +47,21 @@ class Modes:
 
     @property
     def free(self) -> NDArray[np.bool_]:
-        """Modes that no mount resists, shape (6,)."""
+        """Mask of modes that no mount resists, shape (6,)."""
         return np.asarray(self.squares == 0.0)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """What each mode mostly is: bounce, or bounce-pitch where none has half of the energy."""
-        return tuple(_name(column) for column in self.energy.T)
-
-
-def _name(shares: Array) -> str:
-    first, second = np.argsort(-shares)[:2]
-    return MOTIONS[first] if shares[first] >= PURE else f"{MOTIONS[first]}-{MOTIONS[second]}"
+        """Main motion of each mode: bounce, or bounce-pitch if none has half of the energy."""
+        names = []
+        for shares in self.energy.T:
+            first, second = np.argsort(-shares)[:2]
+            names.append(MOTIONS[first] if shares[first] >= PURE else f"{MOTIONS[first]}-{MOTIONS[second]}")
+        return tuple(names)
 
 
 def modes_of(mass: Array, stiffness: Array, loss: Array | None = None) -> Modes:
-    """Modes of M and K, shapes (6, 6) (E6, E7).
+    """Return the modes of M and K, shapes (6, 6) (E6, E7).
 
     Solved in coordinates in which the mass is one, so that a block with hardly any
     inertia about one axis costs no digits of the others.
@@ -81,12 +80,12 @@ def modes_of(mass: Array, stiffness: Array, loss: Array | None = None) -> Modes:
 
 
 def free_motion(modes: Modes) -> str:
-    """The motions that no mount resists, in words; empty where there are none."""
+    """Return the motions that no mount resists in words; empty without any."""
     return " and ".join(dict.fromkeys(name for name, free in zip(modes.names, modes.free, strict=True) if free))
 
 
 def static_motion(modes: Modes, wrench: Array) -> Array:
-    """Motion (u, theta) of the centre of gravity under a steady wrench about it, shape (6,) (E9, E10).
+    """Return the motion (u, theta) under a steady wrench about the centre of gravity, shape (6,) (E9, E10).
 
     Raises
     ------
@@ -102,22 +101,22 @@ def static_motion(modes: Modes, wrench: Array) -> Array:
 
 
 def weight_wrench(block: Block) -> Array:
-    """Gravity on the block, about its centre of gravity, shape (6,) [N, N m]."""
+    """Return the weight of the block about its centre of gravity, shape (6,) [N, N m]."""
     return np.array([0.0, 0.0, -block.mass * GRAVITY, 0.0, 0.0, 0.0])
 
 
 def sag_frequency(sag: float) -> float:
-    """Natural frequency [Hz] of a mass that sags by `sag` [m] on its spring (E9; eq. 41)."""
+    """Return the natural frequency [Hz] of a mass that sags by `sag` [m] (E9; eq. 41)."""
     return math.sqrt(GRAVITY / sag) / math.tau
 
 
 def sag_for_critical_speed(speed: float, order: float) -> float:
-    """Sag [m] that puts the critical speed of an order at `speed` [rad/s] (E9; eq. 41, Fig. 32)."""
+    """Return the sag [m] that puts the critical speed of an order at `speed` [rad/s] (E9; eq. 41, Fig. 32)."""
     return GRAVITY / (speed * order) ** 2
 
 
 def torque_roll_axis(block: Block) -> Array:
-    """Direction about which a free block starts to turn under a torque about the crank, through its centre of gravity.
+    """Return the axis about which a free block starts to turn under a crank torque.
 
     Returns
     -------

@@ -1,8 +1,7 @@
-"""Forces on the mounts of an engine that its mounting holds far below resonance (M1-M3)."""
+"""Mount forces of an engine far above the resonances of its mounts (M1-M3)."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -14,9 +13,8 @@ from numpy.typing import NDArray
 from laufruhe.errors import UncarriedLoadError
 from laufruhe.machine import Mount
 from laufruhe.machine.mount import every_spring
-from laufruhe.numerics.composed import Mapped
 from laufruhe.numerics.namespaces import NUMBERS
-from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.numerics.spectrum import Mapped, Spectrum
 from laufruhe.physics.rigid_body import point_motion
 from laufruhe.physics.wrench import WRENCH
 
@@ -26,7 +24,7 @@ UNCARRIED_SHARE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class RigidMounting:
-    """The linear map from the wrench on the block to the forces on the mounts.
+    """Linear map from the wrench on the block to the forces on the mounts.
 
     Attributes
     ----------
@@ -43,7 +41,7 @@ class RigidMounting:
     arm: float
 
     def forces(self, wrench: Spectrum, speed: float = 0.0) -> Spectrum:  # noqa: ARG002
-        """Mount forces by order, shape (n, mounts, 3) [N]; the same at every speed.
+        """Return the mount forces by order, shape (n, mounts, 3) [N]; equal at every speed.
 
         Raises
         ------
@@ -51,40 +49,23 @@ class RigidMounting:
             If the wrench drives a direction that no mount carries.
         """
         self.check_carried(wrench)
-        return Mapped(wrench, self._carried)
+        return Mapped(wrench, self._forces_of)
 
-    def _carried(self, loads: NDArray[Any]) -> NDArray[Any]:
-        """Forces of real or complex loads (n, 6), shape (n, mounts, 3)."""
-        if loads.dtype.kind == "c":
-            # of real numbers alone the product takes half the time
-            forces = (np.ascontiguousarray(loads).view(float) @ self._parts).view(complex)
-            return np.asarray(forces.reshape(-1, len(self.maps), 3))
-        # in memory mount by mount, as norms take their rows
-        return np.asarray((loads @ self._each).swapaxes(0, 1))
+    def _forces_of(self, loads: NDArray[Any]) -> NDArray[Any]:
+        # in memory mount by mount, as norms read their rows
+        return np.asarray((loads @ self._columns).swapaxes(0, 1))
 
     @cached_property
-    def _each(self) -> NDArray[np.float64]:
-        """The map to each mount, shape (mounts, 6, 3)."""
+    def _columns(self) -> NDArray[np.float64]:
         return np.ascontiguousarray(self.maps.swapaxes(1, 2))
 
-    @cached_property
-    def _parts(self) -> NDArray[np.float64]:
-        """The map from real and imaginary parts to real and imaginary parts, shape (12, 6 mounts)."""
-        return np.asarray(np.kron(self.maps.reshape(-1, 6).T, np.eye(2)), dtype=float)
-
-    @cached_property
-    def _leak(self) -> NDArray[np.float64]:
-        """From real and imaginary parts to those of what is along the free directions, scaled, shape (12, 2 k)."""
-        return np.asarray(np.kron((self.free / _scales(self.arm)).T, np.eye(2)), dtype=float)
-
     def check_carried(self, wrench: Spectrum) -> None:
-        """Refuse a wrench that some direction lets through."""
-        if not len(self.free) or all(part.once("carried", self, self._is_carried) for part in wrench.parts):
+        """Refuse a wrench along a direction that no mount carries."""
+        along = wrench.coefficients @ (self.free / _scales(self.arm)).T
+        if not along.any():
             return
-        loads = wrench.coefficients
-        scaled = loads / _scales(self.arm)
-        size = float(np.abs(scaled).max(initial=0.0))
-        uncarried = np.abs((scaled @ self.free.T) @ self.free)
+        size = float(np.abs(wrench.coefficients / _scales(self.arm)).max(initial=0.0))
+        uncarried = np.abs(along @ self.free)
         if size > 0.0 and uncarried.max(initial=0.0) > UNCARRIED_SHARE * size:
             order, component = np.unravel_index(int(np.argmax(uncarried)), uncarried.shape)
             raise UncarriedLoadError(
@@ -92,20 +73,9 @@ class RigidMounting:
                 "carries; give a mount stiffness in that direction or a second place"
             )
 
-    def _is_carried(self, part: Spectrum) -> bool:
-        """Whether a part of a wrench has next to nothing along what is free, as most have."""
-        parts = np.ascontiguousarray(part.coefficients).view(float)
-        # squares of real and imaginary parts tell
-        along = parts @ self._leak
-        square = float(np.vdot(along, along))
-        if square == 0.0:
-            return not np.count_nonzero(along)
-        whole = float(np.vdot(parts, parts)) * (UNCARRIED_SHARE / max(self.arm, 1.0)) ** 2 / max(parts.size, 1)
-        return bool(self._leak.shape[1] * square <= whole < math.inf)
-
 
 def rigid_mounting(mounts: Sequence[Mount]) -> RigidMounting:
-    """F_i = K_i G_i (sum_j G_j^T K_j G_j)^+ w, by singular values (M1, M2).
+    """Return the mounting F_i = K_i G_i (sum_j G_j^T K_j G_j)^+ w, by singular values (M1, M2).
 
     Directions that no mount carries are left to `check_carried`; the scene may not
     drive them.

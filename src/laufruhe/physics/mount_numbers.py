@@ -1,4 +1,4 @@
-"""Numbers of a block on its mounts that designers ask for (E7, E9, E11, E14, E46, E47)."""
+"""Figures of a block on its mounts (E7, E9, E11, E14, E46, E47)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from laufruhe.physics.modes import static_motion, torque_roll_axis, weight_wrenc
 
 
 def transmitted(forces: Spectrum, firm: Spectrum, orders: Sequence[float] | None) -> float:
-    """Force on elastic mounts over that on the same mounts if they gave no way (E11).
+    """Return the force on elastic mounts over that on the same mounts if rigid (E11).
 
     Both are the root of the sum of squares over mounts; the largest of the orders named,
     or all orders above zero together. Zero where nothing excites.
@@ -34,23 +34,23 @@ def _ratio(forces: NDArray[np.complex128], firm: NDArray[np.complex128]) -> floa
 
 
 def sag(mounting: ElasticMounting) -> float:
-    """How far the centre of gravity sinks under its own weight [m] (E9)."""
+    """Return the static sag of the centre of gravity under the weight [m] (E9)."""
     return float(-static_motion(mounting.modes, weight_wrench(mounting.block))[2])
 
 
 def decoupling(energy: Any, motions: Sequence[int]) -> float:
-    """Least share of a motion in the mode that is most its own (E7)."""
+    """Return the least energy share of a motion in its dominant mode (E7)."""
     return float(min(energy[motion].max() for motion in motions))
 
 
 def decoupling_shortfall(energy: Any, motions: Sequence[int], wanted: float) -> float:
-    """Sum over motions of what is wanting to a share in the mode that is most its own (E47)."""
+    """Return the summed shortfall of energy shares in dominant modes from `wanted` (E47)."""
     return float(sum(max(wanted - energy[motion].max(), 0.0) for motion in motions))
 
 
 @dataclass(frozen=True, eq=False)
 class AxisResidual:
-    """What turning about the torque-roll axis lacks to be a mode, |left A right - s mass| with s between bounds.
+    """Distance of a rotation about the torque-roll axis from a mode, |left A right - s mass|, s bounded.
 
     A is the stiffness in coordinates in which the mass is one. The least s is known in closed form, so that the
     residual is the distance of an affine function of A from a line: convex in stiffness.
@@ -72,20 +72,20 @@ class AxisResidual:
     most: float
 
     def answer(self, matrix: Any) -> Any:
-        """left A right; of symbols as well."""
+        """Return left A right, also for symbols."""
         return self.left @ matrix @ self.right
 
     def nearest(self, answer: Array) -> float:
-        """The s that leaves least."""
+        """Return the s with the least residual."""
         return float(np.clip(self.mass @ answer / (self.mass @ self.mass), self.least, self.most))
 
     def rows(self, matrix: Array) -> Array:
-        """left A right - s mass at the best s, shape (6,)."""
+        """Return left A right - s mass at the best s, shape (6,)."""
         answer = np.asarray(self.answer(matrix))
         return answer - self.nearest(answer) * self.mass
 
     def under(self, z: Array) -> tuple[Array, float]:
-        """y of length one at most, and c: y' left A right - c is nowhere over the residual (E19, E46)."""
+        """Return y, |y| <= 1, and c such that y' left A right - c never exceeds the residual (E19, E46)."""
         y = z / max(float(np.linalg.norm(z)), 1.0)
         along = float(y @ self.mass)
         if self.most == np.inf and along > 0.0:
@@ -99,20 +99,19 @@ Band: TypeAlias = tuple[float, float]
 
 
 def relative_residual(block: Block, band: Band) -> AxisResidual:
-    """|A t / w^2 - t|, t the turning of length one in coordinates in which the mass is one (E14)."""
+    """Return |A t / w^2 - t|, t the unit rotation in coordinates in which the mass is one (E14)."""
     along = _along(block)
     return AxisResidual(np.eye(6) / (2.0 * np.pi * band[0]) ** 2, along, along, 1.0, 1.0)
 
 
 def raw_residual(block: Block, band: Band) -> AxisResidual:
-    """|K q - w^2 M q|, q one radian about the torque-roll axis, in N and N m for each radian (E46)."""
+    """Return |K q - w^2 M q|, q one radian about the torque-roll axis [N, N m per rad] (E46)."""
     root, motion = np.asarray(np.linalg.cholesky(block.mass_matrix), dtype=np.float64), _turning(block)
     low, high = ((2.0 * np.pi * frequency) ** 2 for frequency in band)
     return AxisResidual(root, root.T @ motion, block.mass_matrix @ motion, low, high)
 
 
 def _turning(block: Block) -> Array:
-    """One radian about the torque-roll axis, shape (6,)."""
     return np.asarray(np.concatenate([np.zeros(3), torque_roll_axis(block)]), dtype=np.float64)
 
 
@@ -122,23 +121,23 @@ def _along(block: Block) -> Array:
 
 
 def mass_root(block: Block) -> Array:
-    """R with R M R' = 1: the transpose takes motion from coordinates in which the mass is one, shape (6, 6)."""
+    """Return R with R M R' = 1, shape (6, 6); its transpose maps unit-mass coordinates to motion."""
     return np.asarray(np.linalg.inv(np.linalg.cholesky(block.mass_matrix)))
 
 
 def residual_of(mounting: ElasticMounting, axis: AxisResidual) -> float:
-    """Of a block on its mounts."""
+    """Return the residual of a block on its mounts."""
     root = mass_root(mounting.block)
     return float(np.linalg.norm(axis.rows(root @ mounting.stiffness @ root.T)))
 
 
 def torque_roll_answer(mounting: ElasticMounting) -> float:
-    """|K q|: what the mounts answer to turning about the torque-roll axis by one radian (E46)."""
+    """Return |K q|, the mount forces and moments per radian about the torque-roll axis (E46)."""
     return float(np.linalg.norm(mounting.stiffness @ _turning(mounting.block)))
 
 
 def torque_roll_coupling(mounting: ElasticMounting) -> float:
-    """How far turning about the torque-roll axis is from being a mode of its own (E8).
+    """Return the distance of the rotation about the torque-roll axis from a mode, 0 to 1 (E8).
 
     0: a torque about the crank moves the block about that axis alone, at one natural
     frequency. 1: the mounts answer with nothing but other motions.
@@ -150,11 +149,11 @@ def torque_roll_coupling(mounting: ElasticMounting) -> float:
 
 
 def torque_roll_frequency(mounting: ElasticMounting) -> float:
-    """At which turning about the torque-roll axis is nearest to a mode, in raw coordinates [Hz] (E46)."""
+    """Return the frequency at which rotation about the torque-roll axis is nearest to a mode [Hz] (E46)."""
     axis = raw_residual(mounting.block, (0.0, np.inf))
     return float(np.sqrt(axis.nearest(mounting.stiffness @ _turning(mounting.block))) / (2.0 * np.pi))
 
 
 def total_stiffness(mounts: Sequence[Mount]) -> float:
-    """Sum of all stiffnesses along the mounts' own axes [N/m]."""
+    """Return the sum of all stiffnesses along the mounts' own axes [N/m]."""
     return float(sum(sum(spring.stiffness) for _, spring in every_spring(mounts)))

@@ -1,4 +1,4 @@
-"""What holds an engine: a linear map from the wrench on its block to the forces on its mounts."""
+"""Mounting of an engine: linear map from the wrench on its block to its mount forces."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from laufruhe.physics.time_mounting import TimeMounting
 
 
 class Mounting(Protocol):
-    """Rigid or elastic; in the frequency domain linear in the wrench at every speed."""
+    """Rigid or elastic mounting; linear in the wrench in the frequency domain."""
 
     def forces(self, wrench: Spectrum, speed: float) -> Spectrum:
-        """Forces of the engine on its mounts, shape (n, mounts, 3) [N] (C7)."""
+        """Return the forces of the engine on its mounts, shape (n, mounts, 3) [N] (C7)."""
 
 
 def mounting_of(engine: Engine, fidelity: Fidelity = EXACT) -> Mounting | None:
-    """The mounting of an engine: elastic where its block is described, else rigid; None without mounts."""
+    """Return the mounting of an engine: elastic if its block is given, else rigid; None without mounts."""
     if not engine.mounts:
         return None
     if engine.block is None or fidelity.mounts == "rigid":
@@ -34,7 +34,7 @@ def mounting_of(engine: Engine, fidelity: Fidelity = EXACT) -> Mounting | None:
 
 
 def travel_of(engine: Engine, mounting: Mounting | None, wrench: Spectrum, speed: float) -> Spectrum | None:
-    """Displacement at every mount, shape (n, mounts, 3) [m]; None where there are no elastic mounts.
+    """Return the displacement at every mount, shape (n, mounts, 3) [m]; None without elastic mounts.
 
     Elastic mounts that are taken for rigid do not travel.
     """
@@ -46,7 +46,7 @@ def travel_of(engine: Engine, mounting: Mounting | None, wrench: Spectrum, speed
 
 
 def mount_maps(mounting: Mounting, order: float, speed: float) -> NDArray[np.complex128]:
-    """Mount forces per wrench at one order and speed, shape (mounts, 3, 6).
+    """Return the mount forces per wrench at one order and speed, shape (mounts, 3, 6).
 
     Raises
     ------

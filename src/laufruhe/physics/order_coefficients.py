@@ -43,7 +43,6 @@ def _poles(rod_ratio: float, offset_ratio: float) -> tuple[float, float, float]:
 
 
 def _complement(rod_ratio: float, offset_ratio: float) -> float:
-    """sqrt(1 - k^2) of k = lambda / (1 + epsilon), from sums taken exactly: near locking 1 - k is all rounding."""
     low = math.fsum((1.0, offset_ratio, -rod_ratio))
     high = math.fsum((1.0, offset_ratio, rod_ratio))
     return math.sqrt(low * high) / (1.0 + offset_ratio)
@@ -61,7 +60,7 @@ def _power_series(power: float, q1: float, q2: float, difference: float, terms: 
 
 @lru_cache(maxsize=1024)
 def orders_needed(rod_ratio: float, offset_ratio: float = 0.0) -> int:
-    """Order beyond which every coefficient is under 1e-18 of the first, times its order squared.
+    """Return the order beyond which every coefficient is under 1e-18 of the first, times its order squared.
 
     Raises
     ------
@@ -82,7 +81,7 @@ def orders_needed(rod_ratio: float, offset_ratio: float = 0.0) -> int:
 
 @lru_cache(maxsize=256)
 def cos_psi_power_orders(power: float, rod_ratio: float, offset_ratio: float, highest: int) -> ComplexArray:
-    """Two-sided coefficients of (cos psi)^power, orders -highest ... highest (K9).
+    """Return the two-sided coefficients of (cos psi)^power, orders -highest ... highest (K9).
 
     Returns
     -------
@@ -103,7 +102,7 @@ def _fixed(found: ComplexArray) -> ComplexArray:
 
 @lru_cache(maxsize=256)
 def piston_acceleration_orders(rod_ratio: float, offset_ratio: float = 0.0, highest: int | None = None) -> ComplexArray:
-    """Coefficients of s''/r: c_1 = -1 - ..., c_2 = -(lambda + lambda^3/4 + ...) (K10).
+    """Return the coefficients of s''/r: c_1 = -1 - ..., c_2 = -(lambda + lambda^3/4 + ...) (K10).
 
     Parameters
     ----------
@@ -128,7 +127,6 @@ def piston_acceleration_orders(rod_ratio: float, offset_ratio: float = 0.0, high
 
 
 def _two_sided(one_sided: ComplexArray) -> ComplexArray:
-    """f = Re sum c_h e^{ih} as a symmetric series over -n ... n."""
     half = one_sided / 2.0
     return np.concatenate([half[:0:-1].conj(), [one_sided[0].real], half[1:]])
 
@@ -141,7 +139,6 @@ def _one_sided(two_sided: ComplexArray, highest: int) -> ComplexArray:
 
 
 def _velocity(rod_ratio: float, offset_ratio: float, highest: int) -> ComplexArray:
-    """s'/r, one-sided: the integral of s''/r, which has no mean."""
     acceleration = piston_acceleration_orders(rod_ratio, offset_ratio, highest)
     h = np.arange(highest + 1)
     h[0] = 1
@@ -150,7 +147,7 @@ def _velocity(rod_ratio: float, offset_ratio: float, highest: int) -> ComplexArr
 
 @lru_cache(maxsize=256)
 def inertia_roll_orders(rod_ratio: float, offset_ratio: float, ratio: float, highest: int) -> ComplexArray:
-    """Coefficients of -s''/r (n s'/r + e/r), for a crank of ratio n (L3).
+    """Return the coefficients of -s''/r (n s'/r + e/r), for a crank of ratio n (L3).
 
     Times m r^2 (n w)^2 it is the roll moment of the reciprocating mass.
     """
@@ -164,7 +161,7 @@ def inertia_roll_orders(rod_ratio: float, offset_ratio: float, ratio: float, hig
 
 @lru_cache(maxsize=256)
 def rod_roll_orders(rod_ratio: float, offset_ratio: float, ratio: float, highest: int) -> ComplexArray:
-    """Coefficients of -psi'' (1 + n psi'), for a crank of ratio n (L4).
+    """Return the coefficients of -psi'' (1 + n psi'), for a crank of ratio n (L4).
 
     Times dTheta (n w)^2 it is the roll moment of the rod's inertia deficit.
     """

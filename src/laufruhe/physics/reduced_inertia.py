@@ -1,4 +1,4 @@
-"""What pistons and rods reduce to the crank on the mean, and the inertia of what turns beside them (V1, V14)."""
+"""Mean reduced inertia of pistons and rods, and the inertia that turns beside them (V1, V14)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _STEPS = 1024
 
 
 def reduced_inertia(part: SliderCrank) -> float:
-    """Mean over a turn of what piston and rod reduce to the crank, and the mass at its pin [kg m2] (V1; textbook 2.9).
+    """Return the mean inertia of piston, rod and pin mass reduced to the crank [kg m2] (V1; textbook 2.9).
 
     With a long rod half the reciprocating mass at the crank radius.
     """
@@ -30,7 +30,7 @@ def _reduced_inertia(part: SliderCrank) -> float:
 
 
 def turning_inertia(engine: Engine, fidelity: Fidelity) -> float | None:
-    """Inertia beside pistons and rods [kg m2], of an uneven speed, the flywheel, or a part of an extension.
+    """Return the inertia beside pistons and rods [kg m2]: of uneven speed, flywheel or extension; else None.
 
     None where none of these is told.
     """

@@ -1,4 +1,4 @@
-"""Mixed cycle, its cut-off solved for the indicated mean pressure wanted."""
+"""Mixed cycle whose cut-off is solved for the requested indicated mean pressure."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ROUNDING = 1e-12
 
 
 def seiliger_pressure(gas: Seiliger, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
-    """Pressure [Pa] of the mixed cycle at crank angles gamma [rad], shape of `angles` (G4, G5).
+    """Return the pressure [Pa] of the mixed cycle at crank angles gamma [rad], shape of `angles` (G4, G5).
 
     Raises
     ------
@@ -40,7 +40,7 @@ def seiliger_pressure(gas: Seiliger, part: SliderCrank, cycle: Cycle, angles: Ar
 
 @lru_cache(maxsize=64)
 def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
-    """Volume at the cut-off over the smallest volume, solved for the indicated mean pressure (G6).
+    """Return cut-off volume over smallest volume, solved for the indicated mean pressure (G6).
 
     The mean pressure rises with the cut-off all the way, from heat at constant volume
     alone (1) to constant pressure down the whole stroke (the compression ratio).
@@ -75,7 +75,7 @@ def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
 
 
 def cut_off_angle(gas: Seiliger, part: SliderCrank, cycle: Cycle) -> float:
-    """Crank angle from the firing dead centre at which the heat ends [rad] (G5)."""
+    """Return the crank angle after the firing dead centre at which the heat ends [rad] (G5)."""
     top, bottom = dead_centres(part)
     ratio, smallest = part.shaft.ratio, ChargedCylinder(gas, part, cycle).smallest
     wanted = part.travel(np, part.dead_centres[0]) + part.stroke * smallest * (seiliger_cut_off(gas, cycle) - 1.0)
@@ -89,12 +89,12 @@ def cut_off_angle(gas: Seiliger, part: SliderCrank, cycle: Cycle) -> float:
 
 
 def compression_end_pressure(gas: Seiliger) -> float:
-    """Pressure at the smallest volume before heat comes [Pa] (G4)."""
+    """Return the pressure at the smallest volume before heat is added [Pa] (G4)."""
     return float(gas.intake_pressure * gas.compression_ratio**gas.compression_exponent)
 
 
 def motored_cycle(gas: Seiliger | Wiebe, cycle: Cycle) -> Seiliger:
-    """The same charge without heat: expansion follows compression back (G4, G5 with peak p_c and n_2 = n_1).
+    """Return the same charge without heat: expansion retraces compression (G4, G5 with peak p_c and n_2 = n_1).
 
     Its indicated mean pressure is that of the gas exchange alone.
     """
@@ -112,7 +112,7 @@ def motored_cycle(gas: Seiliger | Wiebe, cycle: Cycle) -> Seiliger:
 
 
 def seiliger_imep(gas: Seiliger, cycle: Cycle, cut_off_ratio: float) -> float:
-    """Indicated mean pressure of the mixed cycle for a cut-off, in closed form [Pa] (G6).
+    """Return the indicated mean pressure of the mixed cycle for a cut-off, in closed form [Pa] (G6).
 
     Parameters
     ----------
@@ -127,6 +127,5 @@ def seiliger_imep(gas: Seiliger, cycle: Cycle, cut_off_ratio: float) -> float:
 
 
 def _polytropic_work(ratio: float, exponent: float) -> float:
-    """Work of an expansion by a volume ratio, over p V at its small end; any exponent, 1 included."""
     power, log = exponent - 1.0, math.log(ratio)
     return -math.expm1(-power * log) / power if power != 0.0 else log

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank
-from laufruhe.numerics.composed import Summed, held
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.numerics.turns import cancelling_sums
 from laufruhe.physics.crank_torque import crank_torque
@@ -31,7 +30,7 @@ _Parts: TypeAlias = tuple[complex, ...]
 
 
 def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Wrench on the block from everything that moves (C7).
+    """Return the wrench on the block from everything that moves (C7).
 
     Returns
     -------
@@ -46,7 +45,7 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
         return uneven_loads(engine, point, fidelity)
     gas = fidelity.gas_of(point)
     moving, pins = _slider_crank_loads(engine.cycle, engine.slider_cranks, point.speed, gas, fidelity)
-    total = Summed(moving, _turning_loads(pins, engine.rotors, point.speed, engine.cycle))
+    total = moving + _turning_loads(pins, engine.rotors, point.speed, engine.cycle)
     return total + added_geared_loads(engine, point, fidelity) if engine.geared else total
 
 
@@ -54,26 +53,25 @@ def shaking_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EX
 def _slider_crank_loads(
     cycle: Cycle, parts: tuple[SliderCrank, ...], speed: float, gas: GasModel | None, fidelity: Fidelity
 ) -> tuple[Spectrum, _Turning]:
-    """Pistons, rods and gas, and masses at the pins: the same for every design that differs in its rotors alone."""
     engine = Engine("pistons, rods and gas", cycle, parts)
     total = star_loads(engine, speed, lambda part: effects_of(part, fidelity))
     if gas is not None:
         total = total + gas_loads(engine, gas, fidelity)
-    return held(fidelity.kept(total)), _turning(engine.pins, speed, cycle)
+    return fidelity.kept(total), _turning(engine.pins, speed, cycle)
 
 
 def forget() -> None:
-    """Drop the loads that are remembered, for whoever measures what they cost."""
+    """Clear the cache of loads, for timing."""
     _slider_crank_loads.cache_clear()
 
 
 def reciprocating_loads(engine: Engine, speed: float, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Inertia of the reciprocating masses: F = -m s'' along each axis, and its roll moment (L2, L3, L7)."""
+    """Return the inertia loads of reciprocating masses: F = -m s'' and its roll moment (L2, L3, L7)."""
     return star_loads(engine, speed, lambda part: mass_effects(part, fidelity))
 
 
 def rotor_loads(rotors: Iterable[Rotor], speed: float, cycle: Cycle) -> Spectrum:
-    """F = U (n w)^2 e^{i n phi} of each rotor, with its moments (L1).
+    """Return F = U (n w)^2 e^{i n phi} of the rotors, with its moments (L1).
 
     Returns
     -------
@@ -88,11 +86,10 @@ _NOTHING: _Turning = ([], ())
 
 
 def _turning(rotors: tuple[Rotor, ...], speed: float, cycle: Cycle) -> _Turning:
-    return _wrenches(rotors, speed), _indices(cycle, tuple([rotor.shaft.ratio for rotor in rotors]))
+    return _wrenches(rotors, speed), tuple([order_index(cycle, abs(rotor.shaft.ratio)) for rotor in rotors])
 
 
 def _turning_loads(known: _Turning, rotors: tuple[Rotor, ...], speed: float, cycle: Cycle) -> Spectrum:
-    """Of rotors whose wrenches are known, and of others beside them: what cancels among them all is zero."""
     (wrenches, indices), (own, own_indices) = known, _turning(rotors, speed, cycle)
     if not wrenches and not own:
         return Spectrum(cycle.base_order, np.zeros((1, 6), dtype=complex))
@@ -100,13 +97,8 @@ def _turning_loads(known: _Turning, rotors: tuple[Rotor, ...], speed: float, cyc
     return Spectrum(cycle.base_order, cancelling_sums(every, indices + own_indices))
 
 
-@lru_cache(maxsize=256)
-def _indices(cycle: Cycle, ratios: tuple[float, ...]) -> tuple[int, ...]:
-    return tuple(order_index(cycle, abs(ratio)) for ratio in ratios)
-
-
 def added_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Loads that the geared inertia of an engine makes, at even or uneven speed (L8, F5)."""
+    """Return the loads of the geared inertia of an engine, at even or uneven speed (L8, F5)."""
     if fidelity.is_uneven:
         return uneven_geared_loads(engine, point, fidelity)
     return geared_moment(engine, crank_torque(engine, point, fidelity))
@@ -115,19 +107,18 @@ def added_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity
 def added_rotor_loads(
     rotors: Sequence[Rotor], engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT
 ) -> Spectrum:
-    """Loads that rotors alone would add to an engine at an operating point, at even or uneven speed (L1, F5)."""
+    """Return the loads that rotors add to an engine at an operating point, at even or uneven speed (L1, F5)."""
     if fidelity.is_uneven:
         return uneven_rotor_loads(rotors, engine, point, fidelity)
     return rotor_loads(rotors, point.speed, engine.cycle)
 
 
 def rotor_wrench(rotor: Rotor, speed: float) -> NDArray[np.complex128]:
-    """Coefficient of order |n| of one rotor's wrench, shape (6,) (L1)."""
+    """Return the coefficient of order |n| of one rotor's wrench, shape (6,) (L1)."""
     return np.array(_wrenches((rotor,), speed)[0], dtype=complex)
 
 
 def _wrenches(rotors: Sequence[Rotor], speed: float) -> list[_Parts]:
-    """Of each rotor the six parts."""
     wrenches: list[_Parts] = []
     for rotor in rotors:
         shaft = rotor.shaft

@@ -21,7 +21,7 @@ from laufruhe.physics.wrench import ROLL
 
 
 def split_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> tuple[Spectrum, Spectrum | None]:
-    """Wrench per square of crank speed [N s2, N m s2], and that of the gas, which speed does not change [N, N m]."""
+    """Return the wrench per squared crank speed [N s2, N m s2], and that of the gas [N, N m] or None."""
     inertia = shaking_loads(engine, replace(point, speed=1.0, gas=None), fidelity)
     gas = fidelity.gas_of(point)
     if gas is None:
@@ -32,7 +32,7 @@ def split_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXAC
 
 @dataclass(frozen=True, eq=False)
 class SpeedMap:
-    """Field over speed and order.
+    """Mount forces over speed and order.
 
     Attributes
     ----------
@@ -55,26 +55,26 @@ class SpeedMap:
 
     @cached_property
     def firm(self) -> ComplexArray:
-        """Mount forces if the mounts gave no way, shape (s, n, mounts, 3) [N]."""
+        """Mount forces on rigid mounts, shape (s, n, mounts, 3) [N]."""
         return _over_speeds(self.growth, self.parts)
 
     @property
     def transmissibility(self) -> Array:
-        """Per speed and order, shape (s, n); zero where nothing excites (E11)."""
+        """Transmissibility over speed and order, shape (s, n); zero without excitation (E11)."""
         over, under = (np.sqrt(np.sum(np.abs(f) ** 2, axis=(2, 3))) for f in (self.forces, self.firm))
         floor = 1e-12 * under.max(initial=0.0)
         return np.asarray(np.where(under > floor, over / np.where(under > floor, under, 1.0), 0.0))
 
     @property
     def total(self) -> Array:
-        """All orders above zero together, shape (s,) (E11)."""
+        """Transmissibility of all orders above zero together, shape (s,) (E11)."""
         dynamic = self.orders > 0.0
         over, under = (np.sqrt(np.sum(np.abs(f[:, dynamic]) ** 2, axis=(1, 2, 3))) for f in (self.forces, self.firm))
         return np.asarray(np.where(under > 0.0, over / np.where(under > 0.0, under, 1.0), 0.0))
 
     @property
     def rms(self) -> Array:
-        """Root mean square over cycle and mounts of what is not steady, shape (s,) [N]."""
+        """Root mean square of the alternating force over cycle and mounts, shape (s,) [N]."""
         dynamic = self.forces[:, self.orders > 0.0]
         return np.asarray(np.sqrt(0.5 * np.sum(np.abs(dynamic) ** 2, axis=(1, 2, 3)) / dynamic.shape[2]))
 
@@ -87,7 +87,7 @@ def speed_map(
     least: float = 1e-7,
     wanted: Sequence[float] | None = None,
 ) -> SpeedMap:
-    """Mount forces at many speeds under the loads of `split_loads`, all orders and speeds solved together.
+    """Return the mount forces at many speeds under the loads of `split_loads`, all orders and speeds solved together.
 
     Orders under the share `least` of the largest, at every speed, are left out, and those that are not `wanted`.
     """
@@ -114,7 +114,6 @@ def speed_map(
 
 
 def _over_speeds(growth: Sequence[Array], parts: Sequence[ComplexArray]) -> ComplexArray:
-    """Sum of parts, each with its growth over speed, shape (speeds, ...)."""
     total = np.multiply.outer(growth[0], parts[0])
     for grown, part in zip(growth[1:], parts[1:], strict=True):
         total += np.multiply.outer(grown, part)

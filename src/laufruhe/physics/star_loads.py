@@ -17,7 +17,7 @@ from laufruhe.physics.wrench import ROLL, plane_parts
 
 
 def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]) -> Spectrum:
-    """(coefficients of one cylinder) x (phase and weight of each), summed over the star, shape (n, 6) (L6)."""
+    """Return (coefficients of one cylinder) x (phase and weight of each), summed over the star, shape (n, 6) (L6)."""
     cycle = engine.cycle
     alike: dict[Hashable, list[tuple[int, Effect]]] = defaultdict(list)
     for k, part in enumerate(engine.slider_cranks):
@@ -31,7 +31,7 @@ def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], It
 
 
 def _load_of_alike(engine: Engine, speed: float, members: Sequence[tuple[int, Effect]]) -> NDArray[np.complex128]:
-    """Of effects alike of cylinders by their numbers, by the orders of the cycle."""
+    """Return the load of equal effects of cylinders, by the orders of the cycle."""
     series = members[0][1].series()
     parts = [engine.slider_cranks[k] for k, _ in members]
     sizes = np.array([own.size * square_of(part, speed) for part, (_, own) in zip(parts, members, strict=True)])
@@ -45,7 +45,7 @@ def _load_of_alike(engine: Engine, speed: float, members: Sequence[tuple[int, Ef
 
 
 def spread(load: NDArray[np.complex128], step: int) -> NDArray[np.complex128]:
-    """A load by order of its own crank angle, shape (n, d), in orders of the cycle, `step` to one of its own."""
+    """Spread a load by order of its own crank angle, shape (n, d), to orders of the cycle, `step` to one of its own."""
     if step == 1:
         return load
     out = np.zeros(((len(load) - 1) * step + 1, load.shape[1]), dtype=complex)
@@ -55,26 +55,20 @@ def spread(load: NDArray[np.complex128], step: int) -> NDArray[np.complex128]:
 
 @lru_cache(maxsize=1024)
 def order_index(cycle: Cycle, order: float) -> int:
-    """Of an order of crank speed among those of a cycle."""
+    """Return the index of an order of crank speed among those of a cycle."""
     return int(as_order(order) / cycle.base_order)
 
 
 def square_of(part: SliderCrank, speed: float) -> float:
-    """Of the speed of its own crank [rad2/s2]."""
+    """Return the squared speed of a cylinder's own crank [rad2/s2]."""
     return (part.shaft.ratio * speed) ** 2
 
 
 def _weight(part: SliderCrank, direction: Direction) -> tuple[float, ...]:
-    """Wrench of a unit load of a cylinder: a force along its axis or across it, or a roll moment."""
     if direction is Direction.ROLL:
         return _ROLL
-    axis = _axis(part.bank) * (1j if direction is Direction.TRANSVERSE else 1.0)
+    axis = cis(as_turn(part.bank)) * (1j if direction is Direction.TRANSVERSE else 1.0)
     return plane_parts(axis.imag, axis.real, part.x, part.shaft)
 
 
 _ROLL = tuple(ROLL.tolist())
-
-
-@lru_cache(maxsize=256)
-def _axis(bank: float) -> complex:
-    return cis(as_turn(bank))

@@ -1,4 +1,4 @@
-"""Every star that throws may form, grown throw by throw in blocks of bounded memory (S2, S3)."""
+"""Enumeration of crank stars, throw by throw in blocks of bounded memory (S2, S3)."""
 
 from __future__ import annotations
 
@@ -40,17 +40,17 @@ class StarSpace:
 
     @property
     def throws(self) -> int:
-        """Throws of a star."""
+        """Number of throws."""
         return len(self.places)
 
     @property
     def first(self) -> tuple[int, ...]:
-        """One of the stars: throws on the steps in their order."""
+        """First star: throws on the steps in their order."""
         return tuple(step for step, times in enumerate(self.patterns[0]) for _ in range(times))
 
     @property
     def size(self) -> int:
-        """Stars with the first throw on step 0, images counted."""
+        """Number of stars with the first throw on step 0, images counted."""
         total = 0
         for pattern in self.patterns:
             rest = [pattern[0] - 1, *pattern[1:]]
@@ -58,11 +58,11 @@ class StarSpace:
         return total
 
     def canonical(self, stars: Stars) -> Stars:
-        """One of each star's images, the same for all of them."""
+        """Return the canonical image of each star."""
         return canonical(stars, self.phases, self.mirror, self.reflect)
 
     def blocks(self) -> Iterator[Stars]:
-        """All stars, one of each set of images, in blocks (n, throws)."""
+        """Yield all stars, one of each set of images, in blocks (n, throws)."""
         for root in self.roots:
             for block in _grown(self, root):
                 own = np.all(self.canonical(block) == block, axis=1)
@@ -103,48 +103,34 @@ class Partial:
 
 
 def outside_in(throws: int) -> tuple[int, ...]:
-    """First, last, second, last but one ...: images are told apart from both ends."""
+    """Return the order first, last, second, ... of throws: it distinguishes images early."""
     return tuple(k // 2 if k % 2 == 0 else throws - 1 - k // 2 for k in range(throws))
 
 
 def _grown(space: StarSpace, first: Partial) -> Iterator[Stars]:
-    # depth first over blocks: what waits never exceeds a block for every throw and step
+    # depth first, so that at most a block for every throw and step waits
     waiting = [first]
     while waiting:
         partial = waiting.pop()
         if not partial.open:
             yield partial.stars
             continue
-        child = _next(space, partial)
-        for start in range(0, len(child.stars), BLOCK):
+        rows, steps = np.nonzero(partial.counts)
+        stars, counts = partial.stars[rows], partial.counts[rows]
+        stars[:, partial.open[0]] = steps
+        counts[np.arange(len(rows)), steps] -= 1
+        placed, left = (*partial.placed, partial.open[0]), partial.open[1:]
+        first_images = _first_of_images(space, Partial(stars, counts, placed, left))
+        stars, counts = stars[first_images], counts[first_images]
+        for start in range(0, len(stars), BLOCK):
             part = slice(start, start + BLOCK)
-            waiting.append(Partial(child.stars[part], child.counts[part], child.placed, child.open))
-
-
-def _next(space: StarSpace, partial: Partial) -> Partial:
-    child = _children(partial)
-    return _kept(child, _first_of_images(space, child))
-
-
-def _children(partial: Partial) -> Partial:
-    rows, steps = np.nonzero(partial.counts)
-    stars, counts = partial.stars[rows], partial.counts[rows]
-    stars[:, partial.open[0]] = steps
-    counts[np.arange(len(rows)), steps] -= 1
-    return Partial(stars, counts, (*partial.placed, partial.open[0]), partial.open[1:])
-
-
-def _kept(partial: Partial, keep: NDArray[np.bool_]) -> Partial:
-    if keep.all():
-        return partial
-    return Partial(partial.stars[keep], partial.counts[keep], partial.placed, partial.open)
+            waiting.append(Partial(stars[part], counts[part], placed, left))
 
 
 def _first_of_images(space: StarSpace, partial: Partial) -> NDArray[np.bool_]:
-    """Whether no image of the whole star can already be seen to come earlier (S2).
+    """Return a mask of stars of which no image is already known to come earlier (S2).
 
-    An image compares with its star throw by throw from the front; as far as the steps
-    that both need are placed, the comparison is already decided.
+    Image and star compare throw by throw from the front, as far as the steps that both need are placed.
     """
     keep = np.ones(len(partial.stars), dtype=bool)
     placed, last = set(partial.placed), space.throws - 1

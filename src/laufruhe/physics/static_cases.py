@@ -1,4 +1,4 @@
-"""Where a block settles on its mounts under a load that is held, bump stops included (E55).
+"""Equilibrium of a block on its mounts under a static load, bump stops included (E55).
 
     K q + sum T' s (T q - gap) = w    beyond the gaps
 
@@ -43,17 +43,17 @@ class Stops:
     directions: Array
 
     def beyond(self, travel: Array) -> Array:
-        """What of travels is beyond the gaps, shape (..., 3 springs)."""
+        """Return the part of travels beyond the gaps, shape (..., 3 springs)."""
         return np.asarray(travel - np.clip(travel, -self.gaps, self.gaps))
 
     def added(self, met: Mask) -> Array:
-        """Stiffness of those that are met, shape (..., 6, 6), of a mask (..., 3 springs)."""
+        """Return the stiffness of a mask of met stops (..., 3 springs), shape (..., 6, 6)."""
         return np.asarray((self.rows.T * (met * self.stiffness)[..., None, :]) @ self.rows)
 
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """A block under a load that is held.
+    """Equilibrium of a block under a static load.
 
     Attributes
     ----------
@@ -72,14 +72,14 @@ class Settled:
 
 
 def case_wrench(block: Block, case: LoadCase) -> Array:
-    """Of a load case about the centre of gravity, shape (6,) [N, N m]."""
+    """Return the wrench of a load case about the centre of gravity, shape (6,) [N, N m]."""
     arm = np.array(case.place) - np.array(block.centre_of_gravity)
     weight = block.mass * GRAVITY * np.array(case.times_weight)
     return np.concatenate([weight + case.force, np.array(case.moment) + np.cross(arm, case.force)])
 
 
 def stops_of(mounting: ElasticMounting) -> Stops:
-    """Of a mounting."""
+    """Return the stops of a mounting."""
     found = every_spring(mounting.mounts)
     rows = np.array([np.array(spring.orientation) @ mounting.motions[place] for place, spring in found])
     directions = np.zeros((3 * len(mounting.mounts), 3 * len(found)))
@@ -91,7 +91,7 @@ def stops_of(mounting: ElasticMounting) -> Stops:
 
 
 def settled(mounting: ElasticMounting, case: LoadCase) -> Settled:
-    """Where the block stands under a load case (E55).
+    """Return the equilibrium of the block under a load case (E55).
 
     Raises
     ------
@@ -109,7 +109,7 @@ def settled(mounting: ElasticMounting, case: LoadCase) -> Settled:
 
 
 def _balanced(stiffness: Array, stops: Stops, wrench: Array) -> Array:
-    """q of least energy, shape (6,)."""
+    """Return the motion of least energy, shape (6,)."""
 
     def energy(q: Array) -> float:
         over = stops.beyond(stops.rows @ q)

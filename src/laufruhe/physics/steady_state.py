@@ -32,7 +32,7 @@ ROUNDING = 100.0
 
 @dataclass(frozen=True, eq=False)
 class SteadyState:
-    """One period of the motion that repeats itself, at equal crank angles [rad], shape (n,).
+    """Single period of a periodic motion at equal crank angles [rad], shape (n,).
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class SteadyState:
 def periodic_state(
     mounting: ElasticMounting, wrench: Spectrum, speed: float, samples: int = 360, tolerance: float = 1e-11
 ) -> SteadyState:
-    """Steady state by integration over one period, shot until it closes (E28).
+    """Return the steady state by integration over one period, shot until it closes (E28).
 
     The start that repeats itself is found by Newton's method; the columns of its matrix
     are integrated beside the motion itself.
@@ -99,7 +99,6 @@ def motion_rates(model: TimeModel, load: Callable[[float], Array]) -> Callable[[
 def _over_period(
     rates: Callable[[float, Array], Array], start: Array, until: float, tolerance: float, times: Array | None = None
 ) -> Array:
-    """States from a start on, those of several columns one below the other."""
     scale = float(np.abs(start).max(initial=0.0)) or 1e-6
     return integrated(
         rates, (0.0, until), start.reshape(-1), "DOP853", t_eval=times, rtol=tolerance,
@@ -108,14 +107,14 @@ def _over_period(
 
 
 def integrated(*told: Any, **more: Any) -> Array:
-    """States that SciPy finds; loaded late, for a check or a solve needs none of it."""
+    """Integrate by SciPy, which is loaded late, and return the states."""
     from scipy.integrate import solve_ivp
 
     return np.asarray(solve_ivp(*told, **more).y)
 
 
 def _shot(run: Callable[[Array], Array], count: int, size: float, tolerance: float, has_stops: bool) -> Array:
-    """The start (y, y'), shape (2 n,), that one period of `run` ends at again, by Newton's method from rest (E28)."""
+    """Find the start (y, y'), shape (2 n,), that one period of `run` returns to, by Newton's method from rest (E28)."""
     start, step = np.zeros(2 * count), size * 1e-4
     for _ in range(MOST_SHOTS):
         ends = run(start[:, None] + np.column_stack([np.zeros(2 * count), step * np.eye(2 * count)]))

@@ -1,4 +1,4 @@
-"""What loads the sections of the running gear, and what its sizes make of that (Z1-Z9).
+"""Loads on the sections of the running gear, and stresses by their sizes (Z1-Z9).
 
 Every stress is a load inside the crankcase, linear in the masses, times a factor of the sizes alone. The crankshaft is
 cut in the middle of its journals, as the simple calculation of the sources has it (textbook 10.3; worked diesel G, H):
@@ -49,7 +49,7 @@ SPREAD = 2.0 / 3.0
 
 
 def pin_moments(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Bending moment in the middle of every crank pin, shape (n, cylinders, 3): the force that makes it, turned (Z3).
+    """Return the bending moment in the middle of every crank pin, shape (n, cylinders, 3), along its force (Z3).
 
     Raises
     ------
@@ -62,7 +62,7 @@ def pin_moments(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Sp
 
 
 def side_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """What every throw's piece of the shaft presses on the bearing before it and behind it, (n, 2 cylinders, 3) (Z4).
+    """Return the bearing forces before and behind every throw by its own piece of shaft, (n, 2 cylinders, 3) (Z4).
 
     Raises
     ------
@@ -82,12 +82,12 @@ def side_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Sp
 
 
 def journal_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Torque through every main bearing of all throws before it, the load at the rear (C3), (n, bearings) (Z5)."""
+    """Return the torque through every main bearing by the throws before it, (n, bearings), output at the rear (Z5)."""
     return _torques(engine, point, fidelity, [bearing.x for bearing in engine.bearings])
 
 
 def side_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """What bends the journals beside every throw, and the torque through them, shape (n, 2 cylinders, 4) (Z6)."""
+    """Return bending force and torque of the journals beside every throw, shape (n, 2 cylinders, 4) (Z6)."""
     forces = side_forces(engine, point, fidelity)
     places = [bearing.x for part in engine.slider_cranks for bearing in _span(engine, part)]
     torques = _torques(engine, point, fidelity, places)
@@ -96,14 +96,14 @@ def side_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spe
 
 
 def cap_forces(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """What masses alone pull on the caps of the big ends, as when the gas is exchanged, (n, cylinders, 3) (Z8)."""
+    """Return the pull of masses alone on the big-end caps, as during gas exchange, (n, cylinders, 3) (Z8)."""
     return pin_forces(engine, replace(point, gas=None), fidelity)
 
 
 def _shared(
     engine: Engine, point: OperatingPoint, fidelity: Fidelity, shares: Sequence[Callable[[float], float]]
 ) -> Spectrum:
-    """Sums of the loads of rods, webs and weights, each times a share of its place along the crankshaft."""
+    """Return sums of loads of rods, webs and weights, each times a share by its place along the crankshaft."""
     if any(part.shaft != CRANKSHAFT for part in engine.slider_cranks):
         raise ModelError("sections are sized of engines with one crankshaft")
     by_rod = np.array([[share(part.x) for part in engine.slider_cranks] for share in shares])
@@ -113,12 +113,8 @@ def _shared(
         own = np.array([share(rotor.x) for share in shares])
         if rotor.shaft == CRANKSHAFT and rotor.unbalance and own.any():
             load = rotor_loads((rotor,), point.speed, engine.cycle)
-            total = total + load.each(partial(_times, own))
+            total = total + load.each(lambda wrench: wrench[:, :3]).each(partial(np.einsum, "k,nd->nkd", own))
     return total
-
-
-def _times(share: Array, wrench: Array) -> Array:
-    return np.asarray(np.einsum("k,nd->nkd", share, wrench[:, :3]))
 
 
 def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, places: Sequence[float]) -> Spectrum:
@@ -129,16 +125,11 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, places: 
         behind = np.array([float(part.x > x) for x in places])
         if behind.any():
             own = crank_torque(replace(engine, slider_cranks=(part,)), point, fidelity)
-            total = total + own.each(partial(_outer, behind))
+            total = total + own.each(partial(np.einsum, "k,n->nk", behind))
     return total
 
 
-def _outer(share: Array, torque: Array) -> Array:
-    return np.multiply.outer(torque, share)
-
-
 def _span(engine: Engine, part: SliderCrank) -> tuple[Bearing, Bearing]:
-    """The main bearings next before and next behind a throw."""
     front = [b for b in engine.bearings if b.shaft == part.shaft and b.x > part.x]
     rear = [b for b in engine.bearings if b.shaft == part.shaft and b.x < part.x]
     if not front or not rear:
@@ -153,18 +144,15 @@ def _within(x: float, front: Bearing, rear: Bearing) -> bool:
 
 
 def _on_one_throw(part: SliderCrank, other: SliderCrank) -> bool:
-    """Whether two rods stand side by side on one pin, or on the two parts of a split one."""
     return abs(part.x - other.x) <= 1.5 * (part.big_end[1] if part.big_end else 0.0)
 
 
 def _lever(at: float, far: float, x: float) -> float:
-    """Share of a load at x that the support `at` carries of a piece that ends at `far`."""
     share = (far - x) / (far - at)
     return share if 0.0 <= share <= 1.0 else 0.0
 
 
 def _moment(section: float, front: Bearing, rear: Bearing, x: float) -> float:
-    """Bending moment at a section for each unit of load at x on its piece [m]."""
     if not _within(x, front, rear):
         return 0.0
     if x >= section:
@@ -176,19 +164,19 @@ def _moment(section: float, front: Bearing, rear: Bearing, x: float) -> float:
 
 
 def gear_of(engine: Engine) -> RunningGear:
-    """The running gear, which the engine must have."""
+    """Return the running gear of an engine, which must have one."""
     if engine.gear is None:
         raise ModelError("sizes of the running gear are asked for, and none are given; add [running_gear]")
     return engine.gear
 
 
 def big_end_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """One over the modulus of every crank pin [1/m3] (Z3)."""
+    """Return the reciprocal section modulus of every crank pin [1/m3] (Z3)."""
     return np.array([1.0 / round_modulus(_pin_size(part)[0]) for part in engine.slider_cranks])
 
 
 def web_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Stress of every web for each newton on its side, bending and pressure at its edge added, (2 cylinders,) (Z4)."""
+    """Return the web stress per newton on its side, bending plus pressure at its edge, (2 cylinders,) (Z4)."""
     webs = _part(engine, "webs", Webs)
     found = []
     for part in engine.slider_cranks:
@@ -200,12 +188,12 @@ def web_factors(engine: Engine, _: OperatingPoint) -> Array:
 
 
 def journal_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """One over the modulus of every journal against torsion [1/m3] (Z5)."""
+    """Return the reciprocal torsion modulus of every journal [1/m3] (Z5)."""
     return np.array([0.5 / round_modulus(_journal(bearing)[0]) for bearing in engine.bearings])
 
 
 def side_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Of force and torque in the edge of every journal beside a throw, shape (2 cylinders, 4) (Z6)."""
+    """Return edge stresses per force and torque of the journals beside a throw, shape (2 cylinders, 4) (Z6)."""
     rows = []
     for part in engine.slider_cranks:
         for diameter, width in map(_journal, _span(engine, part)):
@@ -215,39 +203,39 @@ def side_factors(engine: Engine, _: OperatingPoint) -> Array:
 
 
 def rod_stress_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """One over the section of every rod [1/m2] (Z7)."""
+    """Return the reciprocal section of every rod [1/m2] (Z7)."""
     return np.full(len(engine.slider_cranks), 1.0 / _part(engine, "rod", Shank).area)
 
 
 def buckling_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """One over the load that every rod buckles under, both ends hinged [1/N] (Z7; worked diesel H.a)."""
+    """Return the reciprocal buckling load of every rod, both ends hinged [1/N] (Z7; worked diesel H.a)."""
     stiffness = math.pi**2 * gear_of(engine).elastic_modulus * _part(engine, "rod", Shank).inertia
     return np.array([part.rod_length**2 / stiffness for part in engine.slider_cranks])
 
 
 def bolt_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """One over the section of the bolts of every big end [1/m2] (Z8)."""
+    """Return the reciprocal bolt section of every big end [1/m2] (Z8)."""
     return np.full(len(engine.slider_cranks), 1.0 / _part(engine, "bolts", Bolts).area)
 
 
 def boss_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """One over the area of every piston pin in its bosses [1/m2] (Z9; eq. 92)."""
+    """Return the reciprocal boss area of every piston pin [1/m2] (Z9; eq. 92)."""
     return _of_pins(engine, lambda pin: 1.0 / pin.boss_area)
 
 
 def pin_bending_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Bending stress of every piston pin for each newton [1/m2] (Z9)."""
+    """Return the bending stress of every piston pin per newton [1/m2] (Z9)."""
     return _of_pins(engine, lambda pin: SPREAD * 0.25 * pin.span / round_modulus(pin.diameter, pin.bore))
 
 
 def deflection_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """Deflection of every piston pin for each newton [m/N] (Z9; eq. 93)."""
+    """Return the deflection of every piston pin per newton [m/N] (Z9; eq. 93)."""
     modulus = gear_of(engine).elastic_modulus
     return _of_pins(engine, lambda pin: SPREAD * pin.span**3 / (48.0 * modulus * round_inertia(pin.diameter, pin.bore)))
 
 
 def ovality_factors(engine: Engine, _: OperatingPoint) -> Array:
-    """By how much every piston pin grows across the load, for each newton [m/N] (Z9; eq. 94)."""
+    """Return the ovalisation of every piston pin per newton [m/N] (Z9; eq. 94)."""
     modulus = gear_of(engine).elastic_modulus
 
     def factor(pin: PistonPin) -> float:
@@ -258,13 +246,13 @@ def ovality_factors(engine: Engine, _: OperatingPoint) -> Array:
 
 
 def journal_speeds(engine: Engine, point: OperatingPoint) -> Array:
-    """Speed of every journal over its projected area [1/(m s)] (Z10; worked diesel G.c.V)."""
+    """Return the speed of every journal over its projected area [1/(m s)] (Z10; worked diesel G.c.V)."""
     sizes = [(_journal(bearing), abs(bearing.shaft.ratio)) for bearing in engine.bearings]
     return np.array([0.5 * ratio * point.speed * d / (d * width) for (d, width), ratio in sizes])
 
 
 def throw_clearance(engine: Engine) -> float:
-    """What pin, webs and halves of the journals leave of the least distance between two main bearings [m] (Z11)."""
+    """Return the least space that pin, webs and half journals leave between two main bearings [m] (Z11)."""
     thickness = _part(engine, "webs", Webs).thickness
     found = []
     for part in engine.slider_cranks:
@@ -276,7 +264,7 @@ def throw_clearance(engine: Engine) -> float:
 
 
 def gear_mass(engine: Engine) -> float:
-    """Of all crank pins, webs, shanks and piston pins [kg] (Z2)."""
+    """Return the mass of all crank pins, webs, shanks and piston pins [kg] (Z2)."""
     gear = gear_of(engine)
     if gear.density is None:
         raise ModelError("the mass of the running gear is asked for, and its density is not given")

@@ -1,9 +1,8 @@
-"""Matrices of the block on its mounts in time, with bump stops and the fluid of hydraulic mounts (E25-E27, E50)."""
+"""Matrices of the block on its mounts in time, with bump stops and hydraulic mounts (E25-E27, E50)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,22 +56,22 @@ class TimeModel:
 
     @property
     def size(self) -> int:
-        """n: six, and one for each track."""
+        """Number n of coordinates: six, and one for each fluid track."""
         return len(self.stiffness)
 
     @property
     def has_stops(self) -> bool:
-        """Whether any bump stop can be met."""
+        """True if any bump stop can be met."""
         return bool(np.any((self.stops > 0.0) & np.isfinite(self.gaps)))
 
     def stop_forces(self, y: Array) -> Array:
-        """Forces of the stops along the own axes, shape (3 springs, times) of y (n, times) (E27)."""
+        """Return the stop forces along the own axes, shape (3 springs, times), of y (n, times) (E27)."""
         travel = self.travels @ y
         gaps = self.gaps[:, None]
         return np.asarray(self.stops[:, None] * (travel - np.clip(travel, -gaps, gaps)))
 
     def mount_forces(self, y: Array, rate: Array) -> Array:
-        """Forces of the engine on its mounts, shape (times, mounts, 3) of y, y' (n, times)."""
+        """Return the forces on the mounts, shape (times, mounts, 3), of y and y' (n, times)."""
         out = np.array((self.forces @ y + self.drag @ rate).T.reshape(y.shape[1], -1, 3))
         if self.has_stops:
             own = self.stop_forces(y).T.reshape(-1, len(self.turns), 3)
@@ -80,24 +79,20 @@ class TimeModel:
         return out
 
     def mount_travels(self, y: Array) -> Array:
-        """Travel of the mounts in the axes of C2, shape (times, mounts, 3) of y (n, times)."""
-        return np.asarray((self._travels_in_c2 @ y).T.reshape(y.shape[1], -1, 3))
-
-    @cached_property
-    def _travels_in_c2(self) -> Array:
-        """From y to the travel of every mount, shape (3 mounts, n)."""
+        """Return the deflection of the mounts in the axes of C2, shape (times, mounts, 3), of y (n, times)."""
         first = np.unique(self.places, return_index=True)[1]
         own = self.travels.reshape(len(self.turns), 3, -1)[first]
-        return np.asarray(np.einsum("mab,maj->mbj", self.turns[first], own).reshape(-1, self.size))
+        travels_in_c2 = np.einsum("mab,maj->mbj", self.turns[first], own).reshape(-1, self.size)
+        return np.asarray((travels_in_c2 @ y).T.reshape(y.shape[1], -1, 3))
 
     def accelerations(self, y: Array, rate: Array, load: Array) -> Array:
-        """y'' of columns (n, times)."""
+        """Return y'' of columns (n, times)."""
         out = load - self.stiffness @ y - self.damping @ rate
         return out - self.travels.T @ self.stop_forces(y) if self.has_stops else out
 
 
 def time_model(mounting: ElasticMounting) -> TimeModel:
-    """E25 of a mounting, hysteretic loss as the viscous damping of E26.
+    """Return the matrices of E25 for a mounting, hysteretic loss as the viscous damping of E26.
 
     A mount's loss in a mode becomes its loss over that mode's natural frequency, so each
     mode keeps the loss factor that the mounts give it, and forces and motion agree.
@@ -130,7 +125,7 @@ def time_model(mounting: ElasticMounting) -> TimeModel:
 
 
 def frequencies_with_fluid(mounting: ElasticMounting) -> tuple[float, ...]:
-    """Undamped natural frequencies of the block and the fluid of its mounts [Hz]; none without fluid tracks (E50)."""
+    """Return the natural frequencies of block and fluid tracks together [Hz]; none without tracks (E50)."""
     if not (mounting.dynamic and mounting.dynamic.has_law):
         return ()
     squares = np.maximum(np.linalg.eigvalsh(time_model(mounting).stiffness), 0.0)
@@ -138,7 +133,7 @@ def frequencies_with_fluid(mounting: ElasticMounting) -> tuple[float, ...]:
 
 
 def _with_fluid(model: TimeModel, dynamic: DynamicSprings, root: Array) -> TimeModel:
-    """With one more coordinate for the fluid of every track, in which its mass is one (E50).
+    """Add a coordinate for the fluid of every track, in which its mass is one (E50).
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Elastic mounts in the time domain, as a mounting beside the others (E25, E28)."""
+"""Elastic mounting that is integrated in time (E25, E28)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ INTEGRATION = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class TimeMounting:
-    """Steady state by integration: bump stops count, and hysteretic loss is the viscous one of E26.
+    """Steady state by integration, with bump stops, and the viscous loss of E26.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class TimeMounting:
     _found: dict[tuple[int, float], tuple[Spectrum, SteadyState]] = field(default_factory=dict, repr=False)
 
     def forces(self, wrench: Spectrum, speed: float) -> Spectrum:
-        """Forces of the engine on its mounts, shape (n, mounts, 3) [N] (C7).
+        """Return the forces of the engine on its mounts, shape (n, mounts, 3) [N] (C7).
 
         Raises
         ------
@@ -41,7 +41,7 @@ class TimeMounting:
         return spectrum_of(self._state(wrench, speed).forces, wrench.base)
 
     def travel(self, wrench: Spectrum, speed: float) -> Spectrum:
-        """Displacement of the engine at every mount, shape (n, mounts, 3) [m]."""
+        """Return the displacement of the engine at every mount, shape (n, mounts, 3) [m]."""
         return spectrum_of(self._state(wrench, speed).travels, wrench.base)
 
     def _state(self, wrench: Spectrum, speed: float) -> SteadyState:
@@ -54,7 +54,7 @@ class TimeMounting:
 
 
 def viscous_forces(mounting: ElasticMounting, wrench: Spectrum, speed: float) -> Spectrum:
-    """Mount forces order by order of the very equations that time integrates, without bump stops (E25, E26).
+    """Return the mount forces by order of the equations that time integrates, without bump stops (E25, E26).
 
     What integration alone is off by shows beside these; what E26 changes shows beside
     `ElasticMounting.forces`.

@@ -26,7 +26,7 @@ FINE = 8
 
 @dataclass(frozen=True)
 class TorqueFacts:
-    """Torque at one operating point.
+    """Key figures of the torque at one operating point.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class TorqueFacts:
 
 
 def torque_parts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> dict[str, Spectrum]:
-    """Torque of the gas, of pistons and rods as point masses, of what the rods' inertia adds, and of all (T1)."""
+    """Return the torque of gas, of pistons and rods as point masses, of the rods' inertia, and of all (T1)."""
     whole, still = crank_torque(engine, point, fidelity), replace(point, gas=None)
     masses = crank_torque(engine, still, fidelity)
     points = crank_torque(engine, still, replace(fidelity, rod="mass-only"))
@@ -63,13 +63,13 @@ def _less(torque: Spectrum) -> Spectrum:
 
 
 def work_stored(torque: Spectrum, samples: int) -> float:
-    """Largest less smallest work of the torque less its mean [J], of a torque of shape (n,) (T2)."""
+    """Return the range of the work of the alternating torque [J], of a torque of shape (n,) (T2)."""
     work = torque.integral.sample(samples)
     return float(work.max() - work.min()) if len(work) else 0.0
 
 
 def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> TorqueFacts:
-    """Mean, ends and stored work of the torque, and how evenly the crank turns."""
+    """Return mean, extremes and stored work of the torque, and the irregularity of the crank speed."""
     torque = crank_torque(engine, point, fidelity)
     # it bends where the gas does: its ends may stand there
     values = np.concatenate([torque.sample(FINE * fidelity.samples), torque.values(torque.bends)])

@@ -39,13 +39,13 @@ class CrankMotion:
 
     @property
     def unevenness(self) -> float:
-        """Largest less smallest speed over the mean, the degree of irregularity."""
+        """Degree of irregularity: speed range over the mean."""
         return float((self.speed.max() - self.speed.min()) / self.speed.mean())
 
 
 @dataclass(frozen=True, eq=False)
 class _Turning:
-    """What the motion at any time follows from (F2-F4); times are angles at the mean speed [rad]."""
+    """Solution that gives the motion at any time (F2-F4); times are angles at the mean speed [rad]."""
 
     engine: Engine
     fidelity: Fidelity
@@ -55,24 +55,24 @@ class _Turning:
 
     @property
     def bends(self) -> Array:
-        """Times at which the torque of the gas bends, and with it the acceleration."""
+        """Times of kinks of the gas torque, and so of the acceleration."""
         if self.torque.corners is None:
             return np.zeros(0)
         angles, shift = self.torque.corners.angles, self.pace.integral
         return np.asarray(angles + shift.values(angles) - shift.values(np.zeros(1)))
 
     def at(self, times: Array) -> CrankMotion:
-        """Of all rotors the same, so found once."""
+        """Return the motion at some times."""
         return _motion_at(self, times.tobytes())
 
     def loads(self, wrench: Callable[[CrankMotion], Array]) -> Spectrum:
-        """Loads (n, 6) that follow from the motion (F5), in orders of the mean speed."""
+        """Return the loads (n, 6) of a wrench that follows from the motion (F5), in orders of the mean speed."""
         steps, bends = self.fidelity.samples, self.bends
         return bent_spectrum(lambda times: wrench(self.at(times)), steps, self.torque.base, bends, len(bends))
 
 
 def crank_motion(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> CrankMotion:
-    """Motion under gas and inertia torque against a constant load torque, at equal steps of time (F2-F4).
+    """Return the motion under gas and inertia torque against a constant load, at equal time steps (F2-F4).
 
     Raises
     ------
@@ -114,7 +114,7 @@ def _motion_at(turning: _Turning, times: bytes) -> CrankMotion:
 
 
 def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Wrench on the block, shape (n, 6), in orders of the mean speed where that varies (F5).
+    """Return the wrench on the block, shape (n, 6), in orders of the varying speed's mean (F5).
 
     Its sums are taken at sampled times: what a star cancels is zero to rounding only.
     """
@@ -134,18 +134,18 @@ def uneven_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> S
 
 
 def uneven_rotor_loads(rotors: Sequence[Rotor], engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Loads of rotors alone on an engine whose motion they do not change; linear in their unbalances (F5)."""
+    """Return the loads of rotors alone, which do not change the motion; linear in unbalances (F5)."""
     return _turning(engine, point, fidelity).loads(lambda motion: _rotor_loads(rotors, motion))
 
 
 def uneven_geared_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Loads of the geared inertia alone (F5, L8)."""
+    """Return the loads of the geared inertia alone (F5, L8)."""
     gain = geared_factor(engine) * fidelity.crank_inertia
     return _turning(engine, point, fidelity).loads(lambda motion: gain * motion.acceleration[:, None] * ROLL)
 
 
 def gas_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Torque of the gas over the crank angle: its roll moment (L5)."""
+    """Return the torque of the gas over the crank angle: its roll moment (L5)."""
     gas, cycle = fidelity.gas_of(point), engine.cycle
     if gas is None:
         return Spectrum(cycle.base_order, np.zeros(1, dtype=complex))
@@ -168,7 +168,7 @@ def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Arr
 
 
 def moving_inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Array]:
-    """That of pistons and rods alone, reduced to the crank, and its derivative by the crank angle (F3)."""
+    """Return the inertia of pistons and rods reduced to the crank, and its derivative by the angle (F3)."""
     total, slope = np.zeros(len(phi)), np.zeros(len(phi))
     for part in engine.slider_cranks:
         ratio, (inertia, steep) = part.shaft.ratio, reduced(part.motion(np, _alpha(part, phi)), fidelity.rod == "rigid")
@@ -177,7 +177,7 @@ def moving_inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Arra
 
 
 def start_energy(work: Array, inertia: Array, speed: float) -> float:
-    """Energy at the start of the cycle that gives the mean speed (F4), by safeguarded Newton.
+    """Return the energy at the start of the cycle for the mean speed (F4), by safeguarded Newton steps.
 
     The mean of w0 / w falls with the energy and is convex, so Newton from the left of
     the root never leaves it; from the right a halved step is taken.
@@ -204,7 +204,7 @@ def start_energy(work: Array, inertia: Array, speed: float) -> float:
 
 
 def _angles_at(pace: Spectrum, times: Array) -> Array:
-    """Crank angles at equal times: the inverse of t(phi), whose derivative is `pace`, by Newton."""
+    """Return the crank angles at equal times: the inverse of t(phi), whose derivative is `pace`, by Newton."""
     shift = pace.integral.coefficients
     series = Spectrum(pace.base, np.stack([shift, pace.coefficients], axis=1))
     origin = float(shift.sum().real)

@@ -1,4 +1,4 @@
-"""Finite heat release, the heat solved for the indicated mean pressure wanted."""
+"""Finite heat release, the heat solved for the requested indicated mean pressure."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ROUNDING = 1e-12
 
 
 def wiebe_pressure(gas: Wiebe, part: SliderCrank, cycle: Cycle, angles: Array) -> Array:
-    """Pressure [Pa] with finite heat release at crank angles gamma [rad], shape of `angles` (G7-G9).
+    """Return the pressure [Pa] with finite heat release at crank angles gamma [rad], shape of `angles` (G7-G9).
 
     Raises
     ------
@@ -42,7 +42,7 @@ def wiebe_pressure(gas: Wiebe, part: SliderCrank, cycle: Cycle, angles: Array) -
 
 
 def wiebe_heat(gas: Wiebe, part: SliderCrank, cycle: Cycle) -> float:
-    """Heat that gives the indicated mean pressure, burnt or not, over the displacement [Pa] (G10, G11).
+    """Return the heat that gives the indicated mean pressure, over the displacement [Pa] (G10, G11).
 
     Heat released at a volume V works with the efficiency 1 - (V / V_largest)^(kappa-1)
     whatever the rest does, so the mean pressure is linear in the heat.
@@ -53,7 +53,14 @@ def wiebe_heat(gas: Wiebe, part: SliderCrank, cycle: Cycle) -> float:
         With the range that can be reached.
     """
     cylinder = ChargedCylinder(gas, part, cycle)
-    _check_burn(gas, part)
+    _, bottom = dead_centres(part)
+    first, last = gas.start, gas.start + gas.duration
+    if first < bottom - math.tau - _ROUNDING or last > bottom + _ROUNDING:
+        raise ModelError(
+            f"{part.name}: the burn from {math.degrees(first):.6g} to {math.degrees(last):.6g} deg must lie between "
+            f"the dead centres at {math.degrees(bottom) - 360.0:.6g} and {math.degrees(bottom):.6g} deg; move start or "
+            "shorten duration"
+        )
     places, weights = _unit_quadrature()
 
     def worked(x: Array) -> Array:
@@ -72,17 +79,6 @@ def wiebe_heat(gas: Wiebe, part: SliderCrank, cycle: Cycle) -> float:
             f"heat to the most that fuel and air can hold it is between {in_bar(least)} and {in_bar(most)}; {remedy}"
         )
     return max(gas.imep - least, 0.0) / efficiency
-
-
-def _check_burn(gas: Wiebe, part: SliderCrank) -> None:
-    _, bottom = dead_centres(part)
-    first, last = gas.start, gas.start + gas.duration
-    if first < bottom - math.tau - _ROUNDING or last > bottom + _ROUNDING:
-        raise ModelError(
-            f"{part.name}: the burn from {math.degrees(first):.6g} to {math.degrees(last):.6g} deg must lie between "
-            f"the dead centres at {math.degrees(bottom) - 360.0:.6g} and {math.degrees(bottom):.6g} deg; move start or "
-            "shorten duration"
-        )
 
 
 def _burn_rate(gas: Wiebe, x: Array) -> Array:
@@ -105,10 +101,6 @@ def _stored_heat(gas: Wiebe, cylinder: ChargedCylinder, elapsed: Array) -> Array
 
 @lru_cache(maxsize=1)
 def _unit_quadrature() -> tuple[Array, Array]:
-    """Places and weights of the double-exponential rule on (0, 1) (Takahasi and Mori 1974).
-
-    The burn rate behaves as x^m at its start: this rule takes any such end in its stride.
-    """
     step = 1.0 / 24.0
     t = step * np.arange(-84, 85)
     lean = 0.5 * math.pi * np.sinh(t)

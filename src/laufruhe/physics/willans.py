@@ -29,14 +29,14 @@ class Friction:
     deviation: float
 
     def indicated(self, brake: float, deviations: float) -> tuple[float, float, float]:
-        """Least, middle and largest indicated mean pressure at a brake mean pressure [Pa] (W4)."""
+        """Return least, middle and largest indicated mean pressure at a brake mean pressure [Pa] (W4)."""
         room = deviations * self.deviation
         return brake + self.mean - room, brake + self.mean, brake + self.mean + room
 
 
 @dataclass(frozen=True)
 class FrictionTest:
-    """What was measured, and the load at the brake that it makes an indicated one of.
+    """Measured friction, and the brake load that it turns into an indicated one.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class FrictionTest:
 
 @dataclass(frozen=True)
 class _Line:
-    """y = a + b x, and the covariances of a and b."""
+    """Line y = a + b x with the covariances of a and b."""
 
     intercept: float
     slope: float
@@ -77,12 +77,12 @@ class _Line:
 
 
 def mean_pressure(torque: float, displacement: float, turns: int) -> float:
-    """Mean effective pressure [Pa] of a torque [N m], a cycle taking so many turns (W1)."""
+    """Return the mean effective pressure [Pa] of a torque [N m] over a cycle of some turns (W1)."""
     return math.tau * turns * torque / displacement
 
 
 def willans_friction(brake: Sequence[float], fuel: Sequence[float]) -> Friction:
-    """Friction from the fuel burnt at brake mean pressures [Pa] of one speed, fuel in any unit (W2).
+    """Return the friction from fuel burnt at brake mean pressures [Pa] of one speed, fuel in any unit (W2).
 
     Raises
     ------
@@ -101,7 +101,7 @@ def willans_friction(brake: Sequence[float], fuel: Sequence[float]) -> Friction:
 
 
 def motoring_friction(speeds: Sequence[float], drag: Sequence[float], speed: float) -> Friction:
-    """Friction at a speed from the mean pressure [Pa] that motoring took at several, on a straight line (W3).
+    """Return the friction at a speed from motoring pressures [Pa] at several, on a straight line (W3).
 
     Raises
     ------
@@ -116,7 +116,7 @@ def motoring_friction(speeds: Sequence[float], drag: Sequence[float], speed: flo
 
 
 def _line(x: Sequence[float], y: Sequence[float], what: str) -> _Line:
-    """Least squares, and the covariances that the scatter about the line gives."""
+    """Fit a line by least squares, with the covariances of its scatter."""
     if len(x) < FEWEST:
         raise ModelError(f"a line and its deviation take {FEWEST} points, and there are {len(x)}; measure more")
     places = sorted(x)

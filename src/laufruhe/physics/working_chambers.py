@@ -22,7 +22,7 @@ _HALVINGS = 53
 
 
 def chambers_thrust(gas: Chambers, part: SliderCrank, angles: Array) -> Array:
-    """P = -sum of +-F (p - p_0) along the axis of a cylinder, away from the crank [N] (G14; eq. 296).
+    """Return P = -sum of +-F (p - p_0) along the axis of a cylinder, away from the crank [N] (G14; eq. 296).
 
     Parameters
     ----------
@@ -36,12 +36,12 @@ def chambers_thrust(gas: Chambers, part: SliderCrank, angles: Array) -> Array:
 
 
 def chambers_breaks(gas: Chambers, part: SliderCrank) -> Array:
-    """Angles from the dead centre of the cylinder at which a derivative of a pressure jumps [rad]."""
+    """Return the angles after the dead centre at which a derivative of a pressure jumps [rad]."""
     return np.array(sorted({angle for chamber in gas.of(part) for angle in _breaks(chamber, part)}))
 
 
 def chamber_pressure(chamber: Chamber, part: SliderCrank, angles: Array) -> Array:
-    """Absolute pressure [Pa], the mean of both sides at a jump, shape of `angles`."""
+    """Return the absolute pressure [Pa], at a jump the mean of both sides, shape of `angles`."""
 
     def at(own: Array) -> Array:
         smallest, largest = _ends(chamber, part)
@@ -53,13 +53,12 @@ def chamber_pressure(chamber: Chamber, part: SliderCrank, angles: Array) -> Arra
 
 
 def chamber_travel(chamber: Chamber, part: SliderCrank, angles: Array) -> Array:
-    """Part of the stroke from where a chamber is smallest, 0 to 1."""
+    """Return the travel from where a chamber is smallest, as part of the stroke."""
     swept = np.clip(swept_volume(part, angles), 0.0, 1.0)
     return swept if chamber.side > 0 else 1.0 - swept
 
 
 def _ends(chamber: Chamber, part: SliderCrank) -> tuple[float, float]:
-    """Angles at which a chamber is smallest, and largest after it."""
     top, bottom = dead_centres(part)
     return (top, bottom) if chamber.side > 0 else (bottom, top + math.tau)
 
@@ -81,7 +80,7 @@ def _breaks(chamber: Chamber, part: SliderCrank) -> list[float]:
 
 
 def _steam(diagram: Steam, travel: Array, out: NDArray[np.bool_], _: Array) -> Array:
-    """Admission, expansion and release on the way out, exhaust, compression and lead on the way back (G15)."""
+    """Return the pressure of admission, expansion and release, then of exhaust, compression and lead (G15)."""
     released = _expanded(diagram, diagram.admission, diagram.cut_off, np.asarray(diagram.release))
     squeezed = _expanded(diagram, diagram.back_pressure, diagram.compression, np.asarray(diagram.lead))
     way = (travel - diagram.release) / (1.0 - diagram.release if diagram.release < 1.0 else 1.0)
@@ -97,7 +96,6 @@ def _steam(diagram: Steam, travel: Array, out: NDArray[np.bool_], _: Array) -> A
 
 
 def _expanded(diagram: Steam, pressure: float, begin: float, end: Array) -> Array:
-    """p ((begin + c) / (end + c))^n, with nothing to expand the pressure itself."""
     volume = end + diagram.clearance
     shrinking = np.where(volume > 0.0, (begin + diagram.clearance) / np.where(volume > 0.0, volume, 1.0), 1.0)
     return np.asarray(pressure * shrinking**diagram.exponent)

@@ -14,18 +14,18 @@ ROLL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
 
 
 def plane_wrench(lateral: Any, vertical: Any, x: float, shaft: Shaft) -> NDArray[Any]:
-    """Wrench of a force in the plane at x through a shaft's axis, shape (6, ...) of forces (...) (C2)."""
+    """Return the wrench of a force in the plane at x through a shaft's axis, shape (6, ...) of forces (...) (C2)."""
     return np.array(plane_parts(lateral, vertical, x, shaft))
 
 
 def plane_parts(lateral: Any, vertical: Any, x: float, shaft: Shaft) -> tuple[Any, Any, Any, Any, Any, Any]:
-    """The six parts of that wrench."""
+    """Return the six parts of that wrench."""
     roll = shaft.y * vertical - shaft.z * lateral
     return lateral - lateral, lateral, vertical, roll, -x * vertical, x * lateral
 
 
 def turning_parts(lateral: Any, vertical: Any) -> tuple[Any, Any]:
-    """Parts F e^{i h phi} and B e^{-i h phi} of z + i y, that turn with the crank and against it (C4).
+    """Return the parts F e^{i h phi} and B e^{-i h phi} of z + i y, with the crank and against it (C4).
 
     Parameters
     ----------

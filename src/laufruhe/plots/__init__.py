@@ -17,7 +17,7 @@ with chdir(Path(__file__).parent):
 from matplotlib.figure import Figure
 
 from laufruhe.errors import refused
-from laufruhe.numerics.processes import in_twins
+from laufruhe.numerics.processes import fork_map
 from laufruhe.plots.letters import prepare
 from laufruhe.plots.style import as_svg, save
 from laufruhe.present.pictures import PICTURES
@@ -82,7 +82,7 @@ def draw_in_shares(result: Result, folder: Path, kinds: Sequence[str], count: in
     os.close(put)
     # who is done with one takes the next: a byte of a pipe is read by one process alone
     own = (wanted[number[0]] for number in iter(partial(os.read, left, 1), b""))
-    parts = in_twins(lambda _: draw_and_show(result, folder, kinds, own), count)
+    parts = fork_map(lambda _: draw_and_show(result, folder, kinds, own), count)
     os.close(left)
     found = {name: svg for part in parts for name, svg in part.items()}
     # of a twin that died

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
-from laufruhe.numerics.progress import tell
+from laufruhe.numerics.progress import report_progress
 from laufruhe.numerics.witness import is_over
 from laufruhe.prove.witness import Known, check_around, thin
 
@@ -152,7 +152,7 @@ class Division(Generic[P]):
             if not self.complete:
                 break
             known = (self.value, queue[0].bound) if self.of_objective else (math.inf, -math.inf)
-            tell(self.what, self.seen, 0, *known)
+            report_progress(self.what, self.seen, 0, *known)
             taken = [heapq.heappop(queue)]
             while queue and len(taken) < self.at_once and not self.is_done(queue[0]):
                 taken.append(heapq.heappop(queue))

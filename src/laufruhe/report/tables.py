@@ -15,7 +15,7 @@ import numpy as np
 
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.processes import meanwhile
+from laufruhe.numerics.processes import run_concurrently
 from laufruhe.physics.bearing_wear import wear_of
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.irregularity import swing_of
@@ -306,7 +306,7 @@ def writing_tables(result: Result, folder: Path) -> Iterator[Callable[[], None]]
     sheets = number_tables(result)
     cells = sum(len(sheet.head) * len(sheet.rows) for sheet in sheets.values())
     book = partial(write_book, sheets, folder / files.BOOK) if sheets else lambda: None
-    with meanwhile(book, cells > MANY) as written:
+    with run_concurrently(book, cells > MANY) as written:
         for name, sheet in sheets.items():
             write_csv(sheet, folder / f"{name}.csv")
         yield written

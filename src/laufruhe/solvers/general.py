@@ -14,7 +14,7 @@ from dataclasses import replace
 from laufruhe.errors import ModelError, SolverError, counted
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import rounds
-from laufruhe.numerics.progress import tell
+from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
@@ -82,7 +82,7 @@ def _in_turns(program: LocalProgram, best: Array, decide: Decide) -> Array:
     outer = tuple(decision for decision in problem.decisions if decision.kind not in INNER)
     for k in rounds(ROUNDS):
         before = program.rank(best)
-        tell("cones and local programs in turn", k, ROUNDS, before[1])
+        report_progress("cones and local programs in turn", k, ROUNDS, before[1])
         values = dict(zip((d.name for d in problem.decisions), program.values(best), strict=True))
         try:
             held = problem.fixed_at([values[decision.name] for decision in outer], outer)

@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from laufruhe.numerics.norms import Norm
-from laufruhe.numerics.processes import called
+from laufruhe.numerics.processes import call_by_name
 from laufruhe.problem.channels import AT_EACH_MOUNT, CHANNELS, OF_MOUNTING, OF_SIZES, Channel
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence, kinds_of
@@ -119,5 +119,5 @@ class Method:
 
 def by_home(home: str, *asked: Any) -> Result:
     """Call a function by its name; its module is imported when it is first called."""
-    found: Result = called(f"laufruhe.solvers{home}" if home.startswith(".") else home, *asked)
+    found: Result = call_by_name(f"laufruhe.solvers{home}" if home.startswith(".") else home, *asked)
     return found

@@ -12,8 +12,8 @@ from functools import cache, partial
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.extension import in_order
 from laufruhe.numerics.budget import limited, passed
-from laufruhe.numerics.processes import called
-from laufruhe.numerics.progress import Listener, listening, tell
+from laufruhe.numerics.processes import call_by_name
+from laufruhe.numerics.progress import Listener, progress_listener, report_progress
 from laufruhe.numerics.witness import collected
 from laufruhe.problem.channels import (
     FREQUENCIES,
@@ -173,7 +173,7 @@ def solve(
     ModelError
         If the engine as given cannot be evaluated, or nothing decides what is open.
     """
-    with limited(time_limit), listening(listener), collected() as reports:
+    with limited(time_limit), progress_listener(listener), collected() as reports:
         begun, spent = time.perf_counter(), time.thread_time()
         found: Result | None
         try:
@@ -246,7 +246,7 @@ def refuse(problem: Problem) -> None:
         words = " and ".join(kind.name.lower() for kind in sorted(kinds))
         raise ModelError(f"{words} is open and nothing is minimised; add [objective] or [mounts]")
     if problem.phasing is not None and _method(problem).home == _STARS:
-        called("laufruhe.solvers.stars.answers:refuse", problem)
+        call_by_name("laufruhe.solvers.stars.answers:refuse", problem)
 
 
 def _decided(problem: Problem, left: Sequence[Reduction] | None = None) -> Result:
@@ -262,7 +262,7 @@ def _by_method(problem: Problem) -> Result:
     """Decide a problem by the first method that suits it, with the bound of another where that closes."""
     method, kinds = _method(problem), kinds_of(problem)
     # what is decided apart is asked once more, each part by itself
-    tell(method.name)
+    report_progress(method.name)
     conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and kinds <= {_U, _K, _M} else ()
     if conflict:
         return none_within(problem, evaluate_start(problem), conflict, {})

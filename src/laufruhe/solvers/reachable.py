@@ -14,7 +14,7 @@ from functools import partial
 
 from laufruhe.errors import LaufruheError
 from laufruhe.numerics.budget import in_time, left, limited, passed
-from laufruhe.numerics.progress import tell, within
+from laufruhe.numerics.progress import report_progress, within
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import objective_value, with_fine_sampling
@@ -84,7 +84,7 @@ def with_reachable(found: Result, problem: Problem, kinds: Collection[Kind], too
     seconds = None if math.isfinite(left()) else max(LEAST_SECONDS, took)
     with limited(seconds), within(found.message or str(found.status)):
         for k, limit in enumerate(asked):
-            tell("what limits can reach", k, len(asked))
+            report_progress("what limits can reach", k, len(asked))
             with within(f"what '{limit.name}' can reach"), limited(left() / (len(asked) - k)):
                 answers.append(_in_time(_answer(limit, problem, kinds, found, solve)))
         if len(found.conflict) > 1 and any(answer.is_none for answer in answers):

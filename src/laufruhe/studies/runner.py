@@ -13,7 +13,14 @@ import xarray as xr
 
 from laufruhe.errors import SolverError
 from laufruhe.numerics.budget import passed
-from laufruhe.numerics.workers import TimeIsOver, WorkersGone, count_of, each, executor_for, given
+from laufruhe.numerics.workers import (
+    TimeIsOver,
+    WorkersGone,
+    current_executor,
+    executor_for,
+    unordered_map,
+    worker_count,
+)
 from laufruhe.studies.part import Record
 from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.scenes import Scenes
@@ -122,7 +129,7 @@ def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[Answe
     them clearly less time.
     """
     started, first = time.perf_counter(), 0
-    if given() is None:
+    if current_executor() is None:
         for k, task in enumerate(tasks):
             ahead = (time.perf_counter() - started) / k * (len(tasks) - k) if k else 0.0
             if jobs > 1 and ahead * (1.0 - 1.0 / jobs) > POOL_PAYS:
@@ -143,7 +150,7 @@ def _over() -> SolverError:
 
 def _other_files(answer: Answer, task: Task) -> SolverError:
     """Return the error of an answer that depends on other files or another program than its task."""
-    where = f"on {answer.host}" if given() is not None else "while it was worked at"
+    where = f"on {answer.host}" if current_executor() is not None else "while it was worked at"
     rule = f"'{task[1]}' had other files, another Laufruhe or other libraries {where}, so its answer is not kept"
     return SolverError(f"{rule}; have the same everywhere, and the same command goes on")
 
@@ -160,13 +167,13 @@ def _answer(k: int, task: Task, scenes: Scenes) -> Answer:
 def _shared(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -> Iterator[Answer]:
     """Tasks from the first on, as many in a piece as are worth handing out, told by those that are done."""
     done, spent = 0, 0.0
-    worth = NEAR if given() is None else FAR
+    worth = NEAR if current_executor() is None else FAR
     folder = Path.cwd()
 
     def pieces() -> Iterator[_Piece]:
         start = first
         while start < len(tasks):
-            fair = (len(tasks) - start) // (SHARES * count_of(executor))
+            fair = (len(tasks) - start) // (SHARES * worker_count(executor))
             size = max(min(int(worth * done / spent) if spent > 0.0 else 1, fair), 1)
             numbers = range(start, min(start + size, len(tasks)))
             yield _Piece(numbers, [tasks[k] for k in numbers], scenes, folder)
@@ -174,7 +181,7 @@ def _shared(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -> Ite
 
     with executor_for(jobs) as executor:
         try:
-            with closing(each(_served, pieces(), executor)) as found:
+            with closing(unordered_map(_served, pieces(), executor)) as found:
                 for _, some in found:
                     done, spent = done + len(some), spent + sum(answer.seconds for answer in some)
                     if passed():

@@ -19,7 +19,7 @@ from laufruhe.load_models.affine import AffineModel, AffineNorm
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
-from laufruhe.numerics.workers import HERE, working_on
+from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import forget, shaking_loads
 from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
@@ -224,7 +224,7 @@ class _Decided:
         """The design that a fidelity decides; None where it finds none within the limits."""
         # choices about modes of open mounts would change with them, and time decides nothing
         own = own.at(replace(own.fidelity, tolerance=None))
-        with working_on(HERE), suppress(SolverError, ModelError):
+        with working_on(SERIAL), suppress(SolverError, ModelError):
             if is_convex(own):
                 return by_cones(own)
             return None if self._known is None else next_to(own, self._known)

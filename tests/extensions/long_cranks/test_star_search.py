@@ -16,7 +16,7 @@ from laufruhe.extensions.long_cranks.halves import Free, Window, meeting, shares
 from laufruhe.extensions.long_cranks.search import search_stars
 from laufruhe.load_models.amplitudes import AmplitudeTerm
 from laufruhe.machine.layouts import inline
-from laufruhe.numerics.workers import HERE, working_on
+from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.physics.crank_stars import star_sums
 from laufruhe.physics.star_space import StarSpace, outside_in
 from laufruhe.solvers.stars.search import enumerate_stars
@@ -139,7 +139,7 @@ def test_in_pieces_it_finds_the_same_whoever_works(name, monkeypatch):
     monkeypatch.setattr(star_search, "WORTH_SHARING", 0)
     monkeypatch.setattr(star_search, "PIECES", 5)
     space, objective = whole(8), OBJECTIVES[name]
-    with working_on(HERE):
+    with working_on(SERIAL):
         one = search_stars(space, objective, 5)
     with ThreadPoolExecutor(3) as pool, working_on(pool):
         three = search_stars(space, objective, 5)
@@ -154,7 +154,7 @@ def test_in_pieces_it_finds_the_same_whoever_works(name, monkeypatch):
 def test_in_pieces_it_stops_in_time(monkeypatch):
     monkeypatch.setattr(star_search, "WORTH_SHARING", 0)
     space, objective = whole(9), OBJECTIVES["rms of two"]
-    with working_on(HERE):
+    with working_on(SERIAL):
         found = search_stars(space, objective, 1, time_limit=0.0)
     assert not found.complete
     assert found.lower_bound <= enumerate_stars(space, objective).values[0] * (1.0 + 1e-12)

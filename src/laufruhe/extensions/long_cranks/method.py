@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from laufruhe.numerics.processes import called
+from laufruhe.numerics.processes import call_by_name
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence
 from laufruhe.problem.problem import Problem
@@ -12,7 +12,7 @@ from laufruhe.solvers.method import BUILT, Method, is_pointwise
 
 def is_long(problem: Problem) -> bool:
     """Return whether even stars are open that are too many to be listed."""
-    found: bool = called("laufruhe.solvers.stars.answers:is_long", problem)
+    found: bool = call_by_name("laufruhe.solvers.stars.answers:is_long", problem)
     return found
 
 

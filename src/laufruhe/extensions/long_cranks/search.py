@@ -15,8 +15,8 @@ from laufruhe.extensions.long_cranks.halves import Counts, Free, meeting, shares
 from laufruhe.extensions.long_cranks.starts import CoupleObjective, good_starts, swaps
 from laufruhe.load_models.amplitudes import NEGLIGIBLE
 from laufruhe.numerics.budget import limited, passed
-from laufruhe.numerics.progress import tell
-from laufruhe.numerics.workers import HERE, count_of, each, executor_for
+from laufruhe.numerics.progress import report_progress
+from laufruhe.numerics.workers import SERIAL, executor_for, unordered_map, worker_count
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.solvers.stars.search import SLACK, BestStars, StarsFound
@@ -99,21 +99,23 @@ class _Search:
             return
         pieces = [(pattern, part) for pattern in self.space.patterns for part in _parts(self.space, pattern)]
         with ExitStack() as held:
-            many = work > WORTH_SHARING and count_of() > 1
-            executor = held.enter_context(executor_for()) if many else HERE
+            many = work > WORTH_SHARING and worker_count() > 1
+            executor = held.enter_context(executor_for()) if many else SERIAL
             start, size = 0, 1
             while start < len(pieces):
                 chosen = pieces[start : start + size]
                 asked = [_Piece(self.space, self.objective, *piece, self.best) for piece in chosen]
                 # the first pieces find values that spare the others most of their work
                 start, size = start + size, min(2 * size, MOST_AT_ONCE)
-                answers = sorted(each(_explored, asked, executor, patient=True), key=lambda answer: answer[0])
+                answers = sorted(unordered_map(_explored, asked, executor, patient=True), key=lambda answer: answer[0])
                 for _, (best, looked_at, ended) in answers:
                     self.best.offer(best.stars, best.values)
                     self.looked_at += looked_at
                     self.ended = self.ended or ended
                 self.ended = self.ended or len(answers) < len(asked)
-                tell("arrangements of halves", self.looked_at, work, float(self.best.values.min(initial=np.inf)))
+                report_progress(
+                    "arrangements of halves", self.looked_at, work, float(self.best.values.min(initial=np.inf))
+                )
                 if self.ended:
                     return
 

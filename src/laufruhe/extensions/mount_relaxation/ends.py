@@ -13,10 +13,10 @@ from uuid import uuid4
 from laufruhe.extensions.mount_relaxation.bound import Program
 from laufruhe.extensions.mount_relaxation.program import Stated
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.foresight import Foresight, foresight
+from laufruhe.numerics.workers import Speculation, speculation
 
 _Step: TypeAlias = tuple[str, bytes, Array | int]
-Ahead: TypeAlias = Foresight[_Step, tuple[float, Array]]
+Ahead: TypeAlias = Speculation[_Step, tuple[float, Array]]
 
 # seconds of relaxations after which processes are worth starting: where there is one, there are often dozens
 WORTH = 0.25
@@ -41,7 +41,7 @@ def _least(step: _Step) -> tuple[float, Array]:
 
 def ends_ahead() -> AbstractContextManager[Ahead]:
     """Of all boxes of one search."""
-    return foresight(_least, WORTH)
+    return speculation(_least, WORTH)
 
 
 class Aims:
@@ -50,22 +50,22 @@ class Aims:
     def __init__(self, program: Program, ahead: Ahead | None) -> None:
         self._name, self._program, self._ahead = uuid4().hex, pickle.dumps(program), ahead
         if ahead is not None:
-            ahead.forget()
+            ahead.discard()
 
     def least(self, key: Hashable, aim: Array | int) -> tuple[float, Array]:
         """As `Stated.least`."""
         step = (self._name, self._program, aim)
-        return _least(step) if self._ahead is None else self._ahead.wanted((self._name, key), step)
+        return _least(step) if self._ahead is None else self._ahead.result((self._name, key), step)
 
     def all_least(self, aims: Sequence[Array | int]) -> list[float]:
         """Of each of some aims."""
         found = []
         for k, aim in enumerate(aims):
-            self.likely(islice(enumerate(aims), k, None))
+            self.prefetch(islice(enumerate(aims), k, None))
             found.append(self.least(k, aim)[0])
         return found
 
-    def likely(self, aims: Iterable[tuple[Hashable, Array | int]]) -> None:
+    def prefetch(self, aims: Iterable[tuple[Hashable, Array | int]]) -> None:
         """What may be asked next."""
         if self._ahead is not None:
-            self._ahead.likely(((self._name, key), (self._name, self._program, aim)) for key, aim in aims)
+            self._ahead.prefetch(((self._name, key), (self._name, self._program, aim)) for key, aim in aims)

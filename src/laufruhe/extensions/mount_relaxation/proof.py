@@ -290,7 +290,7 @@ def narrowed(boxes: SpringBoxes, lower: Array, upper: Array, pull: Array) -> tup
     for first, (number, side, k) in enumerate(asked):
         if not pays(side, k):
             continue
-        aims.likely(((n, end), signs[end] * units[n]) for n, j, end in asked[first:] if pays(j, end))
+        aims.prefetch(((n, end), signs[end] * units[n]) for n, j, end in asked[first:] if pays(j, end))
         share, stands = aims.least((number, k), signs[k] * units[number])
         solved += 1
         ends[k, side] = max(ends[k, side], signs[k] * middle[side] + half[side] * share)

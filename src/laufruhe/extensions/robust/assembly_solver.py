@@ -25,7 +25,7 @@ from laufruhe.extensions.robust.result import SHARES, AssemblyResult, Place
 from laufruhe.extensions.robust.tolerance import AddedDrive, Error, PistonDrive, Tolerance, Tolerances
 from laufruhe.extensions.robust.worst_case import value_at
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.progress import tell
+from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import is_affine
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
@@ -63,11 +63,11 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
         raise ValueError("there are no parts to choose among")
     refuse(problem)
     started, spent = time.perf_counter(), time.thread_time()
-    tell("what every part adds")
+    report_progress("what every part adds")
     terms, lots = _terms(problem), assembly.lots
     search = _Search(terms, lots, len(problem.engine.slider_cranks), problem.tolerance)
     bound = search.run()
-    tell("the best assembly, and random ones", value=search.value, bound=bound)
+    report_progress("the best assembly, and random ones", value=search.value, bound=bound)
     witness = _walked(problem, lots, search.best, bound, max(walk.SHARE * (time.thread_time() - spent), walk.SECONDS))
     chosen = search.best if witness is None else witness
     initial, final = _evaluated(problem, lots, search.given), _evaluated(problem, lots, chosen)

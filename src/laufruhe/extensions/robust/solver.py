@@ -22,7 +22,7 @@ from laufruhe.extensions.robust.tolerance import Over, built, robust_of, toleran
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
-from laufruhe.numerics.progress import tell, within
+from laufruhe.numerics.progress import report_progress, within
 from laufruhe.numerics.spectrum import common_base
 from laufruhe.numerics.witness import is_over
 from laufruhe.problem.decision import Kind
@@ -116,7 +116,7 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
         return replace(drawing, problem=problem)
     problem = with_tolerances(replace(problem, fidelity=drawing.problem.fidelity), acting)
     start = tuple(unbalances_of(problem, drawing))
-    tell("worst errors of the drawing")
+    report_progress("worst errors of the drawing")
     seeker, least = _found(problem, over, start, drawing)
     seeker = replace(seeker, samples=least.samples)
     as_given = seeker.at(problem.start, proven=False)

@@ -16,7 +16,7 @@ from laufruhe.extensions.run_ups.rows import RunRows
 from laufruhe.load_models.affine import FEASIBLE, AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
-from laufruhe.numerics.progress import tell
+from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.decision import domains_of, vector_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, Term
@@ -100,7 +100,7 @@ class _Steps:
         x = vector_of(domains_of(self._whole.decisions))
         for _ in in_time(range(_ROUNDS)):
             self.add(x)
-            tell("steps of the run-up", sum(map(len, self._places.values())))
+            report_progress("steps of the run-up", sum(map(len, self._places.values())))
             found = solve_cones(self.affine()).x
             if found is None:
                 found = solve_cones(self.affine(averaged=True)).x

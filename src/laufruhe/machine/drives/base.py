@@ -1,4 +1,4 @@
-"""What every drive says of itself: the keys that it takes, its crank radius, and the mechanism that it makes."""
+"""Base class of drives."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from laufruhe.machine.stroke import radius_for_stroke
 
 @dataclass(frozen=True)
 class Sizes:
-    """What [engine] says of lengths, in SI.
+    """Lengths of [engine], in SI.
 
     Attributes
     ----------
@@ -32,7 +32,7 @@ class Sizes:
 
 
 class DriveKind(ABC):
-    """How a crank drives a piston rod or a ram: a new one is a file of its own and a line in `DRIVES`.
+    """Way in which a crank drives a piston rod or a ram; a new one is a file and a line in `DRIVES`.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class DriveKind(ABC):
     has_rod: ClassVar[bool] = True
 
     def radius(self, sizes: Sizes) -> float:
-        """Crank radius that makes the stroke [m].
+        """Return the crank radius that makes the stroke [m].
 
         Raises
         ------
@@ -60,4 +60,4 @@ class DriveKind(ABC):
 
     @abstractmethod
     def mechanism(self, plain: Mechanism, sizes: Sizes) -> Mechanism:
-        """What makes the mechanism of every cylinder, from what all drives share."""
+        """Return the mechanism of every cylinder from the numbers that all drives share."""

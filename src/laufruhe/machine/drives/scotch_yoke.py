@@ -8,13 +8,13 @@ from laufruhe.machine.drives.slider_crank import RodDrive
 
 
 class ScotchYoke(RodDrive):
-    """x = r (1 - cos alpha), eqs. 287, 289 and 295."""
+    """Drive with x = r (1 - cos alpha), eqs. 287, 289 and 295."""
 
     name = "scotch-yoke"
     has_rod = False
 
     def radius(self, sizes: Sizes) -> float:
-        """Half the stroke."""
+        """Return half the stroke."""
         if sizes.offset:
             raise KeyedError("offset", "means nothing in a Scotch yoke; leave it out")
         return super().radius(sizes)

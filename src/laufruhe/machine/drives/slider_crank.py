@@ -12,7 +12,7 @@ class RodDrive(DriveKind):
     name = "slider-crank"
 
     def mechanism(self, plain: Mechanism, _: Sizes) -> Mechanism:
-        """Nothing of its own."""
+        """Return the mechanism unchanged."""
         return plain
 
 

@@ -1,4 +1,4 @@
-"""What every layout says of itself: the keys that it takes, what may be open, and what it builds."""
+"""Base class of layouts, and the keys of [engine] that they take."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ SPACING = Key(
 
 @dataclass(frozen=True)
 class Asked:
-    """What is said of an engine.
+    """Engine description that a layout is given.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Asked:
     gas: bool = False
 
     def spacing(self, places: int) -> float:
-        """Between so many places along the crank [m]; beside one alone there is no other."""
+        """Return the distance between neighbouring places along the crank [m]; 1 for a single place."""
         given = self.own["cylinder_spacing"]
         if given is None and places > 1:
             raise KeyedError("cylinder_spacing", 'is missing; add it, for example "125 mm"')
@@ -76,7 +76,7 @@ class Asked:
 
 
 def rod_of(key: str, table: Mapping[str, float], length: float, end: str) -> Rod:
-    """The rod of a table of [engine] with mass, centre of gravity counted from the pin `end`, and inertia."""
+    """Return the rod of a table of [engine], its centre of gravity counted from the pin `end`."""
     if not 0.0 <= table["centre_of_gravity"] <= length:
         rule = f"does not lie on the rod of {units.shown(length, 'm')}; count it from the {end}"
         raise KeyedError(f"{key}.centre_of_gravity", rule, units.shown(table["centre_of_gravity"], "m"))
@@ -84,7 +84,7 @@ def rod_of(key: str, table: Mapping[str, float], length: float, end: str) -> Rod
 
 
 class LayoutKind(ABC):
-    """What a layout takes and builds: a new one is a file of its own and a line in `LAYOUTS`.
+    """Layout of cylinders: keys, open numbers and construction; a new one is a file and a line in `LAYOUTS`.
 
     Attributes
     ----------
@@ -120,15 +120,15 @@ class LayoutKind(ABC):
     has_pistons: ClassVar[bool] = True
 
     def takes(self, key: str) -> bool:
-        """Whether a key means anything here."""
+        """Return True if a key means anything here."""
         return key in self.lists or any(own.name == key for own in self.keys)
 
     def cycle(self, said: Cycle) -> Cycle:
-        """In which the loads of an engine repeat whose chambers work in this one (C6)."""
+        """Return the cycle in which loads repeat, of the cycle of the chambers (C6)."""
         return said
 
     def mechanism(self, own: Mapping[str, Any], **shared: Any) -> Mechanism:
-        """What cylinders share in a layout without pistons.
+        """Return the shared numbers of cylinders of a layout without pistons.
 
         Parameters
         ----------
@@ -141,7 +141,7 @@ class LayoutKind(ABC):
 
     @abstractmethod
     def place(self, asked: Asked) -> Layout:
-        """Places, banks and pins.
+        """Return places, banks and pins.
 
         Raises
         ------
@@ -152,5 +152,5 @@ class LayoutKind(ABC):
     def parts(
         self, asked: Asked, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
-        """Slider-cranks and the throws that they work on."""
+        """Return the slider-cranks and the throws that they work on."""
         return build(asked.cycle, layout, asked.mechanism, throws, asked.firing_order)

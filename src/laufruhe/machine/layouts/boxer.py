@@ -1,4 +1,4 @@
-"""Opposed banks, every cylinder on a throw of its own."""
+"""Opposed banks with a throw for every cylinder."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from laufruhe.numerics.turns import SAME_TURN, Turn, angle_of, as_turn, cis, wit
 
 @dataclass(frozen=True)
 class Mechanism:
-    """What all cylinders of an engine share.
+    """Numbers that all cylinders of an engine share.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Mechanism:
         pin_mass: float = 0.0,
         shaft: Shaft = CRANKSHAFT,
     ) -> SliderCrank:
-        """One cylinder of an engine.
+        """Return the slider-crank of a cylinder.
 
         Parameters
         ----------
@@ -84,19 +84,18 @@ class Mechanism:
         return self._made_of(plain, number)
 
     def _made_of(self, plain: SliderCrank, number: int) -> SliderCrank:  # noqa: ARG002
-        """The mechanism of a cylinder, of the slider-crank that has what all share."""
         return plain
 
 
 def numbers_of(plain: SliderCrank) -> dict[str, Any]:
-    """Its fields, for a mechanism that has more."""
+    """Return the fields of a slider-crank, to construct a mechanism that has more."""
     return {own.name: getattr(plain, own.name) for own in fields(plain)}
 
 
 def firing_angles(
     cycle: Cycle, layout: Layout, throws: Sequence[float], firing_order: Sequence[int]
 ) -> tuple[float, ...]:
-    """Crank angle at which every cylinder fires [rad], each at the first dead centre after the one before.
+    """Return the crank angle at which every cylinder fires [rad], each at its first dead centre after the one before.
 
     Raises
     ------
@@ -124,7 +123,7 @@ def firing_angles(
 
 
 def even_throws(cycle: Cycle, layout: Layout, firing_order: Sequence[int]) -> tuple[float, ...]:
-    """Angles of the throws that fire evenly in this order, from cylinder 1's dead centre at phi = 0.
+    """Return the throw angles of even firing in this order [rad], cylinder 1 at its dead centre at phi = 0.
 
     Raises
     ------
@@ -148,7 +147,7 @@ def even_throws(cycle: Cycle, layout: Layout, firing_order: Sequence[int]) -> tu
 
 @dataclass(frozen=True)
 class Throw:
-    """One throw of a crankshaft.
+    """Throw of a crankshaft.
 
     Attributes
     ----------
@@ -170,7 +169,7 @@ class Throw:
 
 
 def throw_rotors(throws: Sequence[Throw]) -> tuple[Rotor, ...]:
-    """The rotating masses of the throws."""
+    """Return the rotating masses of the throws as rotors."""
     return tuple(
         Rotor(f"throw {k + 1}", throw.x, throw.unbalance, throw.shaft, Role.THROW)
         for k, throw in enumerate(throws)
@@ -185,7 +184,7 @@ def build(
     angles: Sequence[float],
     firing_order: Sequence[int] | None = None,
 ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
-    """Slider-cranks and the throws that they work on.
+    """Return the slider-cranks, and the throws that they work on.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from laufruhe.numerics.turns import Turn, angle_of, as_turn, cis, within
 
 @dataclass(frozen=True)
 class Triangle:
-    """Three cranks at the corners of a triangle with one corner below, and when their pistons are at dead centre.
+    """Three cranks at the corners of a triangle that stands on one corner, and the dead centres of their pistons.
 
     Bank k lies between corner k and the next one, counted with the clock from below as seen from the front; its first
     piston works on corner k.
@@ -41,7 +41,7 @@ class Triangle:
 
     @property
     def shafts(self) -> tuple[Shaft, Shaft, Shaft]:
-        """The crankshaft below, then the left and the right one."""
+        """Crankshafts: below, left and right."""
         half, height = 0.5 * self.side, math.sqrt(0.75) * self.side
         _, left, right = self.ratios
         return (
@@ -52,12 +52,12 @@ class Triangle:
 
     @staticmethod
     def axis(corner: int, bank: int) -> Turn:
-        """Angle of the cylinder axis of a bank as a crank at one of its ends sees it (C5), as a part of a turn."""
+        """Return the angle of a bank's cylinder axis as seen by the crank at one of its ends, in turns (C5)."""
         away = Fraction(1, 12) - Fraction(bank, 3)
         return away if corner == bank else away + Fraction(1, 2)
 
     def centre(self, corner: int, bank: int) -> Turn:
-        """Crank angle of a piston's dead centre, the lower throw being upright, as a part of a turn."""
+        """Return the crank angle of a piston's dead centre with the lower throw upright, in turns."""
         at: Turn = self.axis(0, 0)
         for k in range(bank):
             # over to the other piston of bank k, then to the next bank on that crank
@@ -66,13 +66,13 @@ class Triangle:
 
 
 def closing_lead(ratios: tuple[int, int, int], first: Turn, second: Turn) -> Turn:
-    """Lead of the third bank that the other two leave, for the angles round the triangle close (K18)."""
+    """Return the lead of the third bank that closes the angles round the triangle (K18)."""
     half = Fraction(1, 2)
     return within(-Fraction(sum(ratios), 6) - first - second + half, 1) - half
 
 
 def equal_lead(ratios: tuple[int, int, int]) -> Turn:
-    """The least lead that all three banks may share: 20 degrees with one crank reversed, 60 with none (K18)."""
+    """Return the least lead that all three banks may share: 20 deg with one crank reversed, 60 with none (K18)."""
     return -Fraction(sum(ratios), 18)
 
 
@@ -96,7 +96,7 @@ class Delta(LayoutKind):
     fires_evenly = True
 
     def place(self, asked: Asked) -> Layout:
-        """Rows, by the throws of the lower crank; banks by when their first pistons are at dead centre."""
+        """Return rows by the throws of the lower crank, banks by the dead centres of their first pistons."""
         rows, rest = divmod(asked.cylinders, 3)
         if rest:
             raise KeyedError("cylinders", "is no multiple of the 3 of a row; give one that is", str(asked.cylinders))
@@ -133,7 +133,7 @@ class Delta(LayoutKind):
     def parts(
         self, asked: Asked, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
-        """First the pistons of the banks' first corners, then those of their second ones; throws of all cranks."""
+        """Return the pistons at the first corners of the banks, then at the second, and the throws of all cranks."""
         triangle, mechanism = self._triangle(asked), asked.mechanism
         found: list[SliderCrank] = []
         cranks: list[Throw] = []
@@ -153,7 +153,6 @@ class Delta(LayoutKind):
 
 
 def _check_order(order: Sequence[int] | None, firsts: Sequence[SliderCrank]) -> None:
-    """Every cylinder fires at its dead centre of every turn, so the throws say in which order."""
     if order is None:
         return
     turns = [within(as_turn(firsts[k - 1].firing_angle) - as_turn(firsts[order[0] - 1].firing_angle), 1) for k in order]

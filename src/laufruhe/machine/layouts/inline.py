@@ -9,18 +9,18 @@ from laufruhe.machine.layouts.places import Layout, stations
 
 
 def inline(cylinders: int, spacing: float) -> Layout:
-    """One bank, upright."""
+    """Return a single upright bank."""
     places = stations(cylinders, spacing)
     none = (0.0,) * cylinders
     return Layout("inline", places, none, tuple(range(cylinders)), none, places)
 
 
 class Inline(LayoutKind):
-    """One bank, a throw for every cylinder."""
+    """Single bank with a throw for every cylinder."""
 
     name = "inline"
     openable: ClassVar[tuple[str, ...]] = ("throws", "firing_order")
 
     def place(self, asked: Asked) -> Layout:
-        """One bank, upright."""
+        """Return a single upright bank."""
         return inline(asked.cylinders, asked.spacing(asked.cylinders))

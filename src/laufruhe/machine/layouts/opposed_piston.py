@@ -1,4 +1,4 @@
-"""Two pistons in each cylinder, on two cranks geared to each other."""
+"""Two pistons in each cylinder, on two geared cranks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from laufruhe.machine.slider_crank import SliderCrank
 def facing_pistons(
     lower: Sequence[SliderCrank], crank: Shaft, lead: float = 0.0, pin_mass: float = 0.0
 ) -> tuple[SliderCrank, ...]:
-    """The second pistons of opposed-piston cylinders, upside down on a crank of their own.
+    """Return the second pistons of opposed-piston cylinders, upside down on a crank of their own.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def facing_pistons(
 
 
 class OpposedPiston(Inline):
-    """In line, with a second crank above."""
+    """Inline layout with a second crank above."""
 
     name = "opposed-piston"
     keys = (
@@ -80,7 +80,7 @@ class OpposedPiston(Inline):
     def parts(
         self, asked: Asked, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
-        """The lower pistons, then the upper ones, and the throws of both cranks."""
+        """Return the lower pistons, then the upper ones, and the throws of both cranks."""
         lower, cranks = super().parts(asked, layout, throws)
         distance, lead = asked.own["crank_distance"], asked.own["crank_lead"]
         if distance is None:

@@ -8,7 +8,7 @@ from laufruhe.machine.layouts.places import Layout
 
 
 class Parts(LayoutKind):
-    """Every slider-crank listed with its place."""
+    """List of slider-cranks with their places."""
 
     name = "parts"
     keys = ()
@@ -16,5 +16,5 @@ class Parts(LayoutKind):
     is_free = True
 
     def place(self, asked: Asked) -> Layout:
-        """Nothing is placed: the list says where everything is."""
+        """Refuse: the list gives every place."""
         raise ModelError(f"a list of {counted(asked.cylinders, 'slider-crank')} has no layout; fix the throws")

@@ -11,7 +11,7 @@ from laufruhe.numerics.turns import Turn, as_turn
 
 @dataclass(frozen=True)
 class Layout:
-    """Where cylinders and throws are, without their masses.
+    """Places of cylinders and throws, without masses.
 
     Attributes
     ----------
@@ -43,30 +43,30 @@ class Layout:
     throws: tuple[float, ...] | None = None
 
     def own_turn(self, k: int) -> Turn:
-        """Crank angle at which alpha of cylinder k is 0, were its throw at zero, as a part of a turn (C5)."""
+        """Return the crank angle of alpha = 0 of cylinder k with its throw at zero, in turns (C5)."""
         return as_turn(self.banks[k]) - as_turn(self.pin_offsets[k])
 
     def dead_centre(self, throws: Sequence[float], k: int) -> Turn:
-        """Crank angle of cylinder k's dead centre as a part of a turn (C5)."""
+        """Return the crank angle of cylinder k's dead centre, in turns (C5)."""
         late = as_turn(self.late[k]) if self.late else 0
         return self.own_turn(k) - as_turn(throws[self.pins[k]]) + late
 
     @property
     def spread(self) -> float:
-        """How far firing intervals may be from even for dead centres that are late [rad]."""
+        """Largest deviation from even firing because dead centres are late [rad]."""
         return max(self.late) - min(self.late) if self.late else 0.0
 
     def side(self, k: int) -> float:
-        """Share of the angle between the banks at which cylinder k leans, 1/2 to the left, -1/2 to the right."""
+        """Return the share of the bank angle at which cylinder k leans: 1/2 left, -1/2 right."""
         return self.sides[k] if self.sides else 0.0
 
 
 def stations(count: int, spacing: float) -> tuple[float, ...]:
-    """`count` places a `spacing` apart, the first at the front, the middle at x = 0 (C2)."""
+    """Return `count` places at equal spacing, the first at the front, the middle at x = 0 (C2)."""
     return tuple((count - 1 - 2 * k) * (0.5 * spacing) for k in range(count))
 
 
 def check_even(cylinders: int, what: str) -> None:
-    """Two banks share the cylinders."""
+    """Refuse an odd number of cylinders on two banks."""
     if cylinders < 2 or cylinders % 2:
         raise ModelError(f"{what} needs an even number of cylinders, got {cylinders}")

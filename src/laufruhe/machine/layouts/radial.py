@@ -1,4 +1,4 @@
-"""One row of cylinders around one crank pin: a master rod carries the others on knuckle pins."""
+"""Row of cylinders around one crank pin: a master rod carries the others on knuckle pins."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from laufruhe.machine.slider_crank import SliderCrank
 
 @dataclass(frozen=True, kw_only=True)
 class MasterRod(Mechanism):
-    """What the cylinders of a radial share, and the articulated rods.
+    """Shared numbers of the cylinders of a radial, and the articulated rods.
 
     Attributes
     ----------
@@ -66,7 +66,6 @@ class MasterRod(Mechanism):
         return ArticulatedCrank(**numbers_of(articulated), knuckle=knuckle)
 
     def _knuckle(self, number: int) -> Knuckle:
-        """Knuckle pin of a cylinder, on a master rod that stands for its geometry alone."""
         rod = SliderCrank(
             "master rod", 0.0, self.crank_radius, self.rod_length, 0.0, 0.0, self.master_bank, self.offset
         )
@@ -74,12 +73,11 @@ class MasterRod(Mechanism):
 
 
 def _top(part: SliderCrank) -> complex:
-    """The highest place of a piston pin in the plane of its cylinder [m]."""
     return complex(math.sqrt((part.rod_length + part.crank_radius) ** 2 - part.offset**2), part.offset)
 
 
 class Radial(LayoutKind):
-    """A master rod and articulated rods on one crank pin, cylinder 1 upright, numbers as the crank turns."""
+    """Master rod and articulated rods on one crank pin; cylinder 1 upright, numbers as the crank turns."""
 
     name = "radial"
     keys = (
@@ -107,7 +105,7 @@ class Radial(LayoutKind):
     needs_rod = True
 
     def place(self, asked: Asked) -> Layout:
-        """Cylinders at equal angles around one throw; phi = 0 is the true dead centre of cylinder 1 (C5)."""
+        """Return cylinders at equal angles around one throw; phi = 0 is the true dead centre of cylinder 1 (C5)."""
         count = asked.cylinders
         banks, none = _banks(count), (0.0,) * count
         rods = _master_rod(asked)
@@ -122,7 +120,7 @@ class Radial(LayoutKind):
     def parts(
         self, asked: Asked, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
-        """The master's slider-crank and the articulated ones, every second firing where four strokes take two turns."""
+        """Return the slider-cranks of master and articulated rods; on four strokes every second one fires."""
         turns, count = asked.cycle.turns, asked.cylinders
         order = [k + 1 for start in range(turns) for k in range(start, count, turns)]
         return build(asked.cycle, layout, _master_rod(asked), throws, asked.firing_order or order)
@@ -133,7 +131,7 @@ def _banks(count: int) -> tuple[float, ...]:
 
 
 def _master_rod(asked: Asked) -> MasterRod:
-    """What [engine] says of the rods.
+    """Return the master rod that [engine] describes.
 
     Raises
     ------

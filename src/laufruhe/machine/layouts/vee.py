@@ -10,7 +10,7 @@ STAGGER = Key("bank_stagger", "length")
 
 
 def vee(cylinders: int, spacing: float, bank_angle: float, split_pin: float = 0.0, bank_stagger: float = 0.0) -> Layout:
-    """Two banks on shared or split pins.
+    """Return two banks on shared or split pins.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def vee(cylinders: int, spacing: float, bank_angle: float, split_pin: float = 0.
 
 
 class Vee(LayoutKind):
-    """Two banks, a throw for each pair of cylinders."""
+    """Two banks with a throw for each pair of cylinders."""
 
     name = "vee"
     keys = (
@@ -56,7 +56,7 @@ class Vee(LayoutKind):
     banks = 2
 
     def place(self, asked: Asked) -> Layout:
-        """Two banks on shared or split pins."""
+        """Return two banks on shared or split pins."""
         own = asked.own
         if own["bank_angle"] is None:
             raise KeyedError("bank_angle", "is missing; add the angle between the banks, or its bounds")

@@ -27,18 +27,18 @@ from laufruhe.numerics.spectrum import Spectrum
 
 
 class Maximum(Norm):
-    """The largest length."""
+    """Largest length of the rows."""
 
     name = "maximum"
     refinement = 8
     is_largest = is_convex = of_row_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
-        """max_k |v_k|."""
+        """Return max_k |v_k|."""
         return float(lengths(rows).max(initial=0.0))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """v_k / |v_k| of the longest row alone."""
+        """Return v_k / |v_k| of the longest row alone."""
         size, z = lengths(rows), np.zeros_like(rows)
         k = int(np.argmax(size)) if len(size) else 0
         if len(size) and size[k] > 0.0:
@@ -46,34 +46,34 @@ class Maximum(Norm):
         return z
 
     def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks:
-        """Every row that is as long as the longest, and those that the dual rows given are of."""
+        """Return rows as long as the longest, and those that the given dual rows use."""
         size, shares = lengths(rows), lengths(z)
         counts = (size >= (1.0 - TOUCHES) * size.max(initial=0.0)) | (shares > COUNTS * shares.sum())
         return Kinks(z, np.flatnonzero(counts & (size > 0.0)))
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """sum_k |z_k|."""
+        """Return sum_k |z_k|."""
         return float(lengths(z).sum())
 
     def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """The solver's: one row is too little where several are as long."""
+        """Return the solver's rows: one row is too little where several are as long."""
         return z
 
     def spread(self, z: Array, steps: int, times: int) -> Array:
-        """In place: the angles between have nothing."""
+        """Return the rows in place, with zeros at the angles between."""
         return in_place(z, steps, times)
 
     def of_lengths(self, lengths: Array, weights: Array) -> Array:
-        """The largest."""
+        """Return the largest length."""
         return np.asarray(lengths.max(axis=-1))
 
     def cones(self, grid: Grid) -> Cones:
-        """One head over all rows."""
+        """Return a single head over all rows."""
         count = len(grid.weights)
         return Cones(np.ones(1), np.zeros(count, dtype=np.intp), np.ones(count))
 
     def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """A variable that no softened row exceeds (E22)."""
+        """Return a variable that no softened row exceeds (E22)."""
         import casadi as ca
 
         top = program.head(ca.mmax(ca.sqrt(ca.sum2(rows * rows))) / unit)
@@ -83,18 +83,18 @@ class Maximum(Norm):
     def limited(
         self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
     ) -> tuple[Any, float, float]:
-        """Squares, which are smooth at zero."""
+        """Limit the squares, which are smooth at zero."""
         import casadi as ca
 
         return ca.sum2(rows * rows), most * most, 2.0 * most
 
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
-        """Not above the sum of the orders' amplitudes."""
+        """Bound by the sum of the orders' amplitudes."""
         used = [signal for signal, share in zip(signals, shares, strict=True) if share > 0.0]
         return max((float(amplitudes(signal).max(initial=0.0)) for signal in used), default=0.0)
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Compared at every place where the samples could have stood, and what curvature lets these miss."""
+        """Compare all shifts of the samples, and add what curvature hides between them."""
         coarse = steps * self.refinement
         times, errors, bends = max(2, math.ceil(finest / coarse)), [0.0], [0.0]
         for signal, share in zip(signals, shares, strict=True):
@@ -108,7 +108,7 @@ class Maximum(Norm):
 
 
 def in_place(z: Array, steps: int, times: int) -> Array:
-    """Dual rows on a finer grid, nothing at the angles between."""
+    """Return dual rows on a finer grid, with zeros at the angles between."""
     blocks = z.reshape(-1, steps, z.shape[-1])
     out = np.zeros((len(blocks), steps * times, z.shape[-1]))
     out[:, ::times] = blocks

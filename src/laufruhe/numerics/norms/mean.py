@@ -39,72 +39,72 @@ class Mean(Norm):
     sums_lengths = is_convex = of_row_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
-        """sum_k w_k |v_k|."""
+        """Return sum_k w_k |v_k|."""
         return float(grid.weights @ lengths(rows))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """w_k v_k / |v_k|."""
+        """Return w_k v_k / |v_k|."""
         size = lengths(rows)
         return np.asarray(grid.weights[:, None] * rows / np.where(size > 0.0, size, 1.0)[:, None])
 
     def across(self, grid: Grid, rows: Array) -> Array | None:
-        """w_k / |v_k|; that of a short row where one vanishes."""
+        """Return w_k / |v_k|, with a short row in place of a zero one."""
         size = lengths(rows)
         return np.asarray(grid.weights / np.maximum(size, SHORT * float(size.max(initial=0.0)) or 1.0))
 
     def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks:
-        """Rows along the design's own, free where they vanish."""
+        """Return rows along the design's own, free where they vanish."""
         size = lengths(rows)
         vanishing = size <= VANISHES * float(size.max(initial=0.0))
         base = np.where(vanishing[:, None], 0.0, self.subgradient(grid, rows))
         return Kinks(base, vanishing=np.flatnonzero(vanishing))
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """max_k |z_k| / w_k; infinite where a weightless row is used."""
+        """Return max_k |z_k| / w_k; infinite where a weightless row is used."""
         size, weights = lengths(z), grid.weights
         if np.any((weights == 0.0) & (size > 0.0)):
             return math.inf
         return float((size / np.where(weights > 0.0, weights, 1.0)).max(initial=0.0))
 
     def dual_feasible(self, grid: Grid, z: Array) -> Array:
-        """Rows that are too long are cut."""
+        """Shorten rows that are too long."""
         size, weights = lengths(z), grid.weights
         shrink = np.divide(weights, size, out=np.ones(len(size)), where=size > weights)
         return np.asarray(z * shrink[:, None])
 
     def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """The design's own directions, the solver's only where a row vanishes."""
+        """Return the design's directions, the solver's only where a row vanishes."""
         size = lengths(rows)
         small = size <= 1e-6 * float(size.max(initial=0.0))
         return np.where(small[:, None], z, self.subgradient(grid, rows))
 
     def of_lengths(self, lengths: Array, weights: Array) -> Array:
-        """Lengths times weights."""
+        """Return lengths times weights."""
         return np.asarray(np.dot(lengths, weights))
 
     def majorant(self, grid: Grid, lengths: Array) -> tuple[Array, float]:
-        """|v| <= (|v|^2 / c + c) / 2 of every row."""
+        """Return |v| <= (|v|^2 / c + c) / 2 for every row."""
         size = np.maximum(lengths, LEAST * float(lengths.max(initial=0.0)) or 1.0)
         return grid.weights / size, 0.5 * float(grid.weights @ size)
 
     def cones(self, grid: Grid) -> Cones:
-        """A head for each row."""
+        """Return a head for each row."""
         count = len(grid.weights)
         return Cones(grid.weights, np.arange(count), np.ones(count))
 
     def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Softened lengths."""
+        """Return the softened lengths."""
         import casadi as ca
 
         return ca.dot(ca.DM(grid.weights), softened_lengths(rows, share * unit))
 
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
-        """Not above the root mean square of the same place."""
+        """Bound by the root mean square of the same place."""
         squares = np.array([mean_square(signal) for signal in signals])
         return float(shares @ np.sqrt(squares).mean(axis=1))
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Compared at every place where the samples could have stood, and what curvature lets these miss."""
+        """Compare all shifts of the samples, and add what curvature hides between them."""
         times, total = max(2, math.ceil(finest / steps)), 0.0
         for signal, share in zip(signals, shares, strict=True):
             if share == 0.0:

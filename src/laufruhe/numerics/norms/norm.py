@@ -1,4 +1,4 @@
-"""What a norm of a signal has to know of itself (P1-P3).
+"""Base class of norms of signals (P1-P3).
 
 Mean, peak and root mean square of a force over angle, mounts and operating points are
 norms of the same kind: a norm over rows of the length of each row. So is a sum of masses
@@ -27,7 +27,7 @@ _LEAST, _MOST = 1e-140, 1e150
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Where rows stand.
+    """Weights and grouping of the rows of signals.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Kinks:
 
 @dataclass(frozen=True, eq=False)
 class Cones:
-    """A norm as the least linear function of heads t_c >= |rows of cone c| (P1).
+    """Norm as the least linear function of heads t_c >= |rows of cone c| (P1).
 
     Attributes
     ----------
@@ -109,28 +109,28 @@ class Cones:
 
 
 class SmoothProgram(Protocol):
-    """What a smooth form may add to the program that it becomes part of (N3, E22)."""
+    """Program that a smooth form adds variables and constraints to (N3, E22)."""
 
     def head(self, value: Any) -> Any:
-        """A variable that is at least zero; `value` is where it stands at a given point."""
+        """Return a nonnegative variable that starts at `value`."""
 
     def free(self, value: Any) -> Any:
-        """A row of variables without bounds."""
+        """Return a row of variables without bounds."""
 
     def hold(self, expression: Any) -> None:
-        """Every entry at most zero."""
+        """Constrain every entry to be at most zero."""
 
 
 _ONLY: dict[type[Norm], Norm] = {}
 
 
 def only(kind: type[Norm]) -> Norm:
-    """The one norm of a class."""
+    """Return the single instance of a norm's class."""
     return _ONLY.setdefault(kind, kind())
 
 
 class Norm(ABC):
-    """A norm of rows v_k, shape (k, d), on a grid.
+    """Norm of rows v_k, shape (k, d), on a grid.
 
     A class claims what it is; a fact that it does not claim is used by no method and by no bound. One that claims
     nothing needs `value`, `above` and `sampling_bound` alone.
@@ -183,10 +183,10 @@ class Norm(ABC):
 
     @abstractmethod
     def value(self, grid: Grid, rows: Array) -> float:
-        """The norm."""
+        """Return the norm."""
 
     def values(self, grid: Grid, many: Array) -> Array:
-        """Of many signals, shape (n, k, d)."""
+        """Return the norm of many signals, shape (n, k, d)."""
         return np.array([self.value(grid, rows) for rows in many])
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
@@ -197,7 +197,7 @@ class Norm(ABC):
         raise self._unclaimed("subgradient")
 
     def across(self, grid: Grid, rows: Array) -> Array | None:
-        """Second derivative across every row, shape (k,); None where the norm is no sum over its rows (P10)."""
+        """Return the second derivative across every row, shape (k,); None if the norm is no sum over rows (P10)."""
         return None
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
@@ -205,7 +205,7 @@ class Norm(ABC):
         raise self._unclaimed("dual norm")
 
     def dual_feasible(self, grid: Grid, z: Array) -> Array:
-        """The nearest simple change of Z into the unit ball of the dual norm (P3)."""
+        """Return a simple projection of Z into the unit ball of the dual norm (P3)."""
         excess = self.dual_norm(grid, z)
         return z if excess <= 1.0 else z / excess
 
@@ -214,7 +214,7 @@ class Norm(ABC):
         return None
 
     def balanced(self, grid: Grid, z: Array) -> Array:
-        """The nearest dual rows whose dual norm is finite (P3)."""
+        """Return nearby dual rows with a finite dual norm (P3)."""
         return z
 
     def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
@@ -222,15 +222,15 @@ class Norm(ABC):
         raise self._unclaimed("dual norm")
 
     def spread(self, z: Array, steps: int, times: int) -> Array:
-        """Dual rows at `steps` angles of each signal on a grid `times` as fine, straight from angle to angle (P6)."""
+        """Interpolate dual rows at `steps` angles of each signal to a grid `times` as fine (P6)."""
         return between(z, steps, times)
 
     def of_lengths(self, lengths: Array, weights: Array) -> Array:
-        """Of many designs from the lengths of their rows, shape (..., k) to (...); the lengths are used up."""
+        """Return the norm of many designs from row lengths (..., k), shape (...); overwrites the lengths."""
         raise TypeError(f"{self.name} is not known from lengths alone")
 
     def majorant(self, grid: Grid, lengths: Array) -> tuple[Array, float] | None:
-        """Squares that lie over the norm, and touch it where the rows are as long as these (R6).
+        """Return squares above the norm that touch it at these row lengths (R6).
 
         Returns
         -------
@@ -249,7 +249,7 @@ class Norm(ABC):
     def limited(
         self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
     ) -> tuple[Any, float, float]:
-        """A smooth expression, what it may not exceed where the norm may not exceed `most`, and the slope of that.
+        """Return a smooth expression for norm <= `most`, its largest value, and the slope of that by `most`.
 
         Smooth where the rows are zero too, and off by no more than the share of one; that to minimise where it is so.
         """
@@ -257,18 +257,18 @@ class Norm(ABC):
 
     @abstractmethod
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
-        """A value that the norm of these signals (n, places, d) does not exceed, without a sample (F6)."""
+        """Return an upper bound of the norm of signals (n, places, d), without samples (F6)."""
 
     @abstractmethod
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """How far the norm at `steps` samples a cycle can be off at the most (F7, F8)."""
+        """Return an upper bound of the sampling error of the norm at `steps` samples a cycle (F7, F8)."""
 
     def _unclaimed(self, what: str) -> TypeError:
         return TypeError(f"norm '{self.name}' claims no {what}, and a method asks for it")
 
 
 def between(z: Array, steps: int, times: int) -> Array:
-    """Dual rows on a finer grid, straight from angle to angle."""
+    """Interpolate dual rows to a finer grid, linearly by angle."""
     blocks = z.reshape(-1, steps, z.shape[-1])
     share = np.arange(times) / times
     following = np.roll(blocks, -1, axis=1)
@@ -277,7 +277,7 @@ def between(z: Array, steps: int, times: int) -> Array:
 
 
 def lengths(rows: Array) -> Array:
-    """|v_k| of each row, shape (k, d) to (k,), safe from overflow and underflow."""
+    """Return |v_k| of each row, shape (k, d) to (k,), safe from overflow and underflow."""
     # BLAS warns of nothing
     if not np.vdot(rows, rows) < _MOST**2:
         return _scaled_lengths(rows)
@@ -291,7 +291,6 @@ def lengths(rows: Array) -> Array:
 
 @lru_cache(maxsize=16)
 def _ones(count: int) -> Array:
-    """So many ones: a sum as a product with them takes a fifth of the time."""
     return np.ones(count)
 
 
@@ -302,14 +301,14 @@ def _scaled_lengths(rows: Array) -> Array:
 
 
 def softened_lengths(rows: Any, softness: Any) -> Any:
-    """|v|_e of each row of a CasADi matrix (k, d), shape (k, 1) (N3)."""
+    """Return sqrt(|v|^2 + e^2) - e of each row of a CasADi matrix (k, d), shape (k, 1) (N3)."""
     import casadi as ca
 
     return ca.sqrt(ca.sum2(rows * rows) + softness * softness) - softness
 
 
 def mean_square(signal: Spectrum) -> Array:
-    """Mean square over the cycle at every place, shape (places,); Parseval's sum."""
+    """Return the mean square over the cycle at every place, shape (places,), by Parseval's sum."""
     c = signal.coefficients
     power = 0.5 * np.sum(np.abs(c) ** 2, axis=(0, 2))
     # the steady part does not alternate
@@ -320,7 +319,7 @@ def mean_square(signal: Spectrum) -> Array:
 
 
 def amplitudes(signal: Spectrum) -> Array:
-    """What the signal does not exceed at every place, shape (places,): the sum of the orders' amplitudes."""
+    """Return the sum of the orders' amplitudes at every place, an upper bound of the signal, shape (places,)."""
     own = order_amplitude(signal.coefficients).sum(axis=0)
     if signal.corners is None:
         return np.asarray(own)
@@ -328,7 +327,7 @@ def amplitudes(signal: Spectrum) -> Array:
 
 
 def curvature(signal: Spectrum) -> tuple[Array, Array]:
-    """Bounds of the second derivative over crank angle between bends, and of its mean with these, shape (places,)."""
+    """Bound the second derivative over crank angle between kinks, and its mean with them, shape (places,)."""
     smooth = signal.smooth
     bent = Spectrum(smooth.base, smooth.coefficients * (smooth.orders**2)[:, None, None])
     most, mean = amplitudes(bent), np.sqrt(mean_square(bent))
@@ -340,12 +339,12 @@ def curvature(signal: Spectrum) -> tuple[Array, Array]:
 
 
 def jumped(signal: Spectrum) -> Array:
-    """Sum of all jumps of the signal itself over its period, shape (places,)."""
+    """Return the sum of the signal's own jumps over its period, shape (places,)."""
     if signal.corners is None:
         return np.zeros(signal.coefficients.shape[1])
     return lengths(np.abs(signal.corners.jumps[:, 0]).sum(axis=0)) / signal.period
 
 
 def fine_lengths(signal: Spectrum, steps: int, times: int) -> tuple[Array, float]:
-    """Lengths at `steps` samples from each of `times` first angles, (steps, times, places); and the step [rad]."""
+    """Return lengths at `steps` samples from `times` first angles, (steps, times, places), and the step [rad]."""
     return lengths(signal.sample(steps * times)).reshape(steps, times, -1), signal.period / (steps * times)

@@ -38,23 +38,23 @@ SAME_WAY = 1e-3
 
 
 class PeakToPeak(Norm):
-    """The largest diameter of the signals."""
+    """Largest diameter of the signals."""
 
     name = "peak to peak"
     refinement = 8
     is_diameter = is_convex = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
-        """The largest diameter."""
+        """Return the largest diameter."""
         return _diameter(_signals(rows, grid.steps))
 
     def values(self, grid: Grid, many: Array) -> Array:
-        """Of all balls together."""
+        """Return the largest diameter of each of many signals."""
         balls = smallest_balls(_signals(many, grid.steps))
         return np.asarray(2.0 * balls.radii.reshape(len(many), -1).max(axis=1, initial=0.0))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """Along the radii to the points that hold the largest ball, by their shares of its centre."""
+        """Return radii to the points that hold the largest ball, by their shares of its centre."""
         z = np.zeros_like(rows)
         balls = smallest_balls(_signals(rows, grid.steps))
         if balls.radii.max(initial=0.0) > 0.0:
@@ -87,35 +87,35 @@ class PeakToPeak(Norm):
         return Kinks(found[0], others=tuple(found[1:])) if 0 < len(found) <= MOST_KINKS else None
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """Half the sum of the lengths; infinite where the rows of a signal do not add up to nothing."""
+        """Return half the sum of lengths; infinite if the rows of a signal do not add up to zero."""
         sums = np.array([signal.sum(axis=0) for signal in _signals(z, grid.steps)])
         whole = float(lengths(z).sum())
         return 0.5 * whole if np.abs(sums).max(initial=0.0) <= 1e-12 * whole else math.inf
 
     def dual_feasible(self, grid: Grid, z: Array) -> Array:
-        """Balanced, then scaled."""
+        """Balance, then scale."""
         return super().dual_feasible(grid, self.balanced(grid, z))
 
     def balanced(self, grid: Grid, z: Array) -> Array:
-        """The mean of every signal taken away."""
+        """Subtract the mean of every signal."""
         blocks = z.reshape(-1, grid.steps, z.shape[-1])
         return np.asarray(blocks - blocks.mean(axis=1, keepdims=True)).reshape(z.shape)
 
     def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """The solver's: several signals may be as large."""
+        """Return the solver's rows: several signals may be as large."""
         return z
 
     def spread(self, z: Array, steps: int, times: int) -> Array:
-        """In place: the angles between have nothing."""
+        """Return the rows in place, with zeros at the angles between."""
         return in_place(z, steps, times)
 
     def cones(self, grid: Grid) -> Cones:
-        """One head over all rows, those of a signal counted from a centre that is free."""
+        """Return a single head over all rows, each signal counted from a free centre."""
         count = len(grid.weights)
         return Cones(np.full(1, 2.0), np.zeros(count, dtype=np.intp), np.ones(count), centred=True)
 
     def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """A variable over all radii (E22)."""
+        """Return a variable over all radii (E22)."""
         return 2.0 * unit * self._radius(program, grid, rows / unit, share)
 
     def _radius(self, program: SmoothProgram, grid: Grid, rows: Any, share: Any) -> Any:
@@ -133,12 +133,12 @@ class PeakToPeak(Norm):
         return top
 
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
-        """Not above twice the sum of the amplitudes of the orders that alternate."""
+        """Bound by twice the sum of the amplitudes of alternating orders."""
         used = [signal for signal, share in zip(signals, shares, strict=True) if share > 0.0]
         return max((_swing(signal) for signal in used), default=0.0)
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Compared at every place where the samples could have stood, and what curvature lets these miss."""
+        """Compare all shifts of the samples, and add what curvature hides between them."""
         coarse = steps * self.refinement
         times, errors, bends = max(2, math.ceil(finest / coarse)), [0.0], [0.0]
         for signal, share in zip(signals, shares, strict=True):
@@ -158,7 +158,6 @@ def _signals(rows: Array, steps: int) -> Array:
 
 
 def _peaks(sizes: Array) -> NDArray[np.intp]:
-    """Return where lengths are as large as the largest, of neighbours the largest alone."""
     touching = np.flatnonzero(sizes >= (1.0 - TOUCHES) * sizes.max(initial=0.0))
     groups = np.split(touching, np.flatnonzero(np.diff(touching) > 1) + 1)
     if len(groups) > 1 and groups[0][0] == 0 and groups[-1][-1] == len(sizes) - 1:
@@ -171,7 +170,6 @@ def _balance(along: Array) -> Array:
 
 
 def _shares_of(along: Array) -> Array | None:
-    """Return the only shares, one in sum, with which directions add up to nothing; None where there are no such."""
     system = _balance(along)
     right = np.zeros(len(system))
     right[-1] = 1.0
@@ -186,10 +184,8 @@ def _swing(signal: Spectrum) -> float:
 
 
 def _reach(steps: Array, bent: Array) -> float:
-    """Diameter of the ball that holds a signal at equal steps and where it bends."""
     return _diameter(np.concatenate([steps, bent])[None])
 
 
 def _diameter(signals: Array) -> float:
-    """The largest, of signals of shape (signals, steps, d)."""
     return float(2.0 * smallest_balls(signals).radii.max(initial=0.0))

@@ -14,13 +14,13 @@ from laufruhe.numerics.spectrum import Spectrum
 
 
 class RootMeanSquare(Norm):
-    """The Euclidean norm of weighted rows."""
+    """Euclidean norm of weighted rows."""
 
     name = "rms"
     is_euclidean = is_convex = of_row_lengths = is_pointwise = True
 
     def value(self, grid: Grid, rows: Array) -> float:
-        """sqrt(sum_k w_k |v_k|^2)."""
+        """Return sqrt(sum_k w_k |v_k|^2)."""
         size = np.where(grid.weights > 0.0, lengths(rows), 0.0)
         largest = float(size.max(initial=0.0))
         if largest == 0.0:
@@ -28,16 +28,16 @@ class RootMeanSquare(Norm):
         return largest * float(np.sqrt(grid.weights @ np.square(size / largest)))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """w_k v_k over the norm."""
+        """Return w_k v_k over the norm."""
         total = self.value(grid, rows)
         return np.asarray(grid.weights[:, None] * rows / total) if total > 0.0 else np.zeros_like(rows)
 
     def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks:
-        """Rows along the design's own: it is smooth but at zero."""
+        """Return rows along the design's own: the norm is smooth except at zero."""
         return Kinks(self.subgradient(grid, rows) if rows.any() else z)
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
-        """sqrt(sum_k |z_k|^2 / w_k); infinite where a weightless row is used."""
+        """Return sqrt(sum_k |z_k|^2 / w_k); infinite where a weightless row is used."""
         size, weights = lengths(z), grid.weights
         if np.any((weights == 0.0) & (size > 0.0)):
             return math.inf
@@ -47,24 +47,24 @@ class RootMeanSquare(Norm):
         return largest * float(np.sqrt((np.square(size / largest) / np.where(weights > 0.0, weights, 1.0)).sum()))
 
     def aligned(self, grid: Grid, rows: Array, z: Array) -> Array:
-        """The design's own direction."""
+        """Return the design's own direction."""
         return self.subgradient(grid, rows)
 
     def of_lengths(self, lengths: Array, weights: Array) -> Array:
-        """The root of squares times weights."""
+        """Return the root of weighted squares."""
         return np.asarray(np.sqrt(np.dot(np.multiply(lengths, lengths, out=lengths), weights)))
 
     def majorant(self, grid: Grid, lengths: Array) -> tuple[Array, float]:
-        """N <= (N^2 / c + c) / 2 of the whole."""
+        """Return N <= (N^2 / c + c) / 2 for the whole."""
         whole = self.value(grid, lengths[:, None]) or 1.0
         return grid.weights / whole, 0.5 * whole
 
     def cones(self, grid: Grid) -> Cones:
-        """One cone for all rows, each times the root of its weight."""
+        """Return a single cone over all rows, each times the root of its weight."""
         return Cones(np.ones(1), np.zeros(1, dtype=np.intp), np.sqrt(grid.weights), whole=True)
 
     def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
-        """Softened as one length."""
+        """Return the norm softened as a single length."""
         import casadi as ca
 
         softness = share * unit
@@ -73,18 +73,18 @@ class RootMeanSquare(Norm):
     def limited(
         self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
     ) -> tuple[Any, float, float]:
-        """The mean square, which is smooth at zero."""
+        """Limit the mean square, which is smooth at zero."""
         import casadi as ca
 
         return ca.dot(ca.DM(grid.weights), ca.sum2(rows * rows)), most * most, 2.0 * most
 
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
-        """Parseval's sum, which is exact but for the orders of corners."""
+        """Return Parseval's sum, exact except for orders of kinks."""
         squares = np.array([mean_square(signal) for signal in signals])
         return math.sqrt(float(shares @ squares.mean(axis=1)))
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """Against Parseval's sum."""
+        """Compare with Parseval's sum."""
         squares = [float(np.square(lengths(s.series.sample(steps))).mean()) for s in signals]
         sampled = math.sqrt(float(shares @ np.array(squares)))
         # the orders of corners beyond those that are counted add something between nothing and a bound

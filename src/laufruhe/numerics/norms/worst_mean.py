@@ -29,18 +29,18 @@ _MEAN = Mean()
 
 
 class WorstMean(Norm):
-    """The largest mean of any operating point."""
+    """Largest mean of any operating point."""
 
     name = "worst mean"
     averages = True
     is_largest_mean = is_convex = True
 
     def value(self, grid: Grid, rows: Array) -> float:
-        """max_p mean_p |v_k|."""
+        """Return max_p mean_p |v_k|."""
         return float(self._means(grid, rows).max(initial=0.0))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
-        """That of the mean at the worst operating point."""
+        """Return the subgradient of the mean at the worst operating point."""
         means, z = self._means(grid, rows), np.zeros_like(rows)
         if len(means):
             own = slice(int(np.argmax(means)) * _size(grid), (int(np.argmax(means)) + 1) * _size(grid))
@@ -48,7 +48,7 @@ class WorstMean(Norm):
         return z
 
     def kinks(self, grid: Grid, rows: Array, z: Array) -> Kinks | None:
-        """Return those of the mean of every operating point that is as large; None where a row of one vanishes."""
+        """Return the kinks of the largest means; None where a row of one vanishes."""
         means, size, found = self._means(grid, rows), _size(grid), list[Array]()
         for point in np.flatnonzero(means >= (1.0 - TOUCHES) * means.max(initial=0.0)):
             own, base = slice(point * size, (point + 1) * size), np.zeros_like(rows)
@@ -100,7 +100,7 @@ class WorstMean(Norm):
         return max((_MEAN.above([own], np.ones(1)) for own in _counted(signals, shares)), default=0.0)
 
     def sampling_bound(self, signals: Sequence[Spectrum], shares: Array, steps: int, finest: int) -> float:
-        """No more than that of the mean which is off most."""
+        """Return the bound of the mean that is off most."""
         errors = (_MEAN.sampling_bound([own], np.ones(1), steps, finest) for own in _counted(signals, shares))
         return max(errors, default=0.0)
 
@@ -117,12 +117,10 @@ class WorstMean(Norm):
 
 
 def _size(grid: Grid) -> int:
-    """Rows of one operating point."""
     return len(grid.weights) // grid.points
 
 
 def _shares(grid: Grid) -> Array:
-    """Weights of which those of every operating point add up to one, shape (k,)."""
     blocks = grid.weights.reshape(grid.points, _size(grid))
     whole = blocks.sum(axis=1, keepdims=True)
     return np.asarray(blocks / np.where(whole > 0.0, whole, 1.0)).reshape(-1)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from laufruhe.load_models.simulated import simulated_measures
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.norms import NORMS
-from laufruhe.numerics.processes import called
+from laufruhe.numerics.processes import call_by_name
 from laufruhe.problem import channels
 from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import with_default_sampling
@@ -102,7 +102,7 @@ def simulated_boxes(model: BoxModel) -> SimulatedBoxes | None:
     measures = simulated_measures(model.problem)
     if not measures:
         return None
-    found: SimulatedBoxes | None = called(f"{measures[0].channel.simulation}:boxes", model, measures)
+    found: SimulatedBoxes | None = call_by_name(f"{measures[0].channel.simulation}:boxes", model, measures)
     return found
 
 

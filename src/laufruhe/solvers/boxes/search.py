@@ -12,7 +12,7 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
-from laufruhe.numerics.foresight import Foresight, foresight
+from laufruhe.numerics.workers import Speculation, speculation
 from laufruhe.prove.best_first import Division, Over, Parts, Waiting
 from laufruhe.prove.certificate import gap_of
 from laufruhe.prove.witness import Bounder, Known, check_around
@@ -97,7 +97,7 @@ class _Branching(Division[B], Generic[B, D]):
     """Branch and bound that keeps the best design of all boxes."""
 
     def __init__(
-        self, search: Search[B, D], best: D, nothing: float, tolerance: float, what: str, ahead: Foresight[Any, Any]
+        self, search: Search[B, D], best: D, nothing: float, tolerance: float, what: str, ahead: Speculation[Any, Any]
     ) -> None:  # fmt: skip
         self.what, self.best, self.value = what, best, best.value
         self.known = search.known(best)
@@ -124,8 +124,8 @@ class _Branching(Division[B], Generic[B, D]):
         search, step = self._search, (self._search, box, self.value)
         if search.is_shared:
             others = ((number, (search, part, self.value)) for _, number, part in self.coming(AHEAD))
-            self._ahead.likely([(name, step), *others])
-        parts, conflict = self._ahead.wanted(name, step)
+            self._ahead.prefetch([(name, step), *others])
+        parts, conflict = self._ahead.result(name, step)
         search.add_conflict(conflict)
         for part, design in parts:
             if design is not None and design.rank < self.best.rank:
@@ -159,7 +159,7 @@ def divided(
     -------
     The best design, the lower bound of all designs (infinite if none is feasible), and the number of boxes.
     """
-    with foresight(_parted) as ahead:
+    with speculation(_parted) as ahead:
         boxes = _Branching(search, best, nothing, tolerance, what, ahead)
         bound = boxes.divide((root.bound, root), most)
     if boxes.known is not None:

@@ -13,8 +13,7 @@ import numpy as np
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
-from laufruhe.numerics.foresight import foresight
-from laufruhe.numerics.workers import at_hand
+from laufruhe.numerics.workers import speculation, worker_pool
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
@@ -105,19 +104,19 @@ def _solved(
     started = time.perf_counter()
     initial = evaluate_start(problem)
     worth = looks(problem) >= MANY_LOOKS and workers != 1 and not among
-    with at_hand(run, *(prover.bounds for prover in provers())) if worth else nullcontext():
+    with worker_pool(run, *(prover.bounds for prover in provers())) if worth else nullcontext():
         search = MountSearch(problem, initial, workers, moves, first, beside=moves is None)
         modelled = time.perf_counter()
         search.run()
-        with foresight(_balance, math.inf) as ahead:
+        with speculation(_balance, math.inf) as ahead:
             # beside the bounds, which may still find a better design
-            ahead.likely((each.design.values, _share(each.design)) for each in [search.chosen] if each is not None)
+            ahead.prefetch((each.design.values, _share(each.design)) for each in [search.chosen] if each is not None)
             divided = divided_by(problem, search, among)
             found = search.chosen
             timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
             if found is None or found.design.excess > KEPT:
                 return _none(problem, search, initial, divided, timing), search.turns
-            balance = ahead.wanted(found.design.values, _share(found.design))
+            balance = ahead.result(found.design.values, _share(found.design))
     proven = None if balance is None else _rebalanced(found.design, *balance)
     design = found.design if proven is None or proven[0].value >= found.design.value else proven[0]
     return _result(search, initial, replace(found, design=design), proven, divided, timing, among), search.turns

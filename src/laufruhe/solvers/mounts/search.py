@@ -12,7 +12,7 @@ from laufruhe.load_models.simulated import COARSER
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed, rounds
-from laufruhe.numerics.progress import tell
+from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Limit
@@ -101,14 +101,14 @@ class MountSearch:
         first: Place | None = None, beside: bool = False, coarser: int = COARSER,
     ) -> None:  # fmt: skip
         self.problem, self.moves, self._workers, self._coarser = problem, moves, workers, coarser
-        tell("starts of the mounts")
+        report_progress("starts of the mounts")
         self._points, self._size = start_points(problem)
         if first is not None:
             mounts, columns = first
             own = self._points[0][1] if columns is None else columns
             self._points = [(mounts, own), *self._points[0 if beside else 1 :]]
         self._left_out = self._kept_anyway()
-        tell("smooth program of all that is open")
+        report_progress("smooth program of all that is open")
         self.joint = self._program()
         self._given = given_design(problem, initial) if moves is None else None
         self.best: Found | None = None
@@ -243,7 +243,9 @@ class MountSearch:
         designs: list[Design] = []
         for k, optimum in enumerate(optima):
             kept = self.best is not None and self.best.design.excess <= SLACK
-            tell("ends judged", k, len(optima), self.best.design.value if self.best is not None and kept else np.inf)
+            report_progress(
+                "ends judged", k, len(optima), self.best.design.value if self.best is not None and kept else np.inf
+            )
             design = self._judged(optimum, self.joint)
             if design is not None:
                 designs.append(design)

@@ -21,8 +21,8 @@ from laufruhe.errors import ModelError, counted
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.norms import RMS
-from laufruhe.numerics.progress import tell, within
-from laufruhe.numerics.workers import executor_for, in_turn, working_on
+from laufruhe.numerics.progress import report_progress, within
+from laufruhe.numerics.workers import executor_for, ordered_map, working_on
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import Evaluation, evaluate, with_default_sampling
 from laufruhe.problem.measure import Measure, Term
@@ -166,7 +166,7 @@ def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star]) -> li
         near = place_of(known[0].problem, known[0])[0] if known else None
         # stars side by side, and the starts of each in one process
         work = partial(solve_mounts, workers=1, among=True, near=near)
-        results += in_turn(work, problems[1:], "stars on their mounts") if not passed() else []
+        results += ordered_map(work, problems[1:], "stars on their mounts") if not passed() else []
     found = [StarDesign(star, result, steps) for (star, steps), result in zip(stars, results, strict=False)]
     return sorted(found, key=_rank)
 
@@ -181,7 +181,7 @@ def _solved_fully(problem: Problem, found: list[StarDesign]) -> list[StarDesign]
         if own.search.starts >= starts or each.bound >= found[0].value * (1.0 - problem.tolerance):
             continue
         whole = min(len(found), MOST_SEARCHED)
-        tell("best stars once more", k, whole, value=_least(out))
+        report_progress("best stars once more", k, whole, value=_least(out))
         more = replace(own, search=replace(own.search, starts=starts))
         with within(f"best star {k + 1} of {whole}"):
             again = replace(each, result=solve_mounts(more, among=True))
@@ -200,7 +200,7 @@ def _bounded(found: list[StarDesign], phasing: Phasing, designs: int) -> list[St
     enough = first.certificate.lower_bound if first.certificate is not None else least
     pieces = [(k, each.result) for k, each in enumerate(found)][1:]
     work = partial(_bounded_one, value=least, enough=enough)
-    for k, result in in_turn(work, pieces, "bounds of stars on their mounts"):
+    for k, result in ordered_map(work, pieces, "bounds of stars on their mounts"):
         out[k] = replace(out[k], result=result)
     return out
 
@@ -218,7 +218,7 @@ def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign]) -> list[
     starts = starts or [(start, None) for start in starts_of(phasing, None)[:MOST_SEARCHED]]
     out: list[StarDesign] = []
     for k, (candidate, even) in enumerate(() if found and passed() else starts):
-        tell("throws that leave their star", k, len(starts), value=_least([*found, *out]))
+        report_progress("throws that leave their star", k, len(starts), value=_least([*found, *out]))
         own = _problem_of(problem, phasing, candidate, problem.search.starts)
         moves = ThrowMoves(phasing, phasing.layout_of(candidate), candidate, phasing.intervals)
         result, moved = solve_moved(own, moves, even)

@@ -13,8 +13,7 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.simulated import COARSER, Peaks, peaks_of, simulated_measures
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time, left, limited
-from laufruhe.numerics.foresight import foresight
-from laufruhe.numerics.workers import HERE, count_of, given
+from laufruhe.numerics.workers import SERIAL, current_executor, speculation, worker_count
 from laufruhe.problem.decision import columns_of, domains_of, sides_of
 from laufruhe.problem.evaluation import Evaluation, objective_value, remounted
 from laufruhe.problem.mount_resonance import evaluate_start, off_resonance
@@ -141,14 +140,14 @@ def _looking(problem: Problem, initial: Evaluation, pool: Array) -> Iterator[Cal
     # higher orders hardly move a block, and take most of the time
     loads = tuple(replace(load, wrench=load.wrench.series.kept(POOL_ORDERS)) for load in initial.loads)
     coarse = replace(initial, samples=POOL_SAMPLES, resonance="", loads=loads)
-    shares = [(problem, coarse, points) for points in np.array_split(pool, count_of(given() or HERE))]
-    with foresight(_look, math.inf) as ahead:
+    shares = [(problem, coarse, points) for points in np.array_split(pool, worker_count(current_executor() or SERIAL))]
+    with speculation(_look, math.inf) as ahead:
         with limited(LOOKING * left()):
-            ahead.likely(enumerate(shares))
+            ahead.prefetch(enumerate(shares))
 
         def looked() -> Array:
             with limited(LOOKING * left()):
-                return np.concatenate([ahead.wanted(k, share) for k, share in enumerate(shares)])
+                return np.concatenate([ahead.result(k, share) for k, share in enumerate(shares)])
 
         yield looked
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time, left, passed
-from laufruhe.numerics.progress import tell, telling
+from laufruhe.numerics.progress import report_progress, with_progress
 from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 
 # residual (N2) of what counts as a local optimum, however the solver ended there
@@ -99,9 +99,9 @@ def run(share: tuple[Task, Sequence[tuple[int, Array]]]) -> list[LocalOptimum]:
     task, points = share
     if not points:
         return []
-    tell("derivatives of the smooth program")
+    report_progress("derivatives of the smooth program")
     built = _of_task(task)
-    return [_from_start(task, built, k, point) for k, point in in_time(telling("starts", points))]
+    return [_from_start(task, built, k, point) for k, point in in_time(with_progress("starts", points))]
 
 
 class _Clock(ca.Callback):

@@ -34,9 +34,15 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
-from laufruhe.numerics.foresight import foresight
 from laufruhe.numerics.processes import Processes
-from laufruhe.numerics.workers import WORTH_PROCESSES, count_of, each, executor_for, given
+from laufruhe.numerics.workers import (
+    WORTH_PROCESSES,
+    current_executor,
+    executor_for,
+    speculation,
+    unordered_map,
+    worker_count,
+)
 from laufruhe.solvers.smooth.ipopt import Outside, Task, Teller, run
 from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
 
@@ -180,9 +186,9 @@ def _first_ends(
 ) -> tuple[list[LocalOptimum], Several]:
     """Where starts end, and who looked for that."""
     rest = points[1:]
-    count = min(len(rest), workers if workers is not None else count_of())
+    count = min(len(rest), workers if workers is not None else worker_count())
     # threads would share a linear solver that knows of one alone
-    at_hand = _AtHand(stack, count) if count > 1 and isinstance(given(), Processes) else None
+    at_hand = _AtHand(stack, count) if count > 1 and isinstance(current_executor(), Processes) else None
     if at_hand is not None:
         at_hand.begin((task, rest[:ROUND] if enough is not None else rest))
     # one start tells whether the others are worth processes of their own
@@ -212,7 +218,7 @@ class _Shared:
         """As `run`."""
         task, points = share
         shares = [(task, points[k :: self._count]) for k in range(min(self._count, len(points)))]
-        with closing(each(run, shares, self._executor, patient=True)) as answers:
+        with closing(unordered_map(run, shares, self._executor, patient=True)) as answers:
             return sorted((optimum for _, some in answers for optimum in some), key=lambda o: o.start)
 
 
@@ -220,18 +226,18 @@ class _AtHand:
     """Workers that are there before they are asked, and so may begin before it is known that they will be."""
 
     def __init__(self, stack: ExitStack, count: int) -> None:
-        self._count, self._ahead = count, stack.enter_context(foresight(run))
+        self._count, self._ahead = count, stack.enter_context(speculation(run))
 
     def begin(self, share: Share) -> None:
         """What is likely to be asked."""
-        self._ahead.likely(self._shares(share))
+        self._ahead.prefetch(self._shares(share))
 
     def __call__(self, share: Share) -> list[LocalOptimum]:
         """As `run`; one start goes on here, where the program is set up."""
         if len(share[1]) == 1:
             return run(share)
         self.begin(share)
-        found = [optimum for key, own in self._shares(share) for optimum in self._ahead.wanted(key, own)]
+        found = [optimum for key, own in self._shares(share) for optimum in self._ahead.result(key, own)]
         return sorted(found, key=lambda o: o.start)
 
     def _shares(self, share: Share) -> list[tuple[Hashable, Share]]:

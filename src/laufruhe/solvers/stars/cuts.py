@@ -16,7 +16,7 @@ import numpy as np
 
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.numerics.budget import passed
-from laufruhe.numerics.progress import tell
+from laufruhe.numerics.progress import report_progress
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.decision import Domain
@@ -102,7 +102,9 @@ def search_designs(
         if time.perf_counter() - started > time_limit or (passed() and search.tried):
             complete = False
             break
-        tell("stars and sets of shafts", len(search.solved) + search.infeasible, search.bounds.size, *search.standing)
+        report_progress(
+            "stars and sets of shafts", len(search.solved) + search.infeasible, search.bounds.size, *search.standing
+        )
         search.solve(*place)
     solved = sorted(search.solved, key=lambda s: (s.value, s.star, s.built))
     _, least = search.standing

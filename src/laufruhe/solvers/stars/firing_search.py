@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from laufruhe.load_models.pair_tables import PairObjective
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import limited, passed
-from laufruhe.numerics.progress import tell
+from laufruhe.numerics.progress import report_progress
 from laufruhe.physics.crank_stars import Stars
 from laufruhe.solvers.stars.search import BestStars, StarsFound
 
@@ -41,7 +41,7 @@ def enumerate_orders(
     waiting: list[tuple[int, Stars, Array]] = [(1, stars, squares)]
     with limited(time_limit):
         while waiting and not ended:
-            tell("partial firing orders", seen, value=float(found.values.min(initial=np.inf)))
+            report_progress("partial firing orders", seen, value=float(found.values.min(initial=np.inf)))
             placed, stars, squares = waiting.pop()
             ended = passed()
             if placed == count:

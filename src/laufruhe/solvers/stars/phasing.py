@@ -15,7 +15,7 @@ from laufruhe.errors import ModelError, SolverError, counted
 from laufruhe.load_models.lone_parts import gas_tells_apart
 from laufruhe.machine.firing import MOST_ORDERS
 from laufruhe.numerics.budget import limited, passed
-from laufruhe.numerics.progress import tell
+from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
@@ -234,7 +234,7 @@ def _solved(
     places, nothing = np.argsort(lowest, kind="stable"), numerical_zero(problem)
     for k, place in enumerate(places):
         best = min((one.value for one in found), default=math.inf)
-        tell("firing orders and sets of shafts", k, len(designs), best)
+        report_progress("firing orders and sets of shafts", k, len(designs), best)
         if lowest[place] > best + room_of(best, problem.tolerance, nothing):
             return found, float(lowest[place]), True
         if broken[place]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 from laufruhe.errors import ModelError, counted
 from laufruhe.numerics.budget import in_time
-from laufruhe.numerics.progress import telling, within
+from laufruhe.numerics.progress import with_progress, within
 from laufruhe.problem.decision import AddressDrive, Decision
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Drawing, Path, Phasing, Problem
@@ -78,7 +78,7 @@ def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Pro
     if not starts:
         return no_star(problem, *none_fires(phasing)[:1])
     found: list[tuple[Candidate, Result]] = []
-    for start in in_time(telling("cranks that throws leave", starts)):
+    for start in in_time(with_progress("cranks that throws leave", starts)):
         crank, own = _MovedCrank(phasing, start), phasing.realise(start)
         angles = tuple(_angles(phasing, start))
         looks = replace(own.search, starts=min(own.search.starts, FEW_LOOKS))

@@ -19,7 +19,7 @@ from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.load_models.throw_moves import ThrowMoves
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
-from laufruhe.numerics.progress import tell
+from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.decision import columns_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Side, Term
@@ -78,7 +78,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     found: list[StarDesign] = []
     trade = []
     for k, share in enumerate(in_time(steps)):
-        tell("shares of the deviation allowed", k, len(steps), found[0].value if found else math.inf)
+        report_progress("shares of the deviation allowed", k, len(steps), found[0].value if found else math.inf)
         allowed = _narrowed(phasing, share)
         # what is best with less freedom is a start, so that more of it is never worse
         few = starts[: STARTS if share == 1.0 and phasing.thorough else TRADE_STARTS]

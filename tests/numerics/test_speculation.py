@@ -1,4 +1,4 @@
-"""A search with foresight: what it asks for and finds is what one process asks for and finds."""
+"""A search with speculation asks for the same steps, and finds the same, as one process."""
 
 from __future__ import annotations
 
@@ -15,10 +15,9 @@ from itertools import count
 import pytest
 
 from laufruhe.numerics.budget import left, limited
-from laufruhe.numerics.foresight import foresight
 from laufruhe.numerics.processes import Processes
-from laufruhe.numerics.progress import listening
-from laufruhe.numerics.workers import HERE, in_turn, working_on
+from laufruhe.numerics.progress import progress_listener
+from laufruhe.numerics.workers import SERIAL, ordered_map, speculation, working_on
 
 
 def halves(step: tuple[int, float, float]) -> list[tuple[int, float]]:
@@ -33,21 +32,21 @@ def searched(executor: Executor) -> tuple[list[int], int]:
     """Nodes in the order in which the best-first search wants them; how many answers were there before."""
     number, heap, order, best = count(), [(0.0, 0, 17)], [], 5.0
     next(number)
-    with working_on(executor), foresight(halves) as ahead:
+    with working_on(executor), speculation(halves) as ahead:
         while heap and len(order) < 200 and heap[0][0] < best:
             bound, name, seed = heapq.heappop(heap)
             order.append(seed)
             near = heapq.nsmallest(8, heap)
-            ahead.likely([(name, (seed, bound, best)), *((n, (s, b, best)) for b, n, s in near)])
-            for child, below in ahead.wanted(name, (seed, bound, best)):
+            ahead.prefetch([(name, (seed, bound, best)), *((n, (s, b, best)) for b, n, s in near)])
+            for child, below in ahead.result(name, (seed, bound, best)):
                 heapq.heappush(heap, (below, next(number), child))
                 best = min(best, 4.0 + below)
-        found = ahead.foreseen
+        found = ahead.hits
     return order, found
 
 
 def test_order_and_answers_are_those_of_one_process() -> None:
-    alone, none = searched(HERE)
+    alone, none = searched(SERIAL)
     with ThreadPoolExecutor(3) as pool:
         shared, foreseen = searched(pool)
     assert shared == alone
@@ -59,13 +58,13 @@ def test_what_cannot_be_told_to_others_is_done_here() -> None:
     """Neither a step that no other process can read, nor work that only this one knows."""
     here = os.getpid()
     with Processes(1) as pool, working_on(pool):
-        with foresight(lambda step: 2 * step, worth=math.inf) as ahead:
-            ahead.likely([(0, 21)])
-            assert ahead.wanted(0, 21) == 42
-        with foresight(partial(only_in, here), worth=math.inf) as ahead:
-            ahead.likely([(0, 21)])
-            assert ahead.wanted(0, 21) == 42
-            assert ahead.foreseen == 0
+        with speculation(lambda step: 2 * step, worth=math.inf) as ahead:
+            ahead.prefetch([(0, 21)])
+            assert ahead.result(0, 21) == 42
+        with speculation(partial(only_in, here), worth=math.inf) as ahead:
+            ahead.prefetch([(0, 21)])
+            assert ahead.result(0, 21) == 42
+            assert ahead.hits == 0
 
 
 def only_in(process: int, step: int) -> int:
@@ -86,7 +85,7 @@ def test_a_step_that_is_lost_is_done_here() -> None:
             lost.set_running_or_notify_cancel()
             return lost
 
-    alone, _ = searched(HERE)
+    alone, _ = searched(SERIAL)
     with Losing(2) as pool:
         assert searched(pool) == (alone, 0)
     # where all who work have ended, a search goes on
@@ -95,16 +94,16 @@ def test_a_step_that_is_lost_is_done_here() -> None:
 
 
 def test_an_error_is_that_of_the_step() -> None:
-    with ThreadPoolExecutor(2) as pool, working_on(pool), foresight(lambda x: 1 // x) as ahead:
-        ahead.likely([(0, 0), (1, 1)])
+    with ThreadPoolExecutor(2) as pool, working_on(pool), speculation(lambda x: 1 // x) as ahead:
+        ahead.prefetch([(0, 0), (1, 1)])
         with pytest.raises(ZeroDivisionError):
-            ahead.wanted(0, 0)
+            ahead.result(0, 0)
 
 
 def test_in_turn_keeps_the_order_whoever_works() -> None:
     told: list[int] = []
-    with ThreadPoolExecutor(3) as pool, working_on(pool), listening(lambda step: told.append(step.done)):
-        assert in_turn(abs, [-3, -1, -2], "numbers") == [3, 1, 2]
+    with ThreadPoolExecutor(3) as pool, working_on(pool), progress_listener(lambda step: told.append(step.done)):
+        assert ordered_map(abs, [-3, -1, -2], "numbers") == [3, 1, 2]
     assert told == [0, 1, 2]
 
 
@@ -114,10 +113,10 @@ def until_of(_: int) -> float:
 
 
 def test_steps_have_the_time_that_is_left() -> None:
-    with ThreadPoolExecutor(2) as pool, working_on(pool), limited(60.0), foresight(until_of) as ahead:
-        ahead.likely([("a", 1)])
-        assert 0.0 < ahead.wanted("a", 1) <= 60.0
-        assert ahead.foreseen == 1
+    with ThreadPoolExecutor(2) as pool, working_on(pool), limited(60.0), speculation(until_of) as ahead:
+        ahead.prefetch([("a", 1)])
+        assert 0.0 < ahead.result("a", 1) <= 60.0
+        assert ahead.hits == 1
 
 
 def test_processes_that_start_are_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,11 +129,11 @@ def test_processes_that_start_are_not_waited_for(monkeypatch: pytest.MonkeyPatch
             asked.append(fn)
             return Future()
 
-    monkeypatch.setattr("laufruhe.numerics.foresight.Processes", Starting)
-    monkeypatch.setattr("laufruhe.numerics.foresight.count_of", lambda _=None: 2)
-    with working_on(None), foresight(abs, worth=0.0) as ahead:
-        ahead.likely([("a", -1)])
+    monkeypatch.setattr("laufruhe.numerics.workers.Processes", Starting)
+    monkeypatch.setattr("laufruhe.numerics.workers.worker_count", lambda _=None: 2)
+    with working_on(None), speculation(abs, worth=0.0) as ahead:
+        ahead.prefetch([("a", -1)])
         assert len(asked) == 2
-        assert ahead.wanted("a", -1) == 1
-        assert ahead.foreseen == 0
+        assert ahead.result("a", -1) == 1
+        assert ahead.hits == 0
     assert len(asked) == 2
