@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from pkgutil import resolve_name
 
@@ -48,6 +49,14 @@ def test_rooms_stand_in_the_order_of_their_imports() -> None:
     assert [set(re.findall(r"\w+", cell)) for cell in first_cells("| room | what is in it |")] == layers()
     (chain,) = re.findall(r"^ +(extensions -> .*)$", GUIDE, re.MULTILINE)
     assert [set(re.findall(r"\w+", part)) for part in chain.split(" -> ")] == layers()
+
+
+def test_the_picture_shows_every_room_and_extension() -> None:
+    path = ROOT / "docs" / "extensions" / "rooms.py"
+    spec = spec_from_file_location("rooms", path)
+    rooms = module_from_spec(spec)
+    spec.loader.exec_module(rooms)
+    assert rooms.PICTURE.read_text(encoding="utf-8") == rooms.drawing(), "run `python docs/extensions/rooms.py`"
 
 
 def test_files_that_are_named_are_there() -> None:
