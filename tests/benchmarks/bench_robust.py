@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from pages import PAGES, ROOT, publish
 
-from laufruhe.extensions.robust.built_engines import BuiltEngines, values_of
+from laufruhe.extensions.robust.built_engines import BuiltEngines, objective_values
 from laufruhe.extensions.robust.tolerance import Law, Tolerances, tolerances_of
 from laufruhe.files.reader import load
 from laufruhe.present.tables import piped
@@ -48,7 +48,7 @@ def main() -> None:
     for how in LAWS:
         random, started, most, over = np.random.default_rng(2026), time.process_time(), 0.0, 0
         for _ in range(ENGINES // PIECE):
-            found = values_of(built.terms, drawn(tolerances_of(problem), random, PIECE, how))
+            found = objective_values(built.terms, drawn(tolerances_of(problem), random, PIECE, how))
             most, over = max(most, float(found.max())), over + int((found > worst).sum())
         rows.append(
             [how, f"{ENGINES:,}", f"{most:.3f}", f"{worst:.3f}", f"{over}", f"{time.process_time() - started:.0f}"]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from laufruhe.errors import InputError, ModelError
-from laufruhe.extensions.robust.assembly import Assembly, Lot, assembled
+from laufruhe.extensions.robust.assembly import Assembly, Lot, assemble
 from laufruhe.extensions.robust.assembly_solver import _Search
 from laufruhe.extensions.robust.result import AssemblyResult
 from laufruhe.files.reader import load
@@ -52,7 +52,7 @@ def every(problem: Problem) -> list[float]:
     lots, cylinders = own.lots, len(problem.engine.slider_cranks)
     found = []
     for chosen in itertools.product(*(itertools.permutations(range(len(lot.masses)), cylinders) for lot in lots)):
-        found.append(objective_value(problem, evaluate(problem, assembled(problem.engine, lots, chosen))))
+        found.append(objective_value(problem, evaluate(problem, assemble(problem.engine, lots, chosen))))
     return found
 
 

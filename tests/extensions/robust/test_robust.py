@@ -12,11 +12,17 @@ import pytest
 from scipy.optimize import minimize
 
 from laufruhe.errors import ModelError
-from laufruhe.extensions.robust.adversaries import EveryError, Found
-from laufruhe.extensions.robust.built_engines import BuiltEngines, values_of
+from laufruhe.extensions.robust.built_engines import BuiltEngines, WorstCaseAdversary, WorstEngines, objective_values
 from laufruhe.extensions.robust.result import RobustResult
-from laufruhe.extensions.robust.solver import SMALL, Least, _kept, _Program
-from laufruhe.extensions.robust.tolerance import Over, Robust, Tolerances, built, tolerances_of, with_tolerances
+from laufruhe.extensions.robust.solver import SMALL, RobustDesign, _keep_limits, _Program
+from laufruhe.extensions.robust.tolerance import (
+    Population,
+    Robust,
+    Tolerances,
+    tolerances_of,
+    with_errors,
+    with_tolerances,
+)
 from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
@@ -99,11 +105,11 @@ def test_no_built_engine_exceeds_the_worst_case(problem: Problem, result: Result
     errors = tolerances_of(problem).draw(np.random.default_rng(99), 10_000)
     corners = np.array([[*ends, 1.0, 0.0, 0.0, 1.0] for ends in itertools.product((-1.0, 1.0), repeat=6)])
     many = np.concatenate([errors, corners])
-    found = values_of(engines.terms, many)
+    found = objective_values(engines.terms, many)
     assert found.max() <= worst(result) * (1.0 + 1e-12)
     assert found.max() > 0.97 * worst(result)
     for k in (*range(0, 10_000, 2_000), int(np.argmax(found))):
-        own = built(problem, many[k])
+        own = with_errors(problem, many[k])
         assert objective_value(own, evaluate(own, own.design(values))) == pytest.approx(found[k], rel=1e-10)
 
 
@@ -115,7 +121,7 @@ def test_no_other_design_is_better(read: Callable[[str], Problem]) -> None:
 
     def largest(x: np.ndarray) -> float:
         built = BuiltEngines(problem, turned(x), problem.fidelity.samples)
-        return float(values_of(built.terms, corners).max())
+        return float(objective_values(built.terms, corners).max())
 
     start = [d.value for d in found.decisions]
     assert largest(np.array(start)) == pytest.approx(worst(found), rel=1.1e-4)
@@ -158,7 +164,7 @@ def test_prices_are_slopes(problem: Problem, result: Result) -> None:
 
 
 def test_share_of_engines(problem: Problem, result: Result) -> None:
-    shared = solve(replace(problem, extras=(Robust(tolerances_of(problem), Over(0.95, 400, 3)),)))
+    shared = solve(replace(problem, extras=(Robust(tolerances_of(problem), Population(0.95, 400, 3)),)))
     assert shared.certificate is not None
     assert isinstance(shared.details, RobustResult)
     assert shared.certificate.kind in (Proof.LOCAL, Proof.GLOBAL)
@@ -169,12 +175,12 @@ def test_share_of_engines(problem: Problem, result: Result) -> None:
     assert told.robust.share == pytest.approx(worst(shared), rel=0.02)
     assert told.exceeding_at_most < 0.08
     # and no neighbour is better in the sample that decided
-    errors = tolerances_of(problem).mirrored(np.random.default_rng(3), 400)
+    errors = tolerances_of(problem).draw_mirrored(np.random.default_rng(3), 400)
     values = [d.value for d in shared.decisions]
 
     def level(x: list[float]) -> float:
         engines = BuiltEngines(problem, turned(x), problem.fidelity.samples)
-        return float(np.sort(values_of(engines.terms, errors))[379])
+        return float(np.sort(objective_values(engines.terms, errors))[379])
 
     assert level(values) == pytest.approx(worst(shared), rel=1e-9)
     for k, step in itertools.product(range(2), (-2e-3, 2e-3)):
@@ -208,20 +214,22 @@ def test_a_design_keeps_limits_by_what_is_proven(read: Callable[[str], Problem])
     problem, program = limited(read, 1000.0)
     angles = program.angles
 
-    class Over(EveryError):
+    class Stricter(WorstCaseAdversary):
         """Proves a little more than there is of the engine as drawn."""
 
-        def at(self, values: Sequence[complex], proven: bool) -> Found:
+        def at(self, values: Sequence[complex], proven: bool) -> WorstEngines:
             drawn = evaluate(problem, problem.design(values))
-            return replace(super().at(values, proven), excess=drawn.excess(problem.limits) + 1e-3)
+            return replace(super().at(values, proven), violation=drawn.excess(problem.limits) + 1e-3)
 
-    seeker = Over(problem, 2 * problem.fidelity.samples, 0.5 * problem.tolerance)
+    adversary = Stricter(problem, 2 * problem.fidelity.samples, 0.5 * problem.tolerance)
     solved = program.solved(angles)
     assert solved is not None
-    first = Least(solved[0], seeker.at(solved[0], proven=True), 0.0, program.held, 1, angles, seeker.samples)
-    assert KEPT < first.found.excess < SMALL
-    kept = _kept(program, seeker, first)
-    assert kept.found.excess <= KEPT
+    first = RobustDesign(
+        solved[0], adversary.at(solved[0], proven=True), 0.0, program.active, 1, angles, adversary.samples
+    )
+    assert KEPT < first.found.violation < SMALL
+    kept = _keep_limits(program, adversary, first)
+    assert kept.found.violation <= KEPT
     assert kept.found.value > first.found.value
 
 
@@ -235,7 +243,7 @@ def test_limits_are_kept_by_every_engine(read: Callable[[str], Problem]) -> None
     )
     assert found.limits[0].shadow_price == pytest.approx((narrow - wide) / 60.0, rel=0.05, abs=1e-6)
     for z in itertools.product((-1.0, 1.0), repeat=6):
-        own = built(tight, np.array(z))
+        own = with_errors(tight, np.array(z))
         design = own.design(turned([d.value for d in found.decisions]))
         assert evaluate(own, design).value(tight.limits[0].measure) <= 1900.0 * (1.0 + 1e-5)
     none = solve(read((TEXT + ROBUST + limit.format("200 N")).replace('operating_points = ["2500 rpm"]\n', "")))
@@ -321,7 +329,7 @@ def test_crossed(read: Callable[[str], Problem], text: str) -> None:
     assert found.certificate.kind is Proof.GLOBAL
     values = unbalances_of(problem, found)
     for z in tolerances_of(problem).draw(np.random.default_rng(4), 200):
-        own = built(problem, z)
+        own = with_errors(problem, z)
         value = objective_value(own, evaluate(own, own.design(values), found.final.samples))
         assert value <= worst(found) * (1.0 + 1e-9)
 
@@ -338,7 +346,7 @@ def test_what_bends_loads_is_drawn(read: Callable[[str], Problem]) -> None:
     assert "not of all" in found.certificate.method
     assert not found.details.exact
     values = unbalances_of(problem, found)
-    engines = (built(problem, z) for z in tolerances_of(problem).draw(np.random.default_rng(1), 30))
+    engines = (with_errors(problem, z) for z in tolerances_of(problem).draw(np.random.default_rng(1), 30))
     most = max(objective_value(own, evaluate(own, own.design(values), found.final.samples)) for own in engines)
     assert most == pytest.approx(worst(found), rel=1e-9)
 

@@ -10,7 +10,7 @@ import pytest
 
 import laufruhe
 from laufruhe.extensions.robust.result import RobustResult
-from laufruhe.extensions.robust.tolerance import built, tolerances_of
+from laufruhe.extensions.robust.tolerance import tolerances_of, with_errors
 from laufruhe.files.reader import load_tables
 from laufruhe.numerics.budget import limited
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -37,7 +37,7 @@ def problem(**told: Any) -> Problem:
 
 def heaviest(asked: Problem) -> float:
     """The objective of the engine with the heaviest piston, which is the worst, at many angles."""
-    own = built(asked, np.ones(tolerances_of(asked).count))
+    own = with_errors(asked, np.ones(tolerances_of(asked).count))
     return objective_value(own, evaluate(own, samples=5760))
 
 
@@ -174,7 +174,7 @@ def test_limits_of_built_engines_are_what_the_cycle_has_in_the_worst_of_them(
         "objective": {"minimise": "rms shaking force"},
     }  # fmt: skip
     free = problem(**asked, constraints=[{**limit, "max": "1e6 N"}])
-    heaviest = evaluate(built(free, np.ones(1)), samples=5760).value(free.limits[0].measure)
+    heaviest = evaluate(with_errors(free, np.ones(1)), samples=5760).value(free.limits[0].measure)
     result = solve(problem(**asked, constraints=[{**limit, "max": f"{share * heaviest!r} N"}]))
     assert result.status is told
     if told is Status.OPTIMAL:

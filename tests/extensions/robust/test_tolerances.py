@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 from laufruhe.errors import InputError
-from laufruhe.extensions.robust.tolerance import Law, Scope, built, tolerances_of
+from laufruhe.extensions.robust.tolerance import Law, Scope, tolerances_of, with_errors
 from laufruhe.files.reader import load
 from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -53,10 +53,10 @@ def test_forms(tmp_path: Path, words: str, size: float, law: Law, scope: Scope) 
 
 def test_errors_move_what_they_are_of(tmp_path: Path) -> None:
     problem = read(tmp_path, TEXT.format(" ± 25 g") + MOUNTS)
-    own = built(problem, np.array([1.0, -1.0, 0.0, 0.5]))
+    own = with_errors(problem, np.array([1.0, -1.0, 0.0, 0.5]))
     masses = [part.reciprocating_mass for part in own.engine.slider_cranks]
     assert masses == pytest.approx([1.275, 1.225, 1.25, 1.2625])
-    batch = built(read(tmp_path, TEXT.format(" ± 25 g batch") + MOUNTS), np.array([-1.0]))
+    batch = with_errors(read(tmp_path, TEXT.format(" ± 25 g batch") + MOUNTS), np.array([-1.0]))
     assert [part.reciprocating_mass for part in batch.engine.slider_cranks] == pytest.approx([1.225] * 4)
 
 
@@ -65,7 +65,7 @@ def test_open_unbalances_are_off_by_a_share(tmp_path: Path) -> None:
         "left", 2, "0 mm", 'unbalance = { between = ["0 kg m", "0.05 kg m"], tolerance = "2 %" }\nangle = 90'
     )
     problem = read(tmp_path, TEXT.format("") + MOUNTS + weight)
-    own = built(problem, np.array([1.0]))
+    own = with_errors(problem, np.array([1.0]))
     assert own.design([0.04j]).rotors[-1].unbalance == pytest.approx(0.0408j)
     assert problem.design([0.04j]).rotors[-1].unbalance == pytest.approx(0.04j)
 
@@ -85,15 +85,15 @@ def test_numbers_of_the_file(tmp_path: Path, old: str, new: str, scale: float) -
     unit = "" if "ratio" in old else " m"
     written = f'"{scale!r}{unit}"'
     other = load(plain.replace(old, f"{old.rpartition(' = ')[0]} = {written}" if " = " in old else written))
-    assert built(problem, np.array([1.0])).engine == other.engine
-    assert built(problem, np.array([0.0])).engine == problem.engine
+    assert with_errors(problem, np.array([1.0])).engine == other.engine
+    assert with_errors(problem, np.array([0.0])).engine == problem.engine
     assert not tolerances_of(problem).is_affine
 
 
 def test_angles_of_throws(tmp_path: Path) -> None:
     text = TEXT.format("").replace("firing_order", 'throws = [0, "180 deg ± 1 deg", "180 ± 1", 0]\nfiring_order')
     problem = read(tmp_path, text + MOUNTS)
-    throws = [math.degrees(p.throw) for p in built(problem, np.array([1.0, -0.5])).engine.slider_cranks]
+    throws = [math.degrees(p.throw) for p in with_errors(problem, np.array([1.0, -0.5])).engine.slider_cranks]
     assert throws == pytest.approx([0.0, 181.0, 179.5, 0.0])
 
 
@@ -136,7 +136,7 @@ def test_grades(tmp_path: Path) -> None:
     problem = read(tmp_path, text)
     (told,) = tolerances_of(problem).each
     assert told.size == pytest.approx(0.5 * 60.0 * 20.05e-6, rel=1e-3)
-    own = built(problem, np.array([0.0, 1.0, -1.0, 0.0]))
+    own = with_errors(problem, np.array([0.0, 1.0, -1.0, 0.0]))
     assert [rotor.unbalance for rotor in own.engine.rotors] == pytest.approx([1j * told.size, -told.size])
     assert [rotor.x for rotor in own.engine.rotors] == pytest.approx([0.1875, -0.1875])
     assert objective_value(own, evaluate(own)) != objective_value(problem, evaluate(problem))

@@ -13,7 +13,7 @@ import pytest
 import laufruhe
 from laufruhe.errors import BoundError
 from laufruhe.extensions.robust import assembly_solver, worst_case
-from laufruhe.extensions.robust.assembly import Assembly, assembled
+from laufruhe.extensions.robust.assembly import Assembly, assemble
 from laufruhe.extensions.robust.result import AssemblyResult
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove import certificate
@@ -69,7 +69,7 @@ engines = 200
 
 @pytest.mark.parametrize(
     "broken",
-    [scaled(worst_case, "bounded", bound_times(0.99)), scaled(certificate, "lower_bound", value_times(1.001))],
+    [scaled(worst_case, "bound_part", bound_times(0.99)), scaled(certificate, "lower_bound", value_times(1.001))],
     ids=["the worst engine", "dual rows"],
 )
 def test_a_broken_bounder_of_built_engines(monkeypatch: pytest.MonkeyPatch, tmp_path: Path, broken: Break) -> None:
@@ -123,7 +123,7 @@ def test_an_assembly_that_was_pruned_is_found_out() -> None:
     chosen = tuple(zip(*([p - 1 for p in place.parts] for place in found.details.places), strict=True))
     own = found.problem.extra(Assembly)
     assert own is not None
-    engine = assembled(found.problem.engine, own.lots, chosen)
+    engine = assemble(found.problem.engine, own.lots, chosen)
     value = objective_value(found.problem, evaluate(found.problem, engine))
     assert found.objective is not None
     assert found.objective.value >= best.objective.value * (1.0 - 1e-4)

@@ -9,8 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from lanes import first_fast
-from laufruhe.extensions.robust.error_parts import Block, _Moved, bounded
-from laufruhe.extensions.robust.worst_case import value_at, worst_case
+from laufruhe.extensions.robust.worst_case import Block, bound_part, value_at, worst_case
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.norms import NORMS, Grid
 
@@ -58,7 +57,7 @@ def test_no_errors_of_a_part_exceed_its_bound(name: str) -> None:
             assert narrow is not None
             assert narrow.arc is not None
             blocks = [whole[0], whole[2], narrow]
-            above = bounded(terms, middle, blocks, 0.0, [{}]).bound
+            above = bound_part(terms, middle, blocks, 0.0, [{}]).bound
             for _ in range(40):
                 z = np.zeros(5)
                 angle = narrow.arc[0] + random.uniform(-1.0, 1.0) * narrow.arc[1]
@@ -82,16 +81,6 @@ def test_squares_lie_over_their_norm(name: str) -> None:
         assert norm.norm.value(norm.grid, rows) <= above * (1.0 + 1e-12)
         if size == 0.0:
             assert norm.norm.value(norm.grid, rows) == pytest.approx(above, rel=1e-12)
-
-
-@pytest.mark.parametrize("name", NORMS)
-def test_lengths_of_rows_tell_the_weighted_norm(name: str) -> None:
-    """At every point of a part; a norm that asks for more than lengths counts as nothing."""
-    norm, centre = random_norm(name, 12), np.array([0.3, -0.2, 0.1, 0.4, 0.2])
-    part = _Moved.of(3.0, norm, centre, [Block(own, np.eye(own.stop - own.start)) for own in COLUMNS], {})
-    for local in np.random.default_rng(13).uniform(-1.0, 1.0, (5, 5)):
-        found = part.value_of(part.lengths_at(local))
-        assert found == pytest.approx(3.0 * norm.value(centre + local) if norm.norm.of_row_lengths else 0.0, rel=1e-12)
 
 
 def test_no_errors_leave_the_drawing() -> None:

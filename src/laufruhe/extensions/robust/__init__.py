@@ -9,6 +9,6 @@ EXTENSION = Extension(
     notes=(f"{_HERE}.file:NOTE",),
     reductions=tuple(f"{_HERE}.reductions:{name}" for name in ("ASSEMBLY", "TOLERANCES")),
     sections=tuple(f"{_HERE}.section:{name}" for name in ("ASSEMBLY", "TOLERANCES")),
-    pictures=tuple(f"{_HERE}.pictures:{name}" for name in ("TOLERANCES", "ASSEMBLY")),
+    pictures=tuple(f"{_HERE}.section:{name}_PICTURE" for name in ("TOLERANCES", "ASSEMBLY")),
     study_kinds=(f"{_HERE}.study:Tolerance",),
 )

@@ -53,7 +53,7 @@ class Assembly(Extra):
         return tuple(f"the {lot.kind} of every cylinder" for lot in self.lots)
 
 
-def assembled(engine: Engine, lots: Sequence[Lot], chosen: Chosen) -> Engine:
+def assemble(engine: Engine, lots: Sequence[Lot], chosen: Chosen) -> Engine:
     """Return the engine with these parts: each weighs more than the drawing by its difference from its lot's mean."""
     more = np.sum([lot.differences[list(parts)] for lot, parts in zip(lots, chosen, strict=True)], axis=0)
     drawing = [

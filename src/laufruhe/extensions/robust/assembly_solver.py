@@ -18,12 +18,11 @@ from functools import partial
 import numpy as np
 
 from laufruhe.errors import BoundError, ModelError
-from laufruhe.extensions.robust.assembly import Assembly, Chosen, Lot, assembled
-from laufruhe.extensions.robust.built_engines import BuiltEngines, values_of
-from laufruhe.extensions.robust.error_parts import Terms
+from laufruhe.extensions.robust.assembly import Assembly, Chosen, Lot, assemble
+from laufruhe.extensions.robust.built_engines import BuiltEngines, objective_values
 from laufruhe.extensions.robust.result import SHARES, AssemblyResult, Place
 from laufruhe.extensions.robust.tolerance import AddedDrive, Error, PistonDrive, Tolerance, Tolerances
-from laufruhe.extensions.robust.worst_case import value_at
+from laufruhe.extensions.robust.worst_case import Terms, value_at
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.decision import Kind
@@ -68,7 +67,7 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
     search = _Search(terms, lots, len(problem.engine.slider_cranks), problem.tolerance)
     bound = search.run()
     report_progress("the best assembly, and random ones", value=search.value, bound=bound)
-    witness = _walked(problem, lots, search.best, bound, max(walk.SHARE * (time.thread_time() - spent), walk.SECONDS))
+    witness = _walk(problem, lots, search.best, bound, max(walk.SHARE * (time.thread_time() - spent), walk.SECONDS))
     chosen = search.best if witness is None else witness
     initial, final = _evaluated(problem, lots, search.given), _evaluated(problem, lots, chosen)
     value = objective_value(problem, final)
@@ -92,10 +91,10 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
 
 
 def _evaluated(problem: Problem, lots: Sequence[Lot], chosen: Chosen) -> Evaluation:
-    return evaluate(problem, assembled(problem.engine, lots, chosen))
+    return evaluate(problem, assemble(problem.engine, lots, chosen))
 
 
-def _walked(problem: Problem, lots: Sequence[Lot], best: Chosen, bound: float, seconds: float) -> Chosen | None:
+def _walk(problem: Problem, lots: Sequence[Lot], best: Chosen, bound: float, seconds: float) -> Chosen | None:
     """Return an assembly under a bound, found by exact evaluations alone; None where the walk meets none."""
     random, until = np.random.default_rng(walk.SEED), time.thread_time() + seconds
     here, own, least, left = best, _evaluated(problem, lots, best), math.inf, [best]
@@ -208,7 +207,6 @@ class _Search(Division[Chosen]):
             yield max(self.bound(child), under), child
 
     def _mass(self, chosen: Chosen) -> Array:
-        """Return the mass that every cylinder has more [kg]: to and fro, then turning."""
         return np.asarray(np.sum([m[list(p)] for m, p in zip(self.more, chosen, strict=True)], axis=0)).T.reshape(-1)
 
     def _value(self, chosen: Chosen) -> float:
@@ -271,7 +269,7 @@ class _Search(Division[Chosen]):
         """Return an assembly cylinder by cylinder, beside others at random."""
         random = np.random.default_rng(0)
         others = [tuple(tuple(random.permutation(len(m))[: self.cylinders]) for m in self.more) for _ in range(RANDOM)]
-        values = values_of(self.terms, np.array([self._mass(other) for other in others]))
+        values = objective_values(self.terms, np.array([self._mass(other) for other in others]))
         places = tuple(
             Place(name, tuple(int(p[k]) + 1 for p in chosen),
                   tuple(lot.masses[int(p[k])] for lot, p in zip(self.lots, chosen, strict=True)))

@@ -1,4 +1,4 @@
-"""A design for built engines as a result: judged, compared with the best drawing, its tolerances priced (R10, R11)."""
+"""A design for built engines as a result: evaluated, compared with the best drawing, tolerances priced (R10, R11)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,23 @@ from functools import partial
 
 import numpy as np
 
-from laufruhe.extensions.robust.adversaries import Adversary, Found, names_broken
-from laufruhe.extensions.robust.built_engines import BuiltEngines, evaluated, values_of
+from laufruhe.extensions.robust.built_engines import (
+    Adversary,
+    BuiltEngines,
+    WorstEngines,
+    evaluate_built,
+    objective_values,
+    violated_limits,
+)
 from laufruhe.extensions.robust.result import CONFIDENCE, SHARE, SHARES, BuiltDesign, PricedTolerance, RobustResult
-from laufruhe.extensions.robust.tolerance import Over, Tolerance, built, robust_of, tolerances_of, with_tolerances
+from laufruhe.extensions.robust.tolerance import (
+    Population,
+    Tolerance,
+    robust_of,
+    tolerances_of,
+    with_errors,
+    with_tolerances,
+)
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Limit
@@ -31,7 +44,7 @@ STEP = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class ActiveErrors:
     """Sets of errors that hold a design, and the multipliers of their objectives and limits.
 
     Attributes
@@ -52,27 +65,31 @@ class Held:
     residual: float = 0.0
 
 
-def compared(
-    problem: Problem, seeker: Adversary, nominal: Sequence[Value], robust: Sequence[Value], found: Found,
-    held: Held, scenarios: int,
+def compare_designs(
+    problem: Problem, adversary: Adversary, nominal: Sequence[Value], robust: Sequence[Value], found: WorstEngines,
+    active: ActiveErrors, scenarios: int,
 ) -> RobustResult:  # fmt: skip
     """Compare the best drawing and the design decided, each built many times, and the price of every tolerance."""
+    from scipy.stats import beta
+
     over = robust_of(problem).over
-    sample = _Sample.of(problem, over, seeker.samples)
+    sample = _Sample.of(problem, over, adversary.samples)
     values = sample.values(problem, robust)
     share = SHARE if over.share is None else over.share
-    first = seeker.at(nominal, proven=True)
+    first = adversary.at(nominal, proven=True)
     designs = (
         _design("best drawing", problem, nominal, first, sample.values(problem, nominal), share),
         _design("decided", problem, robust, found, values, share),
     )
-    worst = evaluated(built(problem, found.errors[0]), robust, seeker.samples)
+    worst = evaluate_built(with_errors(problem, found.errors[0]), robust, adversary.samples)
     exceeding = int((values > found.bound * (1.0 + 1e-12)).sum())
+    # Clopper and Pearson (R10)
+    at_most = float(beta.ppf(CONFIDENCE, exceeding + 1, len(values) - exceeding)) if exceeding < len(values) else 1.0
     return RobustResult(
         over=over, exact=over.share is None and tolerances_of(problem).is_affine, share=share,
-        nominal=designs[0], robust=designs[1], tolerances=_priced(problem, robust, held, sample, share),
+        nominal=designs[0], robust=designs[1], tolerances=_price_tolerances(problem, robust, active, sample, share),
         scenarios=scenarios, divisions=found.divisions, engines=len(values), seed=sample.seed, worst_engine=worst,
-        exceeding=exceeding, exceeding_at_most=_at_most(exceeding, len(values)),
+        exceeding=exceeding, exceeding_at_most=at_most,
     )  # fmt: skip
 
 
@@ -85,7 +102,7 @@ class _Sample:
     samples: int
 
     @classmethod
-    def of(cls, problem: Problem, over: Over, samples: int) -> _Sample:
+    def of(cls, problem: Problem, over: Population, samples: int) -> _Sample:
         count = CHECKED if tolerances_of(problem).is_affine else min(over.engines, CHECKED_CURVED)
         random = np.random.default_rng([over.seed, 1])
         return cls(tolerances_of(problem).draw(random, count), over.seed, samples)
@@ -93,16 +110,13 @@ class _Sample:
     def values(self, problem: Problem, values: Sequence[Value]) -> Array:
         """Return the objective of every engine of a design; errors that loads are affine in are all taken at once."""
         if tolerances_of(problem).is_affine:
-            return values_of(BuiltEngines(problem, values, self.samples).terms, self.errors)
-        return np.array([_value(problem, values, z, self.samples) for z in self.errors])
-
-
-def _value(problem: Problem, values: Sequence[Value], errors: Array, samples: int) -> float:
-    return objective_value(problem, evaluated(built(problem, errors), values, samples))
+            return objective_values(BuiltEngines(problem, values, self.samples).terms, self.errors)
+        engines = (evaluate_built(with_errors(problem, z), values, self.samples) for z in self.errors)
+        return np.array([objective_value(problem, engine) for engine in engines])
 
 
 def _design(
-    name: str, problem: Problem, values: Sequence[Value], found: Found, built: Array, share: float
+    name: str, problem: Problem, values: Sequence[Value], found: WorstEngines, built: Array, share: float
 ) -> BuiltDesign:
     from scipy.stats import binom
 
@@ -110,7 +124,8 @@ def _design(
     low, high = (int(binom.ppf(0.5 + side * 0.5 * CONFIDENCE, len(built), share)) for side in (-1.0, 1.0))
     pairs = zip(problem.decisions, values, strict=True)
     entries = tuple((e.name, e.value, e.unit) for d, v in pairs for e in decision_values(d, v))
-    drawing = _value(problem, values, np.zeros(tolerances_of(problem).count), problem.fidelity.samples)
+    none = with_errors(problem, np.zeros(tolerances_of(problem).count))
+    drawing = objective_value(problem, evaluate_built(none, values, problem.fidelity.samples))
     level = float(ordered[min(int(np.ceil(share * len(built))) - 1, len(built) - 1)])
     worst = found.bound if robust_of(problem).over.share is None else float(ordered[-1])
     return BuiltDesign(
@@ -120,20 +135,15 @@ def _design(
     )  # fmt: skip
 
 
-def _at_most(exceeding: int, engines: int) -> float:
-    """Return the share of all engines that exceeds, at most, with CONFIDENCE (Clopper and Pearson, R10)."""
-    from scipy.stats import beta
-
-    return float(beta.ppf(CONFIDENCE, exceeding + 1, engines - exceeding)) if exceeding < engines else 1.0
-
-
-def _priced(
-    problem: Problem, values: Sequence[Value], held: Held, sample: _Sample, share: float
+def _price_tolerances(
+    problem: Problem, values: Sequence[Value], active: ActiveErrors, sample: _Sample, share: float
 ) -> tuple[PricedTolerance, ...]:
     """Return every tolerance with its price, the dearest first."""
     told = []
     for tolerance in tolerances_of(problem).each:
-        wide, narrow = (_taken(problem, values, held, sample, share, tolerance, 1.0 + s) for s in (STEP, -STEP))
+        wide, narrow = (
+            _scaled_objective(problem, values, active, sample, share, tolerance, 1.0 + s) for s in (STEP, -STEP)
+        )
         saving = (wide - narrow) / (2.0 * STEP)
         told.append(PricedTolerance(
             tolerance.name, tolerance.size, tolerance.unit, str(tolerance.law), str(tolerance.scope),
@@ -142,62 +152,72 @@ def _priced(
     return tuple(sorted(told, key=lambda one: -one.saving))
 
 
-def _taken(
-    problem: Problem, values: Sequence[Value], held: Held, sample: _Sample, share: float, tolerance: Tolerance,
+def _scaled_objective(
+    problem: Problem,
+    values: Sequence[Value],
+    active: ActiveErrors,
+    sample: _Sample,
+    share: float,
+    tolerance: Tolerance,
     factor: float,
-) -> float:  # fmt: skip
+) -> float:
     """Return the objective of what holds the design, with one tolerance so many times as wide (R11)."""
     moved = with_tolerances(problem, tolerances_of(problem).scaled(tolerance.name, factor))
     if robust_of(problem).over.share is not None:
         return float(np.quantile(sample.values(moved, values), share))
     total = 0.0
-    for errors, own, prices in zip(held.errors, held.shares, held.prices, strict=True):
+    for errors, own, prices in zip(active.errors, active.shares, active.prices, strict=True):
         priced = [(limit, price) for limit, price in prices if price > 0.0 and limit.measure.is_load]
         if own > 0.0 or priced:
-            found = evaluated(built(moved, errors), values, sample.samples)
+            found = evaluate_built(with_errors(moved, errors), values, sample.samples)
             total += own * objective_value(problem, found)
             total += sum(price * found.value(limit.measure) for limit, price in priced)
     return total
 
 
-def _limited(own: LimitValue, worst: float, price: float, tolerance: float) -> LimitValue:
-    active = worst >= own.limit * (1.0 - tolerance)
-    return replace(own, value=worst, active=active, shadow_price=price if active else 0.0)
-
-
-def none_built(problem: Problem, given: Found, conflict: tuple[str, ...], timing: dict[str, float]) -> Result:
+def infeasible_result(
+    problem: Problem, given: WorstEngines, conflict: tuple[str, ...], timing: dict[str, float]
+) -> Result:
     """Return that no design keeps its limits in every engine, and how the worst engines of the one given stand."""
     found = none_within(problem, evaluate(problem), conflict, timing)
-    return replace(found, limits=_in_the_worst(problem, found.limits, given, {}))
+    return replace(found, limits=_limits_in_the_worst_case(problem, found.limits, given, {}))
 
 
-def _in_the_worst(
-    problem: Problem, limits: Sequence[LimitValue], found: Found, prices: Mapping[Limit, float]
+def _limits_in_the_worst_case(
+    problem: Problem, limits: Sequence[LimitValue], found: WorstEngines, prices: Mapping[Limit, float]
 ) -> tuple[LimitValue, ...]:
     """Return limits of a drawing as its worst engines stand to them."""
-    worst = dict(found.limits)
-    return tuple(
-        _limited(own, worst.get(limit, own.value), prices.get(limit, 0.0), problem.tolerance)
-        for limit, own in zip(problem.limits, limits, strict=True)
-    )
+    worst, own = dict(found.limits), []
+    for limit, value in zip(problem.limits, limits, strict=True):
+        most = worst.get(limit, value.value)
+        active = most >= value.limit * (1.0 - problem.tolerance)
+        price = prices.get(limit, 0.0) if active else 0.0
+        own.append(replace(value, value=most, active=active, shadow_price=price))
+    return tuple(own)
 
 
 def robust_result(
-    problem: Problem, design: Design, given: Found, found: Found, held: Held, shown: Shown, details: RobustResult,
+    problem: Problem,
+    design: Design,
+    given: WorstEngines,
+    found: WorstEngines,
+    active: ActiveErrors,
+    shown: Shown,
+    details: RobustResult,
     timing: dict[str, float],
-) -> Result:  # fmt: skip
+) -> Result:
     """Return the result of a design for built engines; `given` is of the one given."""
-    met = max(found.excess, design.excess) <= KEPT
+    met = max(found.violation, design.excess) <= KEPT
     nothing = numerical_zero(problem, design.evaluation.engine)
     certificate = certified(
         found.bound, shown.bound, nothing, problem.tolerance, shown.reach, shown.kkt_residual, shown.method
     )
     prices: dict[Limit, float] = {}
-    for limit, price in (priced for own in held.prices for priced in own):
+    for limit, price in (priced for own in active.prices for priced in own):
         prices[limit] = prices.get(limit, 0.0) + price
-    limits = _in_the_worst(problem, limit_values(problem, design.evaluation), found, prices)
+    limits = _limits_in_the_worst_case(problem, limit_values(problem, design.evaluation), found, prices)
     status = Status.OPTIMAL if certificate.kind is Proof.GLOBAL else Status.FEASIBLE
-    broken = names_broken(found.limits)
+    broken = violated_limits(found.limits)
     message = f"the best design found breaks {' and '.join(map(repr, broken)) or 'a limit'} in some engines"
     return Result(
         problem=problem,

@@ -18,8 +18,8 @@ from laufruhe.extensions.robust.tolerance import (
     ErrorDrive,
     FileDrive,
     Law,
-    Over,
     PistonDrive,
+    Population,
     Robust,
     Scope,
     ShareDrive,
@@ -77,7 +77,7 @@ class RobustTable(Table):
 
 
 @dataclass(frozen=True)
-class Written:
+class Mark:
     """A tolerance as it stands in a file.
 
     Attributes
@@ -145,39 +145,39 @@ class Written:
 class Marks:
     """Tolerances that stand at numbers of a file."""
 
-    written: tuple[Written, ...]
+    written: tuple[Mark, ...]
 
 
-def _part(tables: Mapping[str, Any]) -> tuple[dict[str, Any], Marks | None]:
-    """Return the tables of a file without tolerances, and these; None where it says nothing of built engines."""
-    found: list[Written] = []
-    plain = {key: _parted(value, (key,), found) if key in _ROOMS else value for key, value in tables.items()}
+def _split(tables: Mapping[str, Any]) -> tuple[dict[str, Any], Marks | None]:
+    """Return the tables of a file without tolerances, and the tolerances; None if there is no table of them either."""
+    found: list[Mark] = []
+    plain = {key: _strip_marks(value, (key,), found) if key in _ROOMS else value for key, value in tables.items()}
     return plain, Marks(tuple(found)) if found or {"tolerances", "robust"} & set(tables) else None
 
 
-def _put(marks: Marks, problem: Problem, file: Any, tables: Mapping[str, Any]) -> Problem:
-    """Return the problem of built engines, where [robust] asks for them; tolerances are checked in any case."""
+def _attach(marks: Marks, problem: Problem, file: Any, tables: Mapping[str, Any]) -> Problem:
+    """Return the problem with its tolerances if it has [robust]; check tolerances in any case."""
     found = [_tolerance(one, problem, tables) for one in marks.written]
     found += _residual(file.tolerances, problem.engine, max(point.speed for point in problem.points))
     if file.robust is None:
         return problem
-    own = Robust(Tolerances(tuple(found)), _over(file.robust, found))
+    own = Robust(Tolerances(tuple(found)), _population(file.robust, found))
     return replace(problem, extras=(*problem.extras, own))
 
 
-def _parted(node: Any, path: Path, found: list[Written]) -> Any:
+def _strip_marks(node: Any, path: Path, found: list[Mark]) -> Any:
     if isinstance(node, list):
-        return [_parted(entry, (*path, k), found) for k, entry in enumerate(node)]
+        return [_strip_marks(entry, (*path, k), found) for k, entry in enumerate(node)]
     if isinstance(node, dict):
         told = node.get("tolerance")
         if "between" in node and isinstance(told, str):
-            found.append(_written(told if any(sign in told for sign in SIGNS) else f"± {told}", path))
+            found.append(_parse_mark(told if any(sign in told for sign in SIGNS) else f"± {told}", path))
             node = {key: value for key, value in node.items() if key != "tolerance"}
             if found[-1].number is not None:
                 raise found[-1].refused("gives a number beside its bounds", 'write for example "± 2 %"')
-        return {key: _parted(value, (*path, key), found) for key, value in node.items()}
+        return {key: _strip_marks(value, (*path, key), found) for key, value in node.items()}
     if isinstance(node, str) and any(sign in node for sign in SIGNS) and path[-1] not in ("name", "names"):
-        written = _written(node, path)
+        written = _parse_mark(node, path)
         if written.number is None:
             return node
         found.append(written)
@@ -185,7 +185,7 @@ def _parted(node: Any, path: Path, found: list[Written]) -> Any:
     return node
 
 
-def _written(text: str, path: Path) -> Written:
+def _parse_mark(text: str, path: Path) -> Mark:
     match = _TOLERANCE.match(text)
     where = key_path(path)
     if match is None or not match["size"]:
@@ -195,18 +195,18 @@ def _written(text: str, path: Path) -> Written:
     if len(laws) > 1 or len(scopes) > 1:
         raise Refused(where, text, "names two laws or two scopes", "keep one of each")
     number = _NUMBER.match(match["number"])
-    return Written(
+    return Mark(
         path, text, float(number.group()) if number else None, units.unit_of(match["number"]), match["size"],
         Law(laws[0]) if laws else Law.UNIFORM, Scope(scopes[0]) if scopes else None,
     )  # fmt: skip
 
 
-def _over(table: RobustTable, tolerances: Sequence[Tolerance]) -> Over:
-    """Return the engines that what is minimised and limited is taken of."""
+def _population(table: RobustTable, tolerances: Sequence[Tolerance]) -> Population:
+    """Return the engines that count: the worst, or a share."""
     if not tolerances:
         raise Refused("robust", None, "has no tolerances to stand", 'give a number one, for example "1.25 kg ± 2 %"')
     if table.over == "worst case":
-        return Over(None, table.engines, table.seed)
+        return Population(None, table.engines, table.seed)
     try:
         share = units.parse(table.over, "") if table.over.strip().endswith("%") else math.nan
     except units.UnitError:
@@ -217,13 +217,13 @@ def _over(table: RobustTable, tolerances: Sequence[Tolerance]) -> Over:
     if table.engines * (1.0 - share) < 1.0:
         rule = f"leaves none of {table.engines} engines above"
         raise Refused("robust.over", table.over, rule, "raise engines, or lower the share")
-    return Over(share, table.engines, table.seed)
+    return Population(share, table.engines, table.seed)
 
 
-_Found: TypeAlias = tuple[list[Error], float, str]
+_Errors: TypeAlias = tuple[list[Error], float, str]
 
 
-def _tolerance(one: Written, problem: Problem, tables: Mapping[str, Any]) -> Tolerance:
+def _tolerance(one: Mark, problem: Problem, tables: Mapping[str, Any]) -> Tolerance:
     key = one.path[-1]
     pieces = {"reciprocating_mass": _pistons, "rotating_mass": _pins}
     if one.path[:1] == ("engine",) and len(one.path) == 2 and key in pieces:
@@ -231,7 +231,7 @@ def _tolerance(one: Written, problem: Problem, tables: Mapping[str, Any]) -> Tol
     elif one.path[0] in ("counterweights", "balancer_shafts") and key in _SIZES:
         errors, size, unit = _rotor(one, problem, tables)
     else:
-        return _of_file(one)
+        return _file_tolerance(one)
     scope = one.scope or Scope.PIECE
     name = f"{errors[0].name}.{key}" if one.path[0] != "engine" else one.where
     if scope is Scope.BATCH:
@@ -239,7 +239,7 @@ def _tolerance(one: Written, problem: Problem, tables: Mapping[str, Any]) -> Tol
     return Tolerance(name, unit, size, tuple(errors), one.law, scope)
 
 
-def _pistons(one: Written, engine: Engine) -> _Found:
+def _pistons(one: Mark, engine: Engine) -> _Errors:
     size = _mass(one)
     drives = [(part.name, PistonDrive(k, size)) for k, part in enumerate(engine.slider_cranks)]
     if size >= min(part.reciprocating_mass for part in engine.slider_cranks):
@@ -247,8 +247,7 @@ def _pistons(one: Written, engine: Engine) -> _Found:
     return [Error(name, (drive,)) for name, drive in drives], size, "kg"
 
 
-def _pins(one: Written, engine: Engine) -> _Found:
-    """Return every throw once: cylinders on one throw share its mass."""
+def _pins(one: Mark, engine: Engine) -> _Errors:
     size, found, seen = _mass(one), [], set()
     for part in engine.slider_cranks:
         at = (part.shaft.name, round(part.x, 9), round(math.remainder(part.throw, math.tau), 9))
@@ -265,13 +264,12 @@ def _pins(one: Written, engine: Engine) -> _Found:
     return found, size, "kg"
 
 
-def _mass(one: Written) -> float:
-    """Return the largest error of a mass [kg]."""
+def _mass(one: Mark) -> float:
     number = one.number or 0.0
     return one.error * (abs(number) if one.is_share else 1.0) * units.parse(f"1 {one.unit}", "kg")
 
 
-def _rotor(one: Written, problem: Problem, tables: Mapping[str, Any]) -> _Found:
+def _rotor(one: Mark, problem: Problem, tables: Mapping[str, Any]) -> _Errors:
     """Return the error of the size of one counterweight or balancer."""
     names = _names(one.path, tables)
     decided = {drive.rotor: decision for decision in problem.decisions for drive in decision.rotor_drives}
@@ -293,14 +291,13 @@ def _rotor(one: Written, problem: Problem, tables: Mapping[str, Any]) -> _Found:
 
 
 def _names(path: Path, tables: Mapping[str, Any]) -> list[str]:
-    """Return the rotors that a table of a file makes."""
     table = tables[str(path[0])][path[1]]
     if path[0] == "counterweights":
         return [str(table["name"])]
     return [name_of_unbalance(table["name"], [one.get("name") for one in table["unbalances"]], int(path[3]))]
 
 
-def _of_file(one: Written) -> Tolerance:
+def _file_tolerance(one: Mark) -> Tolerance:
     """Return the tolerance of any other number: the engine is put together anew with it."""
     if one.number is None:
         raise one.refused("is open, and only masses and unbalances may be open and off", "fix it, or leave it out")
@@ -386,12 +383,11 @@ def _assembly(table: AssemblyTable, problem: Problem, given: Given) -> Problem:
     return replace(problem, extras=(*problem.extras, Assembly(tuple(lots))))
 
 
-def _later(_: Table, problem: Problem, __: Given) -> Problem:
-    """Return the problem as it is: what the table asks is put into it once it is whole."""
+def _unchanged(_: Table, problem: Problem, __: Given) -> Problem:
     return problem
 
 
-TOLERANCES = Key("tolerances", TolerancesTable, _later)
-ROBUST = Key("robust", RobustTable, _later, single=True)
+TOLERANCES = Key("tolerances", TolerancesTable, _unchanged)
+ROBUST = Key("robust", RobustTable, _unchanged, single=True)
 ASSEMBLY = Key("assembly", AssemblyTable, _assembly, single=True)
-NOTE = Note("tolerances", _part, _put)
+NOTE = Note("tolerances", _split, _attach)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from laufruhe.extensions.robust.tolerance import Over
+from laufruhe.extensions.robust.tolerance import Population
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Details
 
@@ -95,7 +95,7 @@ class RobustResult(Details):
         How many of them exceed the objective, and the share of all that does, at most, with CONFIDENCE.
     """
 
-    over: Over
+    over: Population
     exact: bool
     share: float
     nominal: BuiltDesign

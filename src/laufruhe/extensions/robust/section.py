@@ -1,4 +1,4 @@
-"""Sections of reports: two designs under tolerance with the price of each, and parts that were chosen."""
+"""Sections and pictures of reports: two designs under tolerance with prices, and parts that were chosen."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from laufruhe.extensions.robust.result import (
 )
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import figure, number, percent, price_of, with_unit
+from laufruhe.present.pictures import ResultPicture
 from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
 from laufruhe.solvers.result import Result
 
 
 def _tolerance_tables(result: Result) -> list[Table]:
-    """Return two designs, and a row a tolerance."""
+    """Return a table of two designs, and one of tolerances, a row each."""
     found, unit = result.details, objective_unit(result)
     assert isinstance(found, RobustResult)
     worst = "worst case" if found.exact else "worst drawn"
@@ -132,3 +133,13 @@ ASSEMBLY = Section(
     "assembly", lambda result: isinstance(result.details, AssemblyResult), _assembly_tables, _assembly_record,
     ("assembly",),
 )  # fmt: skip
+TOLERANCES_PICTURE = ResultPicture(
+    "robust",
+    "The best drawing and the design decided, each built many times, and what each tolerance costs.",
+    "laufruhe.extensions.robust.picture",
+)
+ASSEMBLY_PICTURE = ResultPicture(
+    "assembly",
+    "The best assembly of measured parts beside those at random.",
+    "laufruhe.extensions.robust.assembly_picture",
+)

@@ -15,10 +15,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.extensions.robust.adversaries import Adversary, DrawnEngines, EveryError, Found
-from laufruhe.extensions.robust.built_engines import evaluated
-from laufruhe.extensions.robust.conclusion import Held, compared, none_built, robust_result
-from laufruhe.extensions.robust.tolerance import Over, built, robust_of, tolerances_of, with_tolerances
+from laufruhe.extensions.robust.built_engines import (
+    Adversary,
+    SampledEngines,
+    WorstCaseAdversary,
+    WorstEngines,
+    evaluate_built,
+)
+from laufruhe.extensions.robust.conclusion import ActiveErrors, compare_designs, infeasible_result, robust_result
+from laufruhe.extensions.robust.tolerance import Population, robust_of, tolerances_of, with_errors, with_tolerances
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import in_time
@@ -59,7 +64,7 @@ OUTER = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Least:
+class RobustDesign:
     """A design, what no engine of it exceeds, and what no design goes under.
 
     Attributes
@@ -73,9 +78,9 @@ class Least:
     """
 
     values: tuple[Value, ...]
-    found: Found
+    found: WorstEngines
     bound: float
-    held: Held
+    active: ActiveErrors
     scenarios: int
     angles: int
     samples: int
@@ -110,39 +115,41 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
     started = time.perf_counter()
     with within("drawing"):
         drawing = solve(problem.drawing)
-    acting = tolerances_of(problem).acting
+    nonzero = tolerances_of(problem).nonzero
     without = drawing.certificate is None and (problem.decisions or drawing.status is Status.INFEASIBLE)
-    if without or not acting.each:
+    if without or not nonzero.each:
         return replace(drawing, problem=problem)
-    problem = with_tolerances(replace(problem, fidelity=drawing.problem.fidelity), acting)
+    problem = with_tolerances(replace(problem, fidelity=drawing.problem.fidelity), nonzero)
     start = tuple(unbalances_of(problem, drawing))
     report_progress("worst errors of the drawing")
-    seeker, least = _found(problem, over, start, drawing)
-    seeker = replace(seeker, samples=least.samples)
-    as_given = seeker.at(problem.start, proven=False)
+    adversary, least = _decide(problem, over, start, drawing)
+    adversary = replace(adversary, samples=least.samples)
+    as_given = adversary.at(problem.start, proven=False)
     if least.conflict:
-        return none_built(problem, as_given, least.conflict, {"solve": time.perf_counter() - started})
+        return infeasible_result(problem, as_given, least.conflict, {"solve": time.perf_counter() - started})
     solved = time.perf_counter()
     reach = Reach.WHOLE if over.share is None else Reach.ASIDE
     design = judged(problem, least.values, least.samples)
-    shown = Shown(least.bound, reach, least.held.residual, _method(problem, least))
-    details = compared(problem, seeker, start, least.values, least.found, least.held, least.scenarios)
+    shown = Shown(least.bound, reach, least.active.residual, _method(problem, least))
+    details = compare_designs(problem, adversary, start, least.values, least.found, least.active, least.scenarios)
     timing = {"solve": solved - started, "compare": time.perf_counter() - solved}
-    return robust_result(problem, design, as_given, least.found, least.held, shown, details, timing)
+    return robust_result(problem, design, as_given, least.found, least.active, shown, details, timing)
 
 
-def _found(problem: Problem, over: Over, start: tuple[Value, ...], drawing: Result) -> tuple[Adversary, Least]:
-    """Return who seeks the worst engines, and the design that is best against it."""
+def _decide(
+    problem: Problem, over: Population, start: tuple[Value, ...], drawing: Result
+) -> tuple[Adversary, RobustDesign]:
+    """Return the adversary that fits the tolerances, and the best design against it."""
     tolerances, samples = tolerances_of(problem), problem.fidelity.samples
     nothing, random = numerical_zero(problem, drawing.final.engine), np.random.default_rng(over.seed)
     if over.share is None and tolerances.is_affine:
-        every = EveryError(problem, samples, 0.5 * problem.tolerance)
-        return every, _least_worst(problem, every, start, nothing)
+        every = WorstCaseAdversary(problem, samples, 0.5 * problem.tolerance)
+        return every, _minimise_worst_case(problem, every, start, nothing)
     if over.share is None:
-        drawn = DrawnEngines(problem, tolerances.draw(random, over.engines), samples)
-        return drawn, _least_worst(problem, drawn, start, nothing)
-    drawn = DrawnEngines(problem, tolerances.mirrored(random, over.engines), samples)
-    found = _least_share(problem, drawn, start, over.share, nothing)
+        drawn = SampledEngines(problem, tolerances.draw(random, over.engines), samples)
+        return drawn, _minimise_worst_case(problem, drawn, start, nothing)
+    drawn = SampledEngines(problem, tolerances.draw_mirrored(random, over.engines), samples)
+    found = _minimise_share(problem, drawn, start, over.share, nothing)
     # of errors that lie alike to both sides half of all engines are no better than the drawing (R9)
     bound = drawing.certificate.lower_bound if drawing.certificate and tolerances.is_affine else 0.0
     found = replace(found, bound=bound if problem.decisions else found.found.bound)
@@ -150,7 +157,7 @@ def _found(problem: Problem, over: Over, start: tuple[Value, ...], drawing: Resu
         if not is_over(found.bound, found.found.bound, nothing):
             break
         drawn = replace(drawn, samples=fine_samples(found.samples))
-        level = _level(drawn, found.values, over.share)
+        level = _quantile(drawn, found.values, over.share)
         found = replace(found, found=replace(found.found, value=level, bound=level), samples=drawn.samples)
     return drawn, found
 
@@ -180,7 +187,7 @@ def refuse(problem: Problem) -> None:
         raise ModelError('limits of loads are kept in the worst case only; take over = "worst case", or leave them out')
 
 
-def _method(problem: Problem, found: Least) -> str:
+def _method(problem: Problem, found: RobustDesign) -> str:
     over, angles = robust_of(problem).over, f"at {found.angles} angles; " if found.angles else ""
     cones = f"second-order cones over {found.scenarios} sets of errors {angles}" if angles else ""
     if over.share is not None:
@@ -199,7 +206,7 @@ class _Program:
         self.errors: list[Array] = []
         self.models: list[AffineModel] = []
         self.shares: list[float] = []
-        self.held = Held()
+        self.active = ActiveErrors()
         self.margin, self.margins = 0.0, 0
         self.conflict: tuple[str, ...] = ()
 
@@ -212,16 +219,16 @@ class _Program:
                 del own[least]
         for z in new:
             self.errors.append(z)
-            self.models.append(AffineModel(built(self.problem, z)))
+            self.models.append(AffineModel(with_errors(self.problem, z)))
             self.shares.append(1.0)
         base = common_base([model.base for model in self.models])
         for model in self.models:
             model.base = base
         return bool(new)
 
-    def lower(self, excess: float) -> None:
+    def lower(self, violation: float) -> None:
         """Lower limits by a little more than what one is passed by."""
-        self.margin, self.margins = self.margin + 1.05 * excess, self.margins + 1
+        self.margin, self.margins = self.margin + 1.05 * violation, self.margins + 1
 
     @property
     def angles(self) -> int:
@@ -264,42 +271,44 @@ class _Program:
         residual = kkt_residual(weighed, solution.x, bound)
         of = [[(limit, price) for (owner, limit), price in zip(owners, prices, strict=True) if owner == k]
               for k in range(len(self.errors))]  # fmt: skip
-        self.held = Held(tuple(self.errors), tuple(self.shares), tuple(map(tuple, of)), residual)
+        self.active = ActiveErrors(tuple(self.errors), tuple(self.shares), tuple(map(tuple, of)), residual)
         return tuple(domain.complex_value(solution.x) for domain in coarse.domains), bound.value
 
     def level(self, values: Sequence[Value]) -> float:
         """Return the largest objective of a design with the errors that are in it."""
-        found = (evaluated(model.problem, values, self.samples) for model in self.models)
+        found = (evaluate_built(model.problem, values, self.samples) for model in self.models)
         return max(objective_value(self.problem, each) for each in found)
 
 
-def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], nothing: float) -> Least:
+def _minimise_worst_case(
+    problem: Problem, adversary: Adversary, start: tuple[Value, ...], nothing: float
+) -> RobustDesign:
     """Return the design whose worst engine is least, from a given one (R8)."""
-    found = seeker.at(start, proven=not problem.decisions)
-    best = Least(start, found, 0.0, Held((found.errors[0],), (1.0,), ((),)), 1, 0, seeker.samples)
+    found = adversary.at(start, proven=not problem.decisions)
+    best = RobustDesign(start, found, 0.0, ActiveErrors((found.errors[0],), (1.0,), ((),)), 1, 0, adversary.samples)
     if not problem.decisions:
         # an engine that was found is built, whatever else is: what it breaks is broken, and what it has is had
-        engine = evaluated(built(problem, found.errors[0]), start, seeker.samples)
+        engine = evaluate_built(with_errors(problem, found.errors[0]), start, adversary.samples)
         best = replace(best, bound=objective_value(problem, with_fine_sampling(engine)), conflict=found.broken)
-        return _read_under(seeker, best, nothing)
+        return _refine_sampling(adversary, best, nothing)
     program, values, bound = _Program(problem, nothing), start, 0.0
     program.add([np.zeros(tolerances_of(problem).count)])
     samples, level, before, known = program.angles // COARSER, 0.0, math.inf, True
     for _ in in_time(range(MOST_ROUNDS)):
         is_worse = found.value > level * (1.0 + JOINS * problem.tolerance)
-        is_new = known and (is_worse or FEASIBLE < found.excess < FALLS * before)
+        is_new = known and (is_worse or FEASIBLE < found.violation < FALLS * before)
         if is_new and program.add(found.errors):
-            samples, before = max(samples, program.angles // COARSER), found.excess
-        elif known and found.excess > FEASIBLE and samples >= program.angles and program.margins < MOST_MARGINS:
+            samples, before = max(samples, program.angles // COARSER), found.violation
+        elif known and found.violation > FEASIBLE and samples >= program.angles and program.margins < MOST_MARGINS:
             # it knows all engines that hold this design, and peaks stand between its angles: limits a little lower
-            program.lower(found.excess)
+            program.lower(found.violation)
         else:
             samples, program.margin, program.margins, before = 2 * samples, 0.0, 0, math.inf
             if samples > program.angles << MOST_DOUBLINGS:
                 break
             if samples > program.angles:
-                seeker = replace(seeker, samples=2 * seeker.samples)
-                program.samples = seeker.samples
+                adversary = replace(adversary, samples=2 * adversary.samples)
+                program.samples = adversary.samples
         solved = program.solved(samples)
         if program.conflict:
             return replace(best, conflict=program.conflict)
@@ -308,64 +317,65 @@ def _least_worst(problem: Problem, seeker: Adversary, start: tuple[Value, ...], 
             continue
         values, own = solved
         bound, level = max(bound, own), program.level(values)
-        found = seeker.at(values, proven=False)
-        if gap_of(found.value, bound, nothing) <= problem.tolerance and found.excess <= FEASIBLE:
-            found = seeker.at(values, proven=True)
-        each = Least(values, found, bound, program.held, len(program.errors), samples, seeker.samples, program.margin)
-        best = min(best, each, key=lambda one: (one.found.excess > KEPT, one.found.value))
-        if gap_of(found.bound, bound, nothing) <= problem.tolerance and found.excess <= FEASIBLE:
+        found = adversary.at(values, proven=False)
+        if gap_of(found.value, bound, nothing) <= problem.tolerance and found.violation <= FEASIBLE:
+            found = adversary.at(values, proven=True)
+        each = RobustDesign(
+            values, found, bound, program.active, len(program.errors), samples, adversary.samples, program.margin
+        )
+        best = min(best, each, key=lambda one: (one.found.violation > KEPT, one.found.value))
+        if gap_of(found.bound, bound, nothing) <= problem.tolerance and found.violation <= FEASIBLE:
             break
-    if not best.found.proven or best.samples < seeker.samples:
-        best = replace(best, found=seeker.at(best.values, proven=True), samples=seeker.samples)
-    return _read_under(seeker, replace(_kept(program, seeker, best), bound=bound), nothing)
+    if not best.found.proven or best.samples < adversary.samples:
+        best = replace(best, found=adversary.at(best.values, proven=True), samples=adversary.samples)
+    return _refine_sampling(adversary, replace(_keep_limits(program, adversary, best), bound=bound), nothing)
 
 
-def _read_under(seeker: Adversary, best: Least, nothing: float) -> Least:
-    """Return a design with its engines measured at so many angles that the bound of all designs lies under them."""
+def _refine_sampling(adversary: Adversary, best: RobustDesign, nothing: float) -> RobustDesign:
+    """Double the samples until the worst engine of a design is not under the bound of all designs."""
     for _ in in_time(range(READINGS)):
         if not is_over(best.bound, best.found.bound, nothing):
             break
-        seeker = replace(seeker, samples=fine_samples(best.samples))
-        best = replace(best, found=seeker.at(best.values, proven=True), samples=seeker.samples)
+        adversary = replace(adversary, samples=fine_samples(best.samples))
+        best = replace(best, found=adversary.at(best.values, proven=True), samples=adversary.samples)
     return best
 
 
-def _kept(program: _Program, seeker: Adversary, best: Least) -> Least:
-    """Return a design that keeps its limits by what is proven too, where that is a little more than the worst found."""
+def _keep_limits(program: _Program, adversary: Adversary, best: RobustDesign) -> RobustDesign:
+    """Lower limits a little until the proven bound of a design keeps them, where only the bound breaks them."""
     program.margin = best.margin
     for _ in in_time(range(MOST_MARGINS)):
-        if not KEPT < best.found.excess <= SMALL:
+        if not KEPT < best.found.violation <= SMALL:
             break
-        program.lower(best.found.excess)
+        program.lower(best.found.violation)
         # of the design as given no program is known yet
         solved = program.solved(best.angles or program.angles)
         if solved is None:
             break
-        found = seeker.at(solved[0], proven=True)
-        if found.excess < best.found.excess:
-            best = replace(best, values=solved[0], found=found, held=program.held)
+        found = adversary.at(solved[0], proven=True)
+        if found.violation < best.found.violation:
+            best = replace(best, values=solved[0], found=found, active=program.active)
     return best
 
 
-def _level(seeker: DrawnEngines, values: Sequence[Value], share: float) -> float:
-    """Return the objective that a share of the drawn engines stays below."""
-    return float(np.sort(seeker.objective(values))[math.ceil(share * len(seeker.errors)) - 1])
+def _quantile(adversary: SampledEngines, values: Sequence[Value], share: float) -> float:
+    return float(np.sort(adversary.objective(values))[math.ceil(share * len(adversary.errors)) - 1])
 
 
-def _least_share(
-    problem: Problem, seeker: DrawnEngines, start: tuple[Value, ...], share: float, nothing: float
-) -> Least:
+def _minimise_share(
+    problem: Problem, adversary: SampledEngines, start: tuple[Value, ...], share: float, nothing: float
+) -> RobustDesign:
     """Return the design that a share of the drawn engines stays below least, as far as a search finds it (R9)."""
-    below = math.ceil(share * len(seeker.errors))
+    below = math.ceil(share * len(adversary.errors))
     values, best = start, None
     for _ in in_time(range(OUTER)):
-        order = np.argsort(seeker.objective(values), kind="stable")
-        kept = seeker.kept(order[:below])
-        each = _least_worst(problem, kept, values, nothing)
+        order = np.argsort(adversary.objective(values), kind="stable")
+        lower_share = adversary.subset(order[:below])
+        each = _minimise_worst_case(problem, lower_share, values, nothing)
         if best is not None and each.found.value >= best.found.value * (1.0 - SAME):
             break
         best, values = each, each.values
     if best is None:
         raise ModelError("no design was found within the time limit; raise it")
-    level = _level(seeker, best.values, share)
-    return replace(best, found=replace(best.found, value=level, bound=level), samples=seeker.samples)
+    level = _quantile(adversary, best.values, share)
+    return replace(best, found=replace(best.found, value=level, bound=level), samples=adversary.samples)

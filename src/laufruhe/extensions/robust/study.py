@@ -82,16 +82,15 @@ class TolerancesTable(Table):
         ]
         sizes = (self.reciprocating_mass, self.unbalance, self.alignment * sum(self.aligned_masses))
         causes = zip(CAUSES, ("kg", "kg m", "kg m"), sizes, (pistons, left, aligned), strict=True)
-        return Tolerances(tuple(Cause(name, unit, size, tuple(errors)) for name, unit, size, errors in causes)).acting
+        return Tolerances(tuple(Cause(name, unit, size, tuple(errors)) for name, unit, size, errors in causes)).nonzero
 
 
 def _left(name: str, x: float, most: float) -> Error:
-    """Return an unbalance at any angle."""
     return Error(name, (AddedDrive(name, x, most),), 2)
 
 
 def _built(engine: Engine, tolerances: Tolerances, errors: Array) -> Engine:
-    return tolerances.built(Drawing(engine, (), (), ()), errors).engine
+    return tolerances.with_errors(Drawing(engine, (), (), ()), errors).engine
 
 
 def _added_forces(engine: Engine, speed: float, tolerances: Tolerances) -> Array:
@@ -306,7 +305,6 @@ def rise_of(row: xr.Dataset) -> float:
 
 
 def _label(row: xr.Dataset) -> str:
-    """Name, and what tolerances do to the mounts."""
     rise = rise_of(row)
     return str(row["case"].item()) + (f"\n{percent(rise)}" if np.isfinite(rise) else "")
 

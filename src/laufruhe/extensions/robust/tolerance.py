@@ -204,7 +204,6 @@ class Tolerance:
 
 
 def _normal(random: np.random.Generator, count: int, width: int) -> Array:
-    """Return normal errors, those beyond the tolerance drawn again."""
     found = random.normal(0.0, 1.0 / SIGMAS, (count, width))
     while (out := np.hypot.reduce(found, axis=1) > 1.0).any():
         found[out] = random.normal(0.0, 1.0 / SIGMAS, (int(out.sum()), width))
@@ -212,7 +211,7 @@ def _normal(random: np.random.Generator, count: int, width: int) -> Array:
 
 
 @dataclass(frozen=True)
-class Over:
+class Population:
     """Choice of the built engines that what is minimised and limited is taken of.
 
     Attributes
@@ -230,7 +229,7 @@ class Over:
     seed: int = 0
 
     def named(self, measure: str, is_affine: bool) -> str:
-        """Return what is minimised, in words."""
+        """Return the name of the objective with the engines that count."""
         if self.share is not None:
             return f"{measure}, {100.0 * self.share:g} % of engines below"
         return f"{measure}, worst case" if is_affine else f"{measure}, worst of {self.engines} drawn engines"
@@ -249,7 +248,7 @@ class Tolerances:
     each: tuple[Tolerance, ...]
 
     @property
-    def acting(self) -> Tolerances:
+    def nonzero(self) -> Tolerances:
         """Tolerances but those of no size."""
         return replace(self, each=tuple(t for t in self.each if t.size * t.scale > 0.0))
 
@@ -293,12 +292,12 @@ class Tolerances:
         """Return errors of many engines, shape (count, columns)."""
         return np.concatenate([np.zeros((count, 0)), *(t.draw(random, count) for t in self.each)], axis=1)
 
-    def mirrored(self, random: np.random.Generator, count: int) -> Array:
+    def draw_mirrored(self, random: np.random.Generator, count: int) -> Array:
         """Return errors of as many engines, half of them the others with every error turned round (R9)."""
         half = self.draw(random, -(-count // 2))
         return np.concatenate([half, -half])
 
-    def built(self, drawing: Drawing, errors: Array, rebuild: Rebuild = no_file) -> Drawing:
+    def with_errors(self, drawing: Drawing, errors: Array, rebuild: Rebuild = no_file) -> Drawing:
         """Return the drawing of engines with these errors, shape (columns,); numbers of a file draw it anew."""
         moves: list[tuple[ErrorDrive, complex]] = []
         at = iter(self.columns)
@@ -327,7 +326,7 @@ class Robust(Extra):
     """
 
     tolerances: Tolerances
-    over: Over
+    over: Population
     words: ClassVar[str] = "tolerances"
 
     def objective_name(self, name: str) -> str:
@@ -336,14 +335,14 @@ class Robust(Extra):
 
 
 def robust_of(problem: Problem) -> Robust:
-    """Return what a problem asks of built engines."""
+    """Return the tolerances of a problem, and the engines that count."""
     found = problem.extra(Robust)
     assert found is not None
     return found
 
 
 def tolerances_of(problem: Problem) -> Tolerances:
-    """Return how far built engines of a problem stand from its drawing."""
+    """Return the tolerances of a problem."""
     return robust_of(problem).tolerances
 
 
@@ -352,11 +351,11 @@ def with_tolerances(problem: Problem, tolerances: Tolerances) -> Problem:
     return replace(problem, extras=(replace(robust_of(problem), tolerances=tolerances),))
 
 
-def built(problem: Problem, errors: Array, tolerances: Tolerances | None = None) -> Problem:
-    """Return the problem of engines with these errors, shape (columns,), none of which is left to chance (R2)."""
+def with_errors(problem: Problem, errors: Array, tolerances: Tolerances | None = None) -> Problem:
+    """Return the problem of the engine with these errors, shape (columns,), and no tolerances (R2)."""
     own = tolerances_of(problem) if tolerances is None else tolerances
     given = Drawing(problem.engine, problem.points, problem.decisions, problem.mount_numbers)
-    found = own.built(given, errors, problem.rebuild)
+    found = own.with_errors(given, errors, problem.rebuild)
     return replace(
         problem, engine=found.engine, points=found.points, decisions=found.decisions,
         mount_numbers=found.mount_numbers, extras=(),

@@ -1,43 +1,55 @@
 """The worst errors of a design, and a bound that no errors exceed (R4 to R7).
 
 The objective is convex in the errors, so its largest value stands at a corner of every interval and on the circle of
-every disc. Which one is found by branch and bound: an error is held at one end or the other, a circle is parted into
-arcs, and what is left free is bounded from above. Every bound comes from rows of the exact model.
+every disc. Branch and bound finds which one: an interval is fixed at either end, a circle is parted into arcs, and the
+free rest is bounded from above. Every bound comes from rows of the exact model.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from laufruhe.errors import BoundError
-from laufruhe.extensions.robust.error_parts import ROUNDING, Block, Terms, bounded
-from laufruhe.extensions.robust.error_parts import Known as Told
+from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.norms.norm import lengths
 from laufruhe.numerics.witness import is_over, report
 from laufruhe.prove.best_first import Division, Over, Parts, Waiting
 from laufruhe.prove.witness import THIN, Known, check_around
 
+Terms: TypeAlias = Sequence[tuple[float, AffineNorm]]
+"""Weights and norms, whose decision vector is that of the errors."""
+
+ROUNDING = 1e-12
 MOST_NODES = 5000
 STARTS, CLIMBS = 12, 30
 """Random errors that a climb starts from, and its steps."""
+MOST_ENDS = 12
+"""Intervals whose ends are all tried in one part."""
+TOUCHES, TURNS = 3, 6
+"""Majorants that are tried, and fixed-point steps for the points of balls, in one part."""
 
 
 @dataclass(frozen=True, eq=False)
 class WorstCase:
-    """The worst errors found, what they make, and what no errors exceed.
+    """The worst errors found, the value there, and a bound over all errors.
 
     Attributes
     ----------
     errors
         Shape (columns,).
     value
-        At these errors.
+        Weighted sum of the norms at these errors.
     bound
-        Of all errors allowed, raw.
+        Upper bound over all errors allowed, raw.
     nodes
         Parts that the errors were divided into.
     """
@@ -59,101 +71,97 @@ def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, most: i
     Parameters
     ----------
     terms
-        Their decision vector is that of the errors.
+        Weights and norms, affine in the errors.
     columns
-        Of every error: one for an interval of -1 to 1, two for the unit disc.
+        Columns of every error: one for an interval of -1 to 1, two for the unit disc.
     tolerance
         Relative distance of bound and value at which the search ends.
     most
-        Parts that the errors are divided into.
+        Largest number of parts that the errors are divided into.
     """
     count = columns[-1].stop if columns else 0
-    best = max((_climbed(terms, columns, z) for z in _starts(columns, count)), key=lambda found: found[0])
+    starts = np.random.default_rng(0).uniform(-1.0, 1.0, (STARTS + 1, count))
+    starts[0] = 0.0
+    for disc in columns:
+        # a point of the square may lie outside the disc in it
+        starts[:, disc] /= np.maximum(np.hypot.reduce(starts[:, disc], axis=1), 1.0)[:, None]
+    best = max((_climb(terms, columns, z) for z in starts), key=lambda point: point[0])
     if not count:
         return WorstCase(np.zeros(0), best[0], best[0], 0)
-    search = _Errors(terms, tolerance, best)
-    whole = [Block(own, np.eye(own.stop - own.start)) for own in columns]
-    first = bounded(terms, np.zeros(count), whole, best[0], search.told)
-    search.better(_climbed(terms, columns, first.errors))
-    bound = search.divide((-first.bound, _Part(np.zeros(count), whole, first.split)), most)
+    search = _ErrorSearch(terms, tolerance, best)
+    blocks = [Block(own, np.eye(own.stop - own.start)) for own in columns]
+    root = bound_part(terms, np.zeros(count), blocks, best[0], search.reaches)
+    search.improve(_climb(terms, columns, root.errors))
+    bound = search.divide((-root.bound, _Part(np.zeros(count), blocks, root.split)), most)
     value, errors = search.best
     if is_over(bound, -value):
         report(BoundError("errors that no engine exceeds", -bound, value))
     return WorstCase(errors, value, -bound, search.seen)
 
 
+def check_worst(terms: Terms, columns: Sequence[slice], worst: WorstCase) -> None:
+    """Report a bound of a thin part around the worst errors that is under their value."""
+    check_around(_Around(terms, columns), worst.errors, Known(worst.errors, -worst.value))
+
+
 @dataclass(frozen=True, eq=False)
 class _Around:
-    """Bounder of thin parts of the errors; the largest sum is the least of its negative."""
+    """Bounder of thin parts of the errors; it minimises the negative of the sum."""
 
     terms: Terms
     columns: Sequence[slice]
     what: str = "errors that no engine exceeds"
 
     def around(self, errors: Array) -> tuple[Array, list[Block]]:
-        """Return a centre and blocks about it that reach some errors."""
+        """Return a centre and thin blocks about it that reach some errors."""
         return (1.0 - THIN) * errors, [Block(own, THIN * np.eye(own.stop - own.start)) for own in self.columns]
 
     def bound(self, part: tuple[Array, list[Block]]) -> float:
-        """Return the bound of a part."""
-        return -bounded(self.terms, *part, -math.inf, [{} for _ in self.terms]).bound
-
-
-def check_worst(terms: Terms, columns: Sequence[slice], found: WorstCase) -> None:
-    """Report a bound of a part around the worst errors found that these exceed."""
-    check_around(_Around(terms, columns), found.errors, Known(found.errors, -found.value))
+        """Return the lower bound of the negative sum over a part."""
+        return -bound_part(self.terms, *part, -math.inf, [{} for _ in self.terms]).bound
 
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """Errors of which some are held: a centre, blocks that are free, and the one of them to part next."""
+    """Node of the search: a centre, free blocks, and the number of the block to divide next."""
 
     centre: Array
     blocks: list[Block]
     split: int
 
 
-class _Errors(Division[_Part]):
-    """Parts of all errors; the largest bound is the least of what is sought here, its negative."""
+class _ErrorSearch(Division[_Part]):
+    """Branch and bound over errors; it minimises the negative of the sum."""
 
     what, of_objective = "boxes of errors", False
 
     def __init__(self, terms: Terms, tolerance: float, best: tuple[float, Array]) -> None:
         self._terms, self._tolerance, self.best = terms, tolerance, best
-        self.told: Told = [{} for _ in terms]
+        self.reaches: Reaches = [{} for _ in terms]
 
-    def better(self, found: tuple[float, Array]) -> None:
-        """Keep the worse of the worst errors so far and others."""
-        self.best = max(self.best, found, key=lambda each: each[0])
+    def improve(self, point: tuple[float, Array]) -> None:
+        """Keep a value and its errors if they are worse than the worst so far."""
+        self.best = max(self.best, point, key=lambda each: each[0])
 
     def is_done(self, one: Waiting[_Part]) -> bool:
-        """Return whether no errors are worse by the tolerance."""
+        """Return whether no errors of a part are worse by the tolerance."""
         return -one.bound <= self.best[0] * (1.0 + self._tolerance)
 
     def parts(self, taken: Sequence[Waiting[_Part]]) -> Parts[_Part]:
-        """Yield parts with one block held at either end, or its circle parted."""
+        """Yield parts with one interval fixed at either end, or one circle parted."""
         ((above, _, own),) = taken
         rest = [block for k, block in enumerate(own.blocks) if k != own.split]
-        for middle, free in own.blocks[own.split].parts(own.centre):
+        for centre, free in own.blocks[own.split].parts(own.centre):
             blocks = rest if free is None else [*rest, free]
-            part = bounded(self._terms, middle, blocks, self.best[0] * (1.0 + self._tolerance), self.told)
-            self.better((value_at(self._terms, part.errors), part.errors))
+            part = bound_part(self._terms, centre, blocks, self.best[0] * (1.0 + self._tolerance), self.reaches)
+            self.improve((value_at(self._terms, part.errors), part.errors))
             # a part is never worse than the whole
             bound = min(part.bound, -above)
-            yield (-bound, _Part(middle, blocks, part.split)) if blocks else Over(-bound)
+            yield (-bound, _Part(centre, blocks, part.split)) if blocks else Over(-bound)
 
 
-def _starts(columns: Sequence[slice], count: int) -> Array:
-    """Return no errors, and random ones that are allowed: a point of the square may lie outside the disc in it."""
-    starts = np.random.default_rng(0).uniform(-1.0, 1.0, (STARTS + 1, count))
-    starts[0] = 0.0
-    for disc in columns:
-        starts[:, disc] /= np.maximum(np.hypot.reduce(starts[:, disc], axis=1), 1.0)[:, None]
-    return starts
-
-
-def _climbed(terms: Terms, columns: Sequence[slice], errors: Array) -> tuple[float, Array]:
-    """Climb from some errors to ones that no step along their own slope betters: each step takes the farthest point."""
+def _climb(terms: Terms, columns: Sequence[slice], errors: Array) -> tuple[float, Array]:
+    """Step to the farthest point along the slope until the value stops rising; return value and errors."""
     value = value_at(terms, errors)
     for _ in range(CLIMBS):
         slope = np.zeros(len(errors))
@@ -163,8 +171,275 @@ def _climbed(terms: Terms, columns: Sequence[slice], errors: Array) -> tuple[flo
         for own in columns:
             size = float(np.hypot.reduce(slope[own]))
             following[own] = slope[own] / size if size > 0.0 else np.eye(own.stop - own.start)[0]
-        found = value_at(terms, following)
-        if found <= value * (1.0 + ROUNDING):
-            return max((value, errors), (found, following), key=lambda each: each[0])
-        value, errors = found, following
+        reached = value_at(terms, following)
+        if reached <= value * (1.0 + ROUNDING):
+            return max((value, errors), (reached, following), key=lambda each: each[0])
+        value, errors = reached, following
     return value, errors
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """A free error: local numbers in an interval of -1 to 1 each, or in the unit disc.
+
+    Attributes
+    ----------
+    columns
+        In the vector of errors.
+    spans
+        Change of the errors per local number, shape (width, width).
+    arc
+        Middle and half angle of a part of a circle; None of an interval or a whole disc.
+    """
+
+    columns: slice
+    spans: Array
+    arc: tuple[float, float] | None = None
+
+    @property
+    def is_disc(self) -> bool:
+        """Return whether its local numbers lie in the unit disc and not in intervals."""
+        return self.arc is None and len(self.spans) > 1
+
+    def parts(self, centre: Array) -> list[tuple[Array, Block | None]]:
+        """Return centres and free blocks that together hold every extreme point."""
+        if len(self.spans) == 1:
+            ends = [centre.copy(), centre.copy()]
+            for end, sign in zip(ends, (1.0, -1.0), strict=True):
+                end[self.columns] += sign * self.spans[0]
+            return [(end, None) for end in ends]
+        if self.arc is None:
+            return [self._arc(centre, 0.5 * np.pi * quarter, 0.25 * np.pi) for quarter in range(4)]
+        middle, half = self.arc
+        return [self._arc(centre, middle + side * 0.5 * half, 0.5 * half) for side in (-1.0, 1.0)]
+
+    def _arc(self, centre: Array, middle: float, half: float) -> tuple[Array, Block]:
+        """Return the centre of the rectangle about an arc of the unit circle, and its block (R7)."""
+        along = np.array([np.cos(middle), np.sin(middle)])
+        across = np.array([-along[1], along[0]])
+        near = float(np.cos(half))
+        moved = centre.copy()
+        moved[self.columns] = 0.5 * (1.0 + near) * along
+        spans = np.stack([0.5 * (1.0 - near) * along, np.sin(half) * across], axis=1)
+        return moved, Block(self.columns, spans, (middle, half))
+
+
+@dataclass(frozen=True, eq=False)
+class PartBound:
+    """Upper bound over a part of the errors, its block to divide next, and errors that may be its worst."""
+
+    bound: float
+    split: int
+    errors: Array
+
+
+def bound_part(terms: Terms, centre: Array, blocks: Sequence[Block], enough: float, reaches: Reaches) -> PartBound:
+    """Bound the sum of norms over a part of the errors from above (R5, R6).
+
+    Parameters
+    ----------
+    terms
+        Weights and norms.
+    centre
+        Errors about which the blocks are free, shape (columns,).
+    enough
+        Bound at which no better one is sought.
+    reaches
+        What blocks move, one cache per term; filled here.
+    """
+    parts = [_TermAbout(*term, centre, blocks, cached) for term, cached in zip(terms, reaches, strict=True)]
+    if not blocks:
+        return PartBound(sum(part.separate_bound() for part in parts), -1, centre)
+    local = np.ones(parts[0].moves.shape[2])
+    touched = [np.sqrt(np.square(part.lengths) + np.square(part.reaches).sum(axis=0)) for part in parts]
+    best = math.inf
+    for k in range(TOUCHES):
+        majorants = [part.norm.norm.majorant(part.norm.grid, sizes) for part, sizes in zip(parts, touched, strict=True)]
+        if not any(majorants):
+            best = sum(part.separate_bound() for part in parts)
+            break
+        above, at = _over_majorants(parts, majorants, blocks)
+        if above < best:
+            best, local = above, at
+        reached = [lengths(part.rows + part.moves @ at) for part in parts]
+        value = sum(part.value(sizes) for part, sizes in zip(parts, reached, strict=True))
+        if best <= enough or best <= value * (1.0 + ROUNDING):
+            break
+        touched = [(a * k + b) / (k + 1) for a, b in zip(touched, reached, strict=True)]
+    errors, at_block = centre.copy(), 0
+    for block in blocks:
+        width = len(block.spans)
+        errors[block.columns] += block.spans @ local[at_block : at_block + width]
+        if width > 1:
+            # on the circle of its disc
+            errors[block.columns] /= float(np.hypot(*errors[block.columns])) or 1.0
+        at_block += width
+    return PartBound(best, int(np.argmax(np.sum([part.sizes for part in parts], axis=0))), errors)
+
+
+class _TermAbout:
+    """A weighted norm about a centre, and its changes by the local numbers of all blocks.
+
+    Attributes
+    ----------
+    rows
+        At the centre, shape (k, d), and their lengths, shape (k,).
+    moves
+        Change of the rows per local number, shape (k, d, n).
+    own
+        Local numbers of every block among these n.
+    reaches
+        Largest change of every row by every block, shape (blocks, k).
+    sizes
+        Largest rise of the weighted norm by every block, shape (blocks,).
+    """
+
+    def __init__(
+        self, weight: float, norm: AffineNorm, centre: Array, blocks: Sequence[Block], cached: dict[_Key, _Reach]
+    ) -> None:
+        self.weight, self.norm, self.blocks = weight, norm, blocks
+        self.rows = norm.rows(centre)
+        self.lengths = lengths(self.rows)
+        found = [_reach(norm, block, cached) for block in blocks]
+        ends = np.cumsum([0, *(each.move.shape[-1] for each in found)])
+        self.own = [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+        self.moves = np.concatenate([np.zeros((*self.rows.shape, 0)), *(each.move for each in found)], axis=2)
+        self.reaches = np.array([each.rows for each in found]).reshape(len(blocks), len(self.rows))
+        self.sizes = weight * np.array([each.size for each in found])
+
+    def separate_bound(self) -> float:
+        """Return the bound of the weighted norm with every row at its own worst (R5)."""
+        kind, grid, rows = self.norm.norm, self.norm.grid, self.rows
+        bound = self.weight * kind.value(grid, rows) + float(self.sizes.sum())
+        if not kind.of_row_lengths:
+            return bound
+        pulls = np.einsum("kd,kdn->kn", rows, self.moves)
+        along = np.zeros(len(rows))
+        for block, own in zip(self.blocks, self.own, strict=True):
+            along += np.hypot.reduce(pulls[:, own], axis=1) if block.is_disc else np.abs(pulls[:, own]).sum(axis=1)
+        across = self.reaches.sum(axis=0)
+        longest = np.sqrt(np.square(self.lengths) + 2.0 * along + np.square(across))
+        longest = np.minimum(self.lengths + across, longest)
+        return min(bound, self.weight * kind.value(grid, longest[:, None]))
+
+    def value(self, sizes: Array) -> float:
+        """Return the weighted norm of rows of these lengths; zero for a norm that needs more than lengths."""
+        kind = self.norm.norm
+        return self.weight * kind.value(self.norm.grid, sizes[:, None]) if kind.of_row_lengths else 0.0
+
+
+def _over_majorants(
+    parts: Sequence[_TermAbout], majorants: Sequence[tuple[Array, float] | None], blocks: Sequence[Block]
+) -> tuple[float, Array]:
+    """Return a bound of the quadratic majorants over all local numbers, and where it stands, shape (n,).
+
+    Ends of up to MOST_ENDS intervals are all tried, so that the majorants are exact between them; of the rest each
+    block is bounded by itself.
+    """
+    own = parts[0].own
+    count = parts[0].moves.shape[2]
+    constant, slope, bend = 0.0, np.zeros(count), np.zeros((count, count))
+    for part, majorant in zip(parts, majorants, strict=True):
+        if majorant is None:
+            constant += part.separate_bound()
+            continue
+        factors, offset = part.weight * majorant[0], part.weight * majorant[1]
+        weighed = (factors[:, None, None] * part.moves).reshape(-1, count)
+        constant += offset + 0.5 * float(factors @ np.square(part.lengths))
+        slope += weighed.T @ part.rows.reshape(-1)
+        bend += weighed.T @ part.moves.reshape(-1, count)
+    ends = [k for k, block in enumerate(blocks) if not block.is_disc]
+    ends.sort(key=lambda k: -float(np.abs(bend[own[k]]).sum()))
+    tried: list[int] = []
+    for k in ends:
+        if len(tried) + own[k].stop - own[k].start <= MOST_ENDS:
+            tried += range(own[k].start, own[k].stop)
+    signs = _signs(len(tried))
+    rest = [k for k in range(len(blocks)) if own[k].start not in tried]
+    left = [j for k in rest for j in range(own[k].start, own[k].stop)]
+    # a disc is one ball, each number of an interval or an arc one of its own
+    firsts = [
+        left.index(j) for k in rest for j in range(own[k].start, own[k].start + 1 if blocks[k].is_disc else own[k].stop)
+    ]
+    total = signs @ slope[tried] + 0.5 * np.einsum("sn,sn->s", signs @ bend[np.ix_(tried, tried)], signs)
+    pulls = slope[left] + signs @ bend[np.ix_(tried, left)]
+    added, points = _over_balls(pulls, bend[np.ix_(left, left)], np.array(firsts, dtype=int))
+    best = int(np.argmax(total + added))
+    at = np.zeros(count)
+    at[tried], at[left] = signs[best], points[best]
+    return constant + float(total[best] + added[best]), at
+
+
+def _over_balls(pulls: Array, bend: Array, firsts: NDArray[np.int_]) -> tuple[Array, Array]:
+    """Bound a . u + u . H u / 2 where every u_b has the length one (R6a).
+
+    Parameters
+    ----------
+    pulls
+        Many a, shape (s, n).
+    bend
+        H, shape (n, n).
+    firsts
+        First number of every ball.
+
+    Returns
+    -------
+    The bounds (s,), and the points about which they are taken (s, n).
+    """
+    if not len(bend):
+        return np.zeros(len(pulls)), np.zeros((len(pulls), 0))
+    sizes = np.diff([*firsts, len(bend)])
+
+    def lengths_of(vectors: Array) -> Array:
+        return np.asarray(np.sqrt(np.add.reduceat(np.square(vectors), firsts, axis=1)))
+
+    # what bends alike in all directions of a ball is known
+    even = np.add.reduceat(np.diag(bend), firsts) / sizes
+    rest = bend - np.diag(np.repeat(even, sizes))
+    most = float(np.linalg.eigvalsh(rest)[-1])
+    points, pulled = np.zeros_like(pulls), pulls
+    for _ in range(TURNS):
+        size = np.repeat(lengths_of(pulled), sizes, axis=1)
+        points = np.where(size > 0.0, pulled / np.where(size > 0.0, size, 1.0), 0.0)
+        # any point of the sphere will do where nothing pulls
+        points[:, firsts] += lengths_of(points) == 0.0
+        pulled = pulls + points @ rest
+    reached = lengths_of(pulled - most * points) + most
+    bound = reached.sum(axis=1) - 0.5 * np.einsum("sn,sn->s", points @ rest, points) + 0.5 * float(even.sum())
+    return bound, points
+
+
+@cache
+def _signs(count: int) -> Array:
+    return np.array(list(itertools.product((1.0, -1.0), repeat=count))).reshape(2**count, count)
+
+
+@dataclass(frozen=True, eq=False)
+class _Reach:
+    """Change of the rows by a block, shape (k, d, w), its largest of each row, shape (k,), and rise of the norm."""
+
+    move: Array
+    rows: Array
+    size: float
+
+
+_Key: TypeAlias = tuple[int, tuple[float, float] | None]
+Reaches: TypeAlias = Sequence[dict[_Key, _Reach]]
+"""Of every term the reach of blocks, which does not change with the centre."""
+
+
+def _reach(norm: AffineNorm, block: Block, cached: dict[_Key, _Reach]) -> _Reach:
+    key = block.columns.start, block.arc
+    if key not in cached:
+        move = norm.slope[..., block.columns] @ block.spans
+        columns = [move[..., j] for j in range(move.shape[-1])]
+        if block.is_disc:
+            gram = np.einsum("kdi,kdj->kij", move, move)
+            mean, half = 0.5 * (gram[:, 0, 0] + gram[:, 1, 1]), 0.5 * (gram[:, 0, 0] - gram[:, 1, 1])
+            rows = np.sqrt(mean + np.hypot(half, gram[:, 0, 1]))
+        else:
+            rows = sum((lengths(column) for column in columns), np.zeros(len(move)))
+        kind, grid = norm.norm, norm.grid
+        apart = kind.value(grid, rows[:, None]) if kind.of_row_lengths else sum(kind.value(grid, c) for c in columns)
+        cached[key] = _Reach(move, rows, apart)
+    return cached[key]
