@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from laufruhe.cli import app
 from laufruhe.errors import InputError
 from laufruhe.report.document import Document
-from laufruhe.report.study_report import told as blocks_of
+from laufruhe.report.study_report import blocks_of
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run

@@ -8,7 +8,7 @@ import numpy as np
 
 from laufruhe.plots.picture import draw
 from laufruhe.studies.kinds import KINDS
-from laufruhe.studies.kinds.free_forces import printed_agree
+from laufruhe.studies.kinds.free_forces import count_agreeing
 from problem_files import PROBLEMS
 from studies.parts import part_of, told
 
@@ -29,7 +29,7 @@ literature = {{ couple_1 = 0.449, couple_2 = 4.9798, force_2 = 0.001 }}
 
 def test_free_forces_count_what_agrees(tmp_path: Path) -> None:
     data = part_of(tmp_path, LAYOUTS)
-    assert printed_agree(data) == (2, 3)
+    assert count_agreeing(data) == (2, 3)
     assert np.isnan(float(data["force_printed"].sel(case="five", order=1)))
     table = told("free forces", data)
     assert "| five | 144 | 0 | 0.4490 (0.449) | 0 (0.001) | 4.9798 (4.9798) |" in table

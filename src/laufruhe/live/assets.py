@@ -12,7 +12,7 @@ PARTS = ("signals", "norms", "numbers", "design", "drawing", "figures", "control
 
 @cache
 def page_assets() -> dict[str, str]:
-    """The script, one classic script that gives `window.laufruheLive`, and the style, by their names."""
+    """Return script (`window.laufruheLive`) and style of a live page, by file name."""
     folder = files("laufruhe.live") / "page"
     parts = [(folder / f"{name}.js").read_text(encoding="utf-8") for name in PARTS]
     script = "\n".join(['"use strict";', "(() => {", *parts, "})();", ""])

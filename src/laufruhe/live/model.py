@@ -43,7 +43,7 @@ NOTHING = "Nothing that is open here can be moved live."
 
 
 def live_model(problem: Problem, result: Result, is_served: bool = False) -> LiveModel:
-    """The page's model of a problem.
+    """Return the page's model of a problem.
 
     Parameters
     ----------
@@ -55,101 +55,100 @@ def live_model(problem: Problem, result: Result, is_served: bool = False) -> Liv
         Whether the page has a server, which decides and measures what does not follow.
     """
     file = f"{problem.name}.toml"
-    bare = LiveModel(
+    model = LiveModel(
         problem.name, problem.title, file, tuple(point.name for point in problem.points), problem.engine.cycle.turns,
         objective=result.problem.drawing.objective_name, unit=result.problem.objective_unit or "",
     )  # fmt: skip
     values = decided(result.problem, {entry.name: entry.value for entry in result.decisions})
     how = HERE if is_served else HOW.format(file=file)
     moving = _moving(result.problem, values)
-    still = tuple(_still(result.problem, how))
-    bare = replace(bare, unmoved=still, why_not="" if moving.decisions else NOTHING)
+    fixed = tuple(_unmoved(result.problem, how))
+    model = replace(model, unmoved=fixed, why_not="" if moving.decisions else NOTHING)
     try:
-        found = _filled(bare, problem, moving, result, values, is_served)
+        filled = _filled(model, problem, moving, result, values, is_served)
     except ModelError as error:
-        return replace(bare, why_not=f"The loads cannot be shown while decisions move: {error}.")
-    return replace(found, save=saved(problem, result, moving, values))
+        return replace(model, why_not=f"The loads cannot be shown while decisions move: {error}.")
+    return replace(filled, save=saved(problem, result, moving, values))
 
 
-def decided(problem: Problem, shown: Mapping[str, float]) -> dict[str, Value]:
-    """Values of all decisions by name, from sizes and angles as results show them; where there is none, the start."""
-    found: dict[str, Value] = {}
+def decided(problem: Problem, numbers: Mapping[str, float]) -> dict[str, Value]:
+    """Return values of all decisions by name, from sizes and angles of a result; the start where missing."""
+    values: dict[str, Value] = {}
     for decision in problem.decisions:
-        if decision.name not in shown:
-            found[decision.name] = decision.start
+        if decision.name not in numbers:
+            values[decision.name] = decision.start
         elif decision.is_affine and decision.set.width > 1:
-            found[decision.name] = shown[decision.name] * cmath.exp(1j * shown[angle_name(decision)])
+            values[decision.name] = numbers[decision.name] * cmath.exp(1j * numbers[angle_name(decision)])
         else:
             unit = decision.set.directions[0]
-            found[decision.name] = shown[decision.name] * (unit if decision.is_affine else 1.0)
-    return found
+            values[decision.name] = numbers[decision.name] * (unit if decision.is_affine else 1.0)
+    return values
 
 
 def _moving(problem: Problem, values: Mapping[str, Value]) -> Problem:
-    """The drawing, all but what loads are affine in fixed as it was decided."""
     fixed = [decision for decision in problem.decisions if not decision.is_affine]
-    held = problem.fixed_at([values[decision.name] for decision in fixed], fixed)
-    return replace(held, phasing=None, extras=())
+    problem_ = problem.fixed_at([values[decision.name] for decision in fixed], fixed)
+    return replace(problem_, phasing=None, extras=())
 
 
 def _filled(
     bare: LiveModel, problem: Problem, moving: Problem, result: Result, values: Mapping[str, Value], is_served: bool
 ) -> LiveModel:
-    model = AffineModel(moving)
+    affine = AffineModel(moving)
     kinds = {decision.kind for decision in moving.decisions}
     # where the value of a measure is known that the page cannot follow
     known = "it is measured when sliders rest" if is_served else f"its value is that of the design decided; {HOW}"
     aside = f"cannot be followed live; {known.format(file=bare.file)}"
-    collected = _Collected(model, kinds, result, aside)
+    collected = _Collected(affine, kinds, result, aside)
     curves = _curves(collected, result)
     measures = collected.measures()
-    start = vector_of(model.domains)
+    start = vector_of(affine.domains)
     designs = [("given", start)]
     if result.decisions:
-        designs.append(("optimum", vector_of(model.domains, [values[d.name] for d in moving.decisions])))
-    designs.append(("between", _between(model.domains)))
+        designs.append(("optimum", vector_of(affine.domains, [values[d.name] for d in moving.decisions])))
+    designs.append(("between", _between(affine.domains)))
     return replace(
         bare,
-        sliders=tuple(_slider(domain, problem) for domain in model.domains),
+        sliders=tuple(_slider(domain, problem) for domain in affine.domains),
         signals=tuple(collected.signals.values()),
         curves=curves,
         measures=measures,
-        designs=tuple(_design(name, x, moving, model.domains, collected.asked) for name, x in designs),
+        designs=tuple(_design(name, x, moving, affine.domains, collected.asked) for name, x in designs),
         reference=None if is_served else _reference(result),
         unmoved=(*bare.unmoved, *collected.unmoved),
     )
 
 
 class _Collected:
-    """Signals of a problem, each once, and what of its measures they say."""
+    """Signals of a problem, each once, and the measures on them."""
 
     def __init__(self, model: AffineModel, kinds: set[Kind], result: Result, aside: str) -> None:
         self.model, self.kinds, self.aside = model, kinds, aside
-        self.decided = {found.name: found for found in result.limits}
+        self.decided = {limit.name: limit for limit in result.limits}
         self.signals: dict[Measure, Signal] = {}
         self.unmoved: list[tuple[str, str]] = []
         self.asked: list[Measure | None] = []
 
     def signal(self, measure: Measure) -> int:
-        """Number of the signal whose norm a measure is; one for all norms."""
+        """Return the index of a measure's signal; all norms share it."""
         key = replace(measure, norm=MEAN)
         if key not in self.signals:
             self.signals[key] = signal_of(self.model, key)
         return list(self.signals).index(key)
 
     def measures(self) -> tuple[Shown, ...]:
-        """Terms of the objective, of later ones, and limits."""
-        problem, found = self.model.problem, []
+        """Return terms of all objectives, and limits."""
+        problem, measures = self.model.problem, []
         for term in problem.objective:
-            found += self._shown(term.measure, OBJECTIVE, term.measure.name, weight=term.weight)
+            measures += self._measure(term.measure, OBJECTIVE, term.measure.name, weight=term.weight)
         for rank in problem.ranks[1:]:
             for term in rank.terms:
-                found += self._shown(term.measure, "rank", term.measure.name)
+                measures += self._measure(term.measure, "rank", term.measure.name)
         for limit in problem.limits:
-            found += self._shown(limit.measure, "limit", limit.name, limit)
-        return tuple(found)
+            measures += self._measure(limit.measure, "limit", limit.name, limit)
+        return tuple(measures)
 
-    def _shown(
+    def _measure(
         self, measure: Measure, role: str, name: str, limit: Limit | None = None, weight: float = 1.0
     ) -> list[Shown]:
         stays = not depends(measure.channel, self.kinds, self.model.problem)
@@ -160,8 +159,8 @@ class _Collected:
         if stays and limit is None:
             return [replace(base, value=self.model.bare.value(measure))]
         if stays and limit is not None:
-            found = self.model.bare.standing(limit)
-            return [replace(base, sides=((found.side, found.edge),), value=found.value)]
+            standing = self.model.bare.standing(limit)
+            return [replace(base, sides=((standing.side, standing.edge),), value=standing.value)]
         if follows:
             return [replace(base, signal=self.signal(measure))]
         self.unmoved.append((name, self.aside))
@@ -178,32 +177,29 @@ def _sides(limit: Limit | None) -> tuple[tuple[str, float], ...]:
 
 
 def _curves(collected: _Collected, result: Result) -> tuple[Curve, ...]:
-    """Forces on mounts and bearings, and what the block feels."""
     forces = [(places.title, places.channel) for places in places_of(result) if places.channel.feels_unbalances]
     block = [(name.capitalize(), CHANNELS[name]) for name in ON_BLOCK]
     return tuple(Curve(title, collected.signal(Measure(channel))) for title, channel in (*forces, *block))
 
 
 def _slider(domain: Domain, problem: Problem) -> Slider:
-    decision, own = domain.decision, domain.set
+    decision, domain_set = domain.decision, domain.set
     return Slider(
-        decision.name, decision.unit, domain.start, domain.width, own.lower, own.upper, own.angles,
+        decision.name, decision.unit, domain.start, domain.width, domain_set.lower, domain_set.upper, domain_set.angles,
         angle_name(decision), *_unit(problem, decision),
     )  # fmt: skip
 
 
 def _unit(problem: Problem, decision: Decision) -> tuple[str, float]:
-    """The unit that the file has, else that of reports, and its factor on an SI value."""
     if problem.origin is not None:
         with suppress(Refused, units.UnitError):
-            own = edits.unit_of_bounds(problem.origin.file[0], decision.name)
-            if own:
-                return own, 1.0 / units.parse(f"1 {own}", decision.unit)
+            unit = edits.unit_of_bounds(problem.origin.file[0], decision.name)
+            if unit:
+                return unit, 1.0 / units.parse(f"1 {unit}", decision.unit)
     return units.readable(decision.unit)
 
 
 def _between(domains: Sequence[Domain]) -> Array:
-    """Somewhere inside, in no special place."""
     parts = [np.zeros(0)]
     for k, domain in enumerate(domains):
         low, high = domain.set.lower, domain.set.upper
@@ -214,14 +210,16 @@ def _between(domains: Sequence[Domain]) -> Array:
     return np.concatenate(parts)
 
 
-def _design(name: str, x: Array, moving: Problem, domains: Sequence[Domain], asked: Sequence[Measure | None]) -> Design:
-    found = evaluate(moving, moving.design([domain.complex_value(x) for domain in domains]))
-    told = (None if measure is None else float(found.value(measure)) for measure in asked)
-    return Design(name, tuple(map(float, x)), tuple(told))
+def _design(
+    name: str, x: Array, moving: Problem, domains: Sequence[Domain], measures: Sequence[Measure | None]
+) -> Design:
+    evaluation = evaluate(moving, moving.design([domain.complex_value(x) for domain in domains]))
+    values = (None if measure is None else float(evaluation.value(measure)) for measure in measures)
+    return Design(name, tuple(map(float, x)), tuple(values))
 
 
 def _reference(result: Result) -> Reference | None:
-    """Return what the objective is compared with as it is shown; None where another one was bounded."""
+    """Return the design that the objective is compared with; None if another objective was bounded."""
     if result.problem.extras or not result.decisions:
         return None
     certificate, objective = result.certificate, result.objective
@@ -233,8 +231,7 @@ def _reference(result: Result) -> Reference | None:
     return Reference.of(objective.value, certificate.kind, certificate.gap)
 
 
-def _still(problem: Problem, how: str) -> Iterator[tuple[str, str]]:
-    """What is open and has no slider, and why."""
+def _unmoved(problem: Problem, how: str) -> Iterator[tuple[str, str]]:
     names = problem.phasing.open_names if problem.phasing is not None else ()
     yield from ((name, f"stars are chosen and not slid, so the one decided stays; {how}") for name in names)
     for decision in problem.decisions:

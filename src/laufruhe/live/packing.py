@@ -14,14 +14,14 @@ from laufruhe.units import readable
 
 
 class Block:
-    """Numbers one behind the other; each array is told by its place and its shape."""
+    """Concatenated arrays, each addressed by offset and shape."""
 
     def __init__(self) -> None:
         self._parts: list[np.ndarray] = []
         self._length = 0
 
     def add(self, values: ArrayLike) -> list[Any]:
-        """Place and shape of an array; a complex one has a last axis of two."""
+        """Append an array and return its offset and shape; a complex array gets a last axis of two."""
         array = np.asarray(values)
         if np.iscomplexobj(array):
             array = np.stack([array.real, array.imag], axis=-1)
@@ -31,19 +31,19 @@ class Block:
         return [self._length - len(flat), list(array.shape)]
 
     def text(self) -> str:
-        """All of them, deflated, as base64."""
-        whole = np.concatenate([np.zeros(0), *self._parts]).astype("<f8")
-        return base64.b64encode(zlib.compress(whole.tobytes(), 6)).decode("ascii")
+        """Return all numbers deflated, as base64."""
+        numbers = np.concatenate([np.zeros(0), *self._parts]).astype("<f8")
+        return base64.b64encode(zlib.compress(numbers.tobytes(), 6)).decode("ascii")
 
 
 def with_unit(unit: str) -> dict[str, Any]:
-    """SI unit, the one that is shown, and its factor."""
+    """Return the SI unit, the readable unit and its factor."""
     name, factor = readable(unit)
     return {"unit": unit, "shown": name, "factor": factor}
 
 
 def packed(part: Any, block: Block) -> Any:
-    """A part of a signal, field by field; its numbers stand in the block."""
+    """Return a part of a signal field by field; its numbers are in the block."""
     if isinstance(part, np.ndarray):
         return block.add(part)
     if isinstance(part, tuple):

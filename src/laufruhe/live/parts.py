@@ -54,7 +54,7 @@ class Slider:
 
 @dataclass(frozen=True)
 class Shown:
-    """A measure that follows the sliders, or stays.
+    """A measure that follows the sliders, or a constant.
 
     Attributes
     ----------
@@ -88,7 +88,7 @@ class Shown:
 
 @dataclass(frozen=True)
 class Curve:
-    """A signal that is drawn."""
+    """A drawn signal."""
 
     title: str
     signal: int
@@ -96,7 +96,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Design:
-    """Values of the decision vector, and every measure that the exact model finds for it; None of what stays."""
+    """A decision vector with every measure by the exact model; None for constants."""
 
     name: str
     x: tuple[float, ...]
@@ -105,7 +105,7 @@ class Design:
 
 @dataclass(frozen=True)
 class Reference:
-    """A design that others are compared with: its objective [SI], and what it is called."""
+    """A design for comparison: its objective [SI] and its name."""
 
     value: float
     name: str
@@ -113,7 +113,7 @@ class Reference:
 
     @classmethod
     def of(cls, value: float, proof: Proof, gap: float) -> Reference:
-        """Name a design by what was proven of it."""
+        """Return the reference of a design with this proof."""
         if proof is Proof.GLOBAL:
             return cls(value, "the proven optimum", True)
         if proof is Proof.WITHIN_GAP:
@@ -123,7 +123,7 @@ class Reference:
 
 @dataclass(frozen=True, eq=False)
 class LiveModel:
-    """A problem as a page shows it.
+    """A problem as a live page shows it.
 
     Attributes
     ----------
@@ -160,14 +160,14 @@ class LiveModel:
 
     @property
     def told(self) -> tuple[str, ...]:
-        """What does not follow sliders, in sentences."""
+        """Sentences about numbers that do not follow sliders."""
         reasons = dict.fromkeys(why for _, why in self.unmoved)
-        names = {why: ", ".join(name for name, own in self.unmoved if own == why) for why in reasons}
+        names = {why: ", ".join(name for name, reason in self.unmoved if reason == why) for why in reasons}
         return tuple(f"{names[why]}: {why}." for why in reasons)
 
     @property
     def too_large(self) -> str:
-        """Why no page carries it; empty where one does."""
+        """Reason why the model does not fit a page; empty if it does."""
         size = len(self._packed[1]) / 1e6
         if size <= MOST_MB:
             return ""
@@ -175,20 +175,19 @@ class LiveModel:
 
     @cached_property
     def _packed(self) -> tuple[list[dict[str, Any]], str]:
-        """Signals, and the numbers that they point to."""
         block = Block()
         return [{**packed(signal, block), **with_unit(signal.unit)} for signal in self.signals], block.text()
 
     def as_json(self) -> str:
-        """What `show` of the page takes; safe inside an HTML element."""
+        """Return the argument of the page's `show`; safe inside an HTML element."""
         signals, data = self._packed
         as_they_are = ("name", "title", "file", "points", "turns", "sliders", "curves", "reference", "save")
         plain = {
             "version": VERSION,
             **{key: getattr(self, key) for key in as_they_are},
             "signals": signals,
-            "measures": [{**asdict(one), "value": _told(one.value), **with_unit(one.unit)} for one in self.measures],
-            "designs": {one.name: {"x": one.x, "measured": [*map(_told, one.measured)]} for one in self.designs},
+            "measures": [{**asdict(one), "value": _or_none(one.value), **with_unit(one.unit)} for one in self.measures],
+            "designs": {one.name: {"x": one.x, "measured": [*map(_or_none, one.measured)]} for one in self.designs},
             "objective": {"name": self.objective, **with_unit(self.unit)},
             "unmoved": [{"name": name, "why": why} for name, why in self.unmoved],
             "whyNot": self.why_not,
@@ -197,6 +196,5 @@ class LiveModel:
         return json.dumps(plain, ensure_ascii=False, allow_nan=False, default=asdict).replace("<", "\\u003c")
 
 
-def _told(value: float | None) -> float | None:
-    """On a resonance there is no number, nor of a shaft that was left out."""
+def _or_none(value: float | None) -> float | None:
     return None if value is None or not np.isfinite(value) else value

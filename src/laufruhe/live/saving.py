@@ -29,7 +29,7 @@ SAME = 1e-9
 
 @dataclass(frozen=True)
 class Saved:
-    """A problem file with places for numbers.
+    """A problem file with placeholders for numbers.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ NOT_SAVED = Saved()
 
 
 def saved(problem: Problem, result: Result, moving: Problem, values: Mapping[str, Value]) -> Saved:
-    """The file of a design whose moving decisions are to be filled in; none that does not read as that design."""
+    """Return the file of a design with placeholders for moving decisions; empty if it would not read back."""
     if problem.origin is None:
         return NOT_SAVED
     tables, path = problem.origin.file
@@ -64,21 +64,21 @@ def saved(problem: Problem, result: Result, moving: Problem, values: Mapping[str
         read = load_tables(given(filled)[0], path)
     except (Refused, InputError) as error:
         return Saved(note=f"This design cannot be written as a problem file: {error}.")
-    if not _alike(read.engine, moving.engine) or read.fidelity != moving.fidelity:
+    if not _equal_engines(read.engine, moving.engine) or read.fidelity != moving.fidelity:
         return Saved(note="This design cannot be written as a problem file that is evaluated alike.")
-    beside = sorted({text for _, text in texts_in(tables) if text.endswith(".csv")})
-    note = f"Save it beside {' and '.join(beside)}." if beside else ""
+    files = sorted({text for _, text in texts_in(tables) if text.endswith(".csv")})
+    note = f"Save it beside {' and '.join(files)}." if files else ""
     return Saved(text, marks, note)
 
 
 def _marks(decisions: Sequence[Decision]) -> tuple[tuple[str, str, str], ...]:
-    found = []
+    marks = []
     for decision in decisions:
-        found.append((f"@{decision.name}@", decision.name, decision.unit))
+        marks.append((f"@{decision.name}@", decision.name, decision.unit))
         if decision.set.width > 1:
             name = angle_name(decision)
-            found.append((f"@{name}@", name, "rad"))
-    return tuple(found)
+            marks.append((f"@{name}@", name, "rad"))
+    return tuple(marks)
 
 
 def _filled(text: str, marks: Sequence[tuple[str, str, str]], moving: Problem) -> str:
@@ -91,7 +91,7 @@ def _filled(text: str, marks: Sequence[tuple[str, str, str]], moving: Problem) -
 
 
 def written(value: float, unit: str) -> str:
-    """A number as a problem file has it, in full precision."""
+    """Return a number as a problem file writes it, in full precision."""
     if unit in ("", "rad"):
         return repr(math.degrees(value) if unit else float(value))
     return f'"{float(value)!r} {unit}"'
@@ -107,7 +107,6 @@ def _fixed(tables: dict[str, Any], result: Result, values: Mapping[str, Value]) 
 
 
 def _with_star(tables: dict[str, Any], result: Result) -> dict[str, Any]:
-    """Throws, firing order and shafts of a star."""
     decided = {entry.name: entry.value for entry in result.decisions}
     throws = [math.degrees(decided[name]) for k in range(len(decided)) if (name := f"throw {k + 1}") in decided]
     star: dict[str, Any] = {"throws": throws} if throws and "throws" in tables["engine"] else {}
@@ -121,8 +120,7 @@ def _with_star(tables: dict[str, Any], result: Result) -> dict[str, Any]:
     return edits.with_star(tables, star, gone)
 
 
-def _alike(one: Engine, other: Engine) -> bool:
-    """Whether two engines have the same masses, throws, firings, rotors and mounts, but for roundings."""
+def _equal_engines(one: Engine, other: Engine) -> bool:
     left, right = map(_numbers, (one, other))
     return left.shape == right.shape and bool(np.all(np.abs(left - right) <= SAME * (1.0 + np.abs(left))))
 

@@ -26,14 +26,14 @@ NOTHING = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class Waves:
-    """Coefficients of the orders that are not nothing, multiples `orders` of the lowest, shape (orders, ...)."""
+    """Non-zero orders of a series, multiples `orders` of the lowest, shape (orders, ...)."""
 
     orders: NDArray[np.intp]
     coefficients: ComplexArray
 
     @classmethod
     def of(cls, coefficients: ComplexArray) -> Waves:
-        """Of a whole series, shape (n, ...)."""
+        """Return the non-zero orders of a series, shape (n, ...)."""
         size = np.abs(coefficients).reshape(len(coefficients), -1).max(axis=1, initial=0.0)
         smallest = np.argsort(size, kind="stable")
         left_out = smallest[np.cumsum(size[smallest]) <= NOTHING * size.max(initial=0.0)]
@@ -43,7 +43,7 @@ class Waves:
 
 @dataclass(frozen=True, eq=False)
 class Bends:
-    """What a signal has beyond a smooth series: pieces of polynomials between its corners (L5a).
+    """Kinks of a signal: a smooth series and polynomials between the kinks (L5a).
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Bends:
 
 @dataclass(frozen=True, eq=False)
 class PointSignal:
-    """At one operating point.
+    """A signal at one operating point.
 
     Attributes
     ----------
@@ -116,7 +116,7 @@ class Signal:
 
 
 def signal_of(model: AffineModel, measure: Measure) -> Signal:
-    """The rows whose norm a measure is."""
+    """Return the rows of a measure."""
     return _of_load(model, measure) if measure.is_load else _of_masses(model, measure)
 
 
@@ -126,13 +126,13 @@ def _of_load(model: AffineModel, measure: Measure) -> Signal:
     every = [signal for own, by in pairs for signal in (own, *by)]
     # the period of one evaluation, in whose steps its means and peaks are sought
     base = common_base([problem.engine.cycle.base_order, *(signal.base for signal in every)])
-    bare = over(base, [own for own, _ in pairs])
+    constant = over(base, [own for own, _ in pairs])
     columns = [over(base, by) for _, by in pairs]
     # those of every norm, a mean has no need of them, and of all that may bend
-    whole = [reduce(add, by, own) for own, by in zip(bare, columns, strict=True)]
-    bends = bends_of(replace(measure, norm=PEAK), whole, problem.engine)
+    signals = [reduce(add, by, own) for own, by in zip(constant, columns, strict=True)]
+    bends = bends_of(replace(measure, norm=PEAK), signals, problem.engine)
     points = []
-    for share, own, by, at in zip(measure.shares(problem.points), bare, columns, bends, strict=True):
+    for share, own, by, at in zip(measure.shares(problem.points), constant, columns, bends, strict=True):
         counted = [selected(measure, signal, problem.engine) for signal in (own, *by)]
         points.append(_point(float(share), counted[0], counted[1:], at))
     names = channel.places(problem.engine)
@@ -140,15 +140,15 @@ def _of_load(model: AffineModel, measure: Measure) -> Signal:
     return Signal(channel.name, channel.unit, places, float(base), problem.fidelity.samples, tuple(points))
 
 
-def _point(share: float, own: Spectrum, columns: Sequence[Spectrum], at: Array) -> PointSignal:
-    shape = own.coefficients.shape[1:]
+def _point(share: float, constant: Spectrum, columns: Sequence[Spectrum], at: Array) -> PointSignal:
+    shape = constant.coefficients.shape[1:]
     most = max((len(column.coefficients) for column in columns), default=1)
     slope = np.zeros((most, *shape, len(columns)), dtype=complex)
     for k, column in enumerate(columns):
         slope[: len(column.coefficients), ..., k] = column.coefficients
     bent = tuple((k, _bends(column, at)) for k, column in enumerate(columns) if column.corners is not None)
-    bends = _bends(own, at) if bent or own.corners is not None else None
-    return PointSignal(share, Waves.of(own.coefficients), bends, Waves.of(slope), bent)
+    bends = _bends(constant, at) if bent or constant.corners is not None else None
+    return PointSignal(share, Waves.of(constant.coefficients), bends, Waves.of(slope), bent)
 
 
 def _bends(signal: Spectrum, at: Array) -> Bends:

@@ -25,18 +25,18 @@ from laufruhe.solvers.result import Result
 
 
 def figures(result: Result) -> Iterator[tuple[str, Figure]]:
-    """Every picture that this result fills, by its name, in the order of a report."""
+    """Yield every picture of a result with its name, in the order of a report."""
     for name in names(result):
         yield name, figure(result, name)
 
 
 def names(result: Result) -> list[str]:
-    """Pictures that this result fills, in the order of a report."""
+    """Return the names of a result's pictures, in the order of a report."""
     return [name for name in PICTURES if import_module(PICTURES[name].module).applies(result)]
 
 
 def figure(result: Result, name: str) -> Figure:
-    """One picture of a result, by its name among `laufruhe.present.pictures.PICTURES`."""
+    """Return one picture of a result, by its name among `laufruhe.present.pictures.PICTURES`."""
     picture = import_module(PICTURES[name].module) if name in PICTURES else None
     if picture is None or not picture.applies(result):
         known = ", ".join(names(result))
@@ -47,7 +47,6 @@ def figure(result: Result, name: str) -> Figure:
 
 
 def _words(result: Result) -> Iterator[str]:
-    """All that the user has named, and pictures may show."""
     problem, engine = result.problem, result.final.engine
     yield from (problem.title, problem.source)
     named: list[Any] = [*problem.points, *problem.limits, *problem.decisions]
@@ -58,36 +57,36 @@ def _words(result: Result) -> Iterator[str]:
 
 
 def draw(result: Result, folder: Path, kinds: Sequence[str] = ("png",)) -> tuple[str, ...]:
-    """Picture files of these kinds, png or svg, into a folder; returns their names."""
+    """Write all pictures, as png or svg, into a folder and return the file names."""
     return tuple(name for _, figure_names, _ in _drawn(result, folder, kinds, names(result)) for name in figure_names)
 
 
 def draw_and_show(result: Result, folder: Path, kinds: Sequence[str], wanted: Iterable[str]) -> dict[str, str]:
-    """Some pictures as `draw` makes them, and what stands in a page: SVG by their names."""
+    """Write some pictures as `draw` does, and return them as SVG by name."""
     return {name: as_svg(figure) for name, _, figure in _drawn(result, folder, kinds, wanted)}
 
 
 def get_ready() -> None:
-    """Import all that draws."""
+    """Import all modules that draw."""
     for name in PICTURES:
         import_module(PICTURES[name].module)
 
 
 def draw_in_shares(result: Result, folder: Path, kinds: Sequence[str], count: int) -> dict[str, str]:
-    """All pictures of a result as `draw_and_show` makes them, by so many processes."""
+    """Write all pictures as `draw_and_show` does, in several processes."""
     # what letters need is found once, for all processes
     prepare(_words(result))
     wanted, (left, put) = names(result), os.pipe()
     os.write(put, bytes(range(len(wanted))))
     os.close(put)
     # who is done with one takes the next: a byte of a pipe is read by one process alone
-    own = (wanted[number[0]] for number in iter(partial(os.read, left, 1), b""))
-    parts = fork_map(lambda _: draw_and_show(result, folder, kinds, own), count)
+    numbered = (wanted[number[0]] for number in iter(partial(os.read, left, 1), b""))
+    parts = fork_map(lambda _: draw_and_show(result, folder, kinds, numbered), count)
     os.close(left)
-    found = {name: svg for part in parts for name, svg in part.items()}
+    drawn = {name: svg for part in parts for name, svg in part.items()}
     # of a twin that died
-    found |= draw_and_show(result, folder, kinds, [name for name in wanted if name not in found])
-    return {name: found[name] for name in wanted}
+    drawn |= draw_and_show(result, folder, kinds, [name for name in wanted if name not in drawn])
+    return {name: drawn[name] for name in wanted}
 
 
 def _drawn(

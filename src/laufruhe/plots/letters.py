@@ -20,7 +20,7 @@ _found: dict[str, str] = {}
 
 
 def prepare(texts: Iterable[str]) -> None:
-    """Find fonts for all letters of these texts; a warning names those that no installed font has."""
+    """Find fonts for all letters of the texts; warn about letters that no installed font has."""
     letters = {letter for text in texts if not text.isascii() for letter in text if letter.isprintable()}
     new = sorted(letter for letter in letters - _found.keys() if ord(letter) not in _own())
     _found.update((letter, next((name for name, has in _others() if ord(letter) in has), "")) for letter in new)
@@ -34,31 +34,28 @@ def prepare(texts: Iterable[str]) -> None:
 
 
 def families() -> list[str]:
-    """Fonts in the order in which a letter is looked for in them; the same letter is always found in the same one."""
+    """Return fonts in the order of their use; a letter always comes from the same font."""
     used = set(_found.values())
     return [FONT, *(name for name, _ in (_others() if used - {""} else ()) if name in used)]
 
 
 @cache
 def _own() -> frozenset[int]:
-    """Letters of the font of all words."""
     return _letters_in(fontManager.findfont(FONT))
 
 
 @cache
 def _others() -> tuple[tuple[str, frozenset[int]], ...]:
-    """Installed fonts and their letters: those without serifs first, then by how many letters they have."""
     paths = {
         entry.name: entry.fname
         for entry in reversed(fontManager.ttflist)
         if entry.weight in _REGULAR and entry.style == "normal" and not entry.name.startswith((FONT, _STAND_IN))
     }
-    found = [(name, _letters_in(path)) for name, path in paths.items()]
-    return tuple(sorted(found, key=lambda font: ("sans" not in font[0].lower(), -len(font[1]), font[0])))
+    fonts = [(name, _letters_in(path)) for name, path in paths.items()]
+    return tuple(sorted(fonts, key=lambda font: ("sans" not in font[0].lower(), -len(font[1]), font[0])))
 
 
 def _letters_in(path: str) -> frozenset[int]:
-    """None of a font of pictures, which cannot be drawn at every size, and of a file that is no font any more."""
     try:
         font = FT2Font(path)
         return frozenset(font.get_charmap()) if font.scalable else frozenset()

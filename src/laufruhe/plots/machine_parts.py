@@ -21,7 +21,7 @@ MM = 1e3
 
 
 def slot(axes: Axes, pose: Pose, bore: float, order: float) -> None:
-    """What the pin of a Scotch yoke slides in, from the front."""
+    """Draw the slot of a Scotch yoke, from the front."""
     if math.isfinite(pose.part.rod_length):
         return
     across = 1j * pose.part.crank_radius * cmath.exp(1j * pose.part.bank)
@@ -30,18 +30,18 @@ def slot(axes: Axes, pose: Pose, bore: float, order: float) -> None:
 
 
 def heights_of(radius: float, along: float) -> tuple[float, float]:
-    """Lowest and highest point of a half disc about its centre [m]."""
+    """Return the lowest and highest point of a half disc about its centre [m]."""
     up, across = math.cos(along), radius * abs(math.sin(along))
     return (-radius if up < 0.0 else -across), (radius if up > 0.0 else across)
 
 
 def at(place: complex) -> tuple[float, float]:
-    """Across and up in the view from the front [mm]."""
+    """Return the coordinates of a point in the view from the front [mm]."""
     return MM * place.imag, MM * place.real
 
 
 def bar(axes: Axes, one: tuple[complex, float], other: tuple[complex, float], order: float, **look: Any) -> None:
-    """Two circles and what lies between them: a rod or a web."""
+    """Draw a rod or a web as two circles and the area between them."""
     (first, wide), (second, narrow) = one, other
     along = cmath.phase(second - first)
     turns = np.linspace(0.5 * math.pi, 1.5 * math.pi, 13)
@@ -51,27 +51,27 @@ def bar(axes: Axes, one: tuple[complex, float], other: tuple[complex, float], or
 
 
 def box(axes: Axes, xs: tuple[float, float], levels: tuple[float, float], order: float, **look: Any) -> None:
-    """A part from the side: x in metres, levels in millimetres."""
+    """Draw a part from the side: x in metres, levels in millimetres."""
     low, high = min(levels), max(levels)
     style = {"edgecolor": INK, "linewidth": 0.7, **look}
     axes.add_patch(Rectangle((MM * min(xs), low), MM * abs(xs[1] - xs[0]), high - low, zorder=order, **style))
 
 
 def look_of(body: Outline) -> dict[str, Any]:
-    """Of one that turns, and of the housing around it."""
+    """Return the style of a turning body or of its housing."""
     if body.moves:
         return {**PISTON, "zorder": 2.2}
     return {"fill": False, "edgecolor": GREY, "linewidth": 1.4, "zorder": 1.8}
 
 
 def bodies(axes: Axes, pose: Pose) -> None:
-    """What turns on the pin instead of a piston, from the front."""
+    """Draw rotating bodies that stand in place of a piston, from the front."""
     for body in pose.bodies:
         axes.add_patch(Polygon([at(place) for place in body.points], closed=True, **look_of(body)))
 
 
 def cylinder(axes: Axes, pose: Pose, bore: float) -> complex:
-    """The walls that a piston runs between, from one dead centre to the other; gives a place beside them."""
+    """Draw the walls of a cylinder between its dead centres, and return a point beside them."""
     turn = cmath.exp(1j * pose.part.bank)
     along = complex((pose.piston - pose.crank) / turn)
     ends = [Pose.of(pose.part, phi).piston for phi in np.linspace(0.0, math.tau / abs(pose.part.shaft.ratio), 13)]
@@ -84,7 +84,7 @@ def cylinder(axes: Axes, pose: Pose, bore: float) -> complex:
 
 
 def piston_at(axes: Axes, pose: Pose, bore: float, order: float, **look: Any) -> None:
-    """A piston and its rings, from the front."""
+    """Draw a piston and its rings, from the front."""
     turn = cmath.exp(1j * pose.part.bank)
 
     def corner(up: float, side: float) -> tuple[float, float]:

@@ -45,7 +45,7 @@ ROOM = 1.1
 
 @dataclass(frozen=True)
 class Scene:
-    """An engine, and what of it was open.
+    """An engine with the names of its open parts.
 
     Attributes
     ----------
@@ -69,13 +69,13 @@ class Scene:
 
     @classmethod
     def of(cls, result: Result) -> Scene:
-        """Of the design of a result."""
+        """Return the scene of a result's final design."""
         engine, problem = result.final.engine, result.problem
         drives = [drive for decision in problem.decisions for drive in decision.drives]
 
         def driven(what: str, kind: Kind | None = None) -> frozenset[Any]:
-            own = [drive for drive in drives if hasattr(drive, what) and kind in (None, drive.kind)]
-            return frozenset(getattr(drive, what) for drive in own)
+            matching = [drive for drive in drives if hasattr(drive, what) and kind in (None, drive.kind)]
+            return frozenset(getattr(drive, what) for drive in matching)
 
         numbers, sizes = driven("mount"), {part for part, _ in driven("key", Kind.SIZE)}
         masses = frozenset(part for part, _ in driven("key", Kind.PISTON))
@@ -87,40 +87,40 @@ class Scene:
 
     @property
     def weights(self) -> list[Rotor]:
-        """Unbalances that are there, but for the throws themselves."""
+        """Rotors with an unbalance, without the throws."""
         return [rotor for rotor in self.engine.rotors if rotor.role is not Role.THROW and abs(rotor.unbalance) > 0.0]
 
     @property
     def is_flat(self) -> bool:
-        """Whether its cylinders lie: such an engine is seen from above, others from the left."""
+        """True if the cylinders lie: the second view is from above."""
         leaning = [abs(math.cos(part.bank)) for part in self.engine.slider_cranks]
         return max(leaning) < 0.5
 
     @property
     def is_star(self) -> bool:
-        """Whether more than two cylinders stand each in a direction of its own: from beside they cover each other."""
+        """True if each of three or more cylinders has its own direction, so that they hide each other from the side."""
         banks = [round(part.bank, 6) for part in self.engine.slider_cranks]
         return len(banks) > 2 and len(set(banks)) == len(banks)
 
     @property
     def beside(self) -> str:
-        """From where the second view is taken."""
+        """Viewpoint of the second view."""
         return "from above" if self.is_flat else "from the left"
 
     def is_decided(self, rotor: Rotor) -> bool:
-        """Whether a weight was."""
+        """Return True for a rotor that was open."""
         return rotor.name in self.rotors
 
 
 def views(scene: Scene) -> Page:
-    """Empty panels for both views, in one scale, as large as fit on a page."""
-    ahead, beside = (np.array(points) for points in reaches(scene))
-    sizes = np.array([ROOM * np.ptp(points, axis=0) for points in (ahead, beside)])
+    """Return empty panels for both views, to one scale that fills a page."""
+    front, side = (np.array(points) for points in reaches(scene))
+    sizes = np.array([ROOM * np.ptp(points, axis=0) for points in (front, side)])
     scale = min((WIDE - NARROW) / sizes[1, 0], WIDE / sizes[:, 0].sum(), HIGH / sizes[:, 1].max())
     high = float(scale * sizes[:, 1].max())
     drawn = page(1, 2, (0.5 * WIDE, high), across=ACROSS)
     inches, left = drawn.figure.get_figwidth(), 0.0
-    for axes, points, size, is_side in zip(drawn.panels, (ahead, beside), sizes, (False, True), strict=True):
+    for axes, points, size, is_side in zip(drawn.panels, (front, side), sizes, (False, True), strict=True):
         wide = max(float(scale * size[0]), NARROW)
         axes.set_position((left / inches, 0.0, wide / inches, 1.0))
         left += wide + ACROSS
@@ -135,7 +135,7 @@ def views(scene: Scene) -> Page:
 
 
 def draw_views(drawn: Page, scene: Scene, phi: float = 0.0) -> None:
-    """Both views at a crank angle."""
+    """Draw both views at a crank angle [rad]."""
     front, side = drawn.panels
     _front(front, scene, phi)
     _side(side, scene, phi)
@@ -144,7 +144,7 @@ def draw_views(drawn: Page, scene: Scene, phi: float = 0.0) -> None:
 
 
 def _front(axes: Axes, scene: Scene, phi: float) -> None:
-    """From the front: y to the right, z up, turning clockwise (C3)."""
+    """Draw the view from the front: y to the right, z up, turning clockwise (C3)."""
     # what stands further back is drawn first
     poses = [Pose.of(part, phi) for part in sorted(scene.engine.slider_cranks, key=lambda part: part.x)]
     bore, places = bore_of(scene.engine), dict[str, complex]()
@@ -177,7 +177,7 @@ def _front(axes: Axes, scene: Scene, phi: float) -> None:
 
 
 def _side(axes: Axes, scene: Scene, phi: float) -> None:
-    """From the left, z up, or from above, y down: the front of the engine at the left."""
+    """Draw the view from the left (z up) or from above (y down), the front of the engine at the left."""
     bore = bore_of(scene.engine)
     poses = [Pose.of(part, phi) for part in scene.engine.slider_cranks]
     quarter, pistons = 0.5 * math.pi if scene.is_flat else 0.0, list[tuple[Pose, float]]()
@@ -200,10 +200,10 @@ def _side(axes: Axes, scene: Scene, phi: float) -> None:
         journal = (pin - 0.7 * reach, pin + 0.7 * reach)
         box(axes, (x - 0.18 * bore, x + 0.18 * bore), journal, 4.4, **_crank_look(scene, pose))
         for body in pose.bodies:
-            found = [level(place) for place in body.points]
-            corner = (MM * (x - 0.5 * body.width), min(found))
-            axes.add_patch(Rectangle(corner, MM * body.width, max(found) - min(found), **look_of(body)))
-            piston = 0.5 * (min(found) + crank)
+            levels = [level(place) for place in body.points]
+            corner = (MM * (x - 0.5 * body.width), min(levels))
+            axes.add_patch(Rectangle(corner, MM * body.width, max(levels) - min(levels), **look_of(body)))
+            piston = 0.5 * (min(levels) + crank)
         if not pose.bodies:
             box(axes, (x - 0.08 * bore, x + 0.08 * bore), (pin, piston), 4.6, **_rod_look(scene))
             high = MM * 0.5 * bore * max(abs(math.cos(pose.part.bank - quarter)), 0.2)
@@ -224,14 +224,13 @@ def _side(axes: Axes, scene: Scene, phi: float) -> None:
 
 
 def _number_of(pose: Pose) -> str:
-    """Of the cylinder; empty where its name has none."""
     return next((word for word in pose.part.name.split() if word.isdecimal()), "")
 
 
 def _numbers(axes: Axes, pistons: Sequence[tuple[Pose, float]], quarter: float, bore: float) -> None:
-    """Of the cylinders, on their pistons, where these are large enough; those of one place together."""
+    """Write cylinder numbers on pistons that are large enough."""
     inch = abs(float(np.ptp(axes.get_xlim()))) * axes.figure.dpi / axes.bbox.width
-    found: list[tuple[float, float, list[str]]] = []
+    labels: list[tuple[float, float, list[str]]] = []
     for pose, up in pistons:
         number = _number_of(pose)
         # pistons of two banks may stand behind each other
@@ -239,18 +238,18 @@ def _numbers(axes: Axes, pistons: Sequence[tuple[Pose, float]], quarter: float, 
         if not number or width_of(number) > (0.45 if lean else 0.9) * 0.96 * MM * bore / inch:
             continue
         place = MM * (pose.part.x - 0.25 * bore * lean)
-        near = (names for x, z, names in found if max(abs(x - place), abs(z - up)) < 0.16 * inch)
+        near = (names for x, z, names in labels if max(abs(x - place), abs(z - up)) < 0.16 * inch)
         if (names := next(near, None)) is None:
-            found.append((place, up, [number]))
+            labels.append((place, up, [number]))
         elif number not in names and width_of(", ".join([*names, number])) < 0.9 * MM * bore / inch:
             names.append(number)
     behind = {"facecolor": "white", "edgecolor": "none", "pad": 0.0}
-    for place, up, names in found:
+    for place, up, names in labels:
         axes.text(place, up, ", ".join(names), ha="center", va="center_baseline", size=SMALL, zorder=6.0, bbox=behind)
 
 
 def reaches(scene: Scene) -> tuple[list[tuple[float, float]], list[tuple[float, float]]]:
-    """Corners of what is seen from the front and from beside, over a whole turn [mm]."""
+    """Return corners of the drawn area in both views, over a whole turn [mm]."""
     front, side = [], []
     for x, centre, radius in _spots(scene):
         for y, z in ((centre.imag - radius, centre.real - radius), (centre.imag + radius, centre.real + radius)):
@@ -277,24 +276,24 @@ def _spots(scene: Scene) -> Iterator[tuple[float, complex, float]]:
 
 
 def legend_of(scene: Scene) -> list[Line2D | Patch]:
-    """What stands for what."""
-    found: list[Line2D | Patch] = []
+    """Return the entries of the legend."""
+    entries: list[Line2D | Patch] = []
     for name, decided in (("crank", scene.cranks), ("piston", scene.pistons), ("rod", scene.rods)):
         if decided:
-            found.append(Patch(label=f"{name}, {scene.state}", **DECIDED))
+            entries.append(Patch(label=f"{name}, {scene.state}", **DECIDED))
     if not scene.cranks >= {part.shaft.name for part in scene.engine.slider_cranks}:
-        found.append(Patch(label="crank", **_PLAIN))
+        entries.append(Patch(label="crank", **_PLAIN))
     # one of each kind
     kinds = {scene.is_decided(rotor): rotor for rotor in scene.weights}
-    found += [
+    entries += [
         Patch(label=f"weight, {scene.state}" if decided else "weight", **_weight_look(scene, rotor))
         for decided, rotor in sorted(kinds.items())
     ]
     if len(scene.mounts) < len(scene.engine.mounts):
-        found.append(entry_of_dots("mount", marker="^", color=ORANGE))
+        entries.append(entry_of_dots("mount", marker="^", color=ORANGE))
     if scene.mounts:
-        found.append(entry_of_dots(f"mount, {scene.state}", marker="^", color=AFTER))
-    return found
+        entries.append(entry_of_dots(f"mount, {scene.state}", marker="^", color=AFTER))
+    return entries
 
 
 def _mount_look(decided: bool) -> dict[str, Any]:

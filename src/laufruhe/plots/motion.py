@@ -33,7 +33,7 @@ LIT = math.radians(70.0)
 
 @styled()
 def animate(result: Result, path: Path) -> None:
-    """One working cycle; arrows are the shaking force at the crank, and the force on each mount; dots are firings."""
+    """Write one working cycle as GIF: arrows are the shaking force and the mount forces, dots are firings."""
     from PIL import Image
 
     scene = Scene.of(result)
@@ -47,12 +47,12 @@ def animate(result: Result, path: Path) -> None:
         _firings(drawn, scene, phi)
         for one, forces in zip(series, loads, strict=False):
             _arrows(drawn.panels[0], scene, forces[step], largest, one.colour)
-        told = f"{math.degrees(phi):.1f}° of crank angle"
+        angle = f"{math.degrees(phi):.1f}° of crank angle"
         scale = f"; longest arrow {number(factor * largest, 3)} {unit}" if largest else ""
         where = f", at {point_name(result, k)}" if loads else ""
         fires = entry_of_dots("fires", color=VERMILION, markersize=7.0)
         legend = [*legend_of(scene), fires, *(one.entry(": forces") for one in series[: len(loads)])]
-        headed(drawn, result, f"The engine turning{where}", f"{told}{scale}.", legend)
+        headed(drawn, result, f"The engine turning{where}", f"{angle}{scale}.", legend)
         drawn.figure.set_dpi(DPI)
         drawn.figure.canvas.draw()
         pixels = np.asarray(drawn.figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
@@ -60,28 +60,26 @@ def animate(result: Result, path: Path) -> None:
     # one set of colours for all, or they would flicker
     some = np.concatenate([np.asarray(frame) for frame in frames[:: max(FRAMES // 4, 1)]])
     colours = Image.fromarray(some).quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
-    shown = [frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in frames]
-    shown[0].save(path, save_all=True, append_images=shown[1:], duration=int(1e3 * SECONDS / FRAMES), loop=0)
+    reduced = [frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in frames]
+    reduced[0].save(path, save_all=True, append_images=reduced[1:], duration=int(1e3 * SECONDS / FRAMES), loop=0)
 
 
 def _firings(drawn: Page, scene: Scene, phi: float) -> None:
-    """A dot over every piston that fired a little while ago."""
     bore, cycle = bore_of(scene.engine), scene.engine.cycle.angle
     for part in scene.engine.cylinders:
         pose = Pose.of(part, phi)
         if (phi - part.firing_angle + 1e-9) % cycle > LIT or pose.bodies:
             continue
         place = pose.piston + 0.4 * bore * cmath.exp(1j * part.bank)
-        beside = (MM * part.x, MM * (place.imag if scene.is_flat else place.real))
-        for axes, (x, y) in zip(drawn.panels, (at(place), beside), strict=True):
+        side = (MM * part.x, MM * (place.imag if scene.is_flat else place.real))
+        for axes, (x, y) in zip(drawn.panels, (at(place), side), strict=True):
             axes.plot(x, y, "o", color=VERMILION, markersize=7.0, zorder=9.5)
 
 
 def _loads(one: Series, k: int) -> Array:
-    """Shaking force, then the force on every mount, at every frame, shape (frames, 1 + mounts, 3) [N]."""
-    found = {field.name: field.values[0, k] for field in forces_of({one.name: one.design}, FRAMES).fields}
-    shaking = found["shaking_force"][:, None]
-    return np.concatenate([shaking, found["mount_force"]], axis=1) if "mount_force" in found else shaking
+    fields = {field.name: field.values[0, k] for field in forces_of({one.name: one.design}, FRAMES).fields}
+    shaking = fields["shaking_force"][:, None]
+    return np.concatenate([shaking, fields["mount_force"]], axis=1) if "mount_force" in fields else shaking
 
 
 def _arrows(axes: Axes, scene: Scene, forces: Array, largest: float, colour: str) -> None:

@@ -27,13 +27,12 @@ MOST_ENTRIES, FEW_ENTRIES = 8, 5
 
 
 def draw(picture: Picture) -> Figure:
-    """The figure of a description."""
+    """Return the figure of a picture."""
     prepare(_texts(picture))
     return _drawn(picture)
 
 
 def _texts(picture: Picture) -> Iterator[str]:
-    """All words of a picture."""
     yield from (picture.title, picture.words, picture.credit)
     for panel in picture.panels:
         yield panel.title
@@ -57,7 +56,7 @@ def _drawn(picture: Picture) -> Figure:
 
 
 def save_picture(picture: Picture, place: Path, kinds: Sequence[str] = ("png",)) -> str:
-    """Write the picture as files of these kinds at a place that has no ending; returns it as SVG."""
+    """Write a picture as files of these kinds, `place` has no ending; return it as SVG."""
     drawn = draw(picture)
     for kind in kinds:
         save(drawn, place.with_name(f"{place.name}.{kind}"))
@@ -65,7 +64,7 @@ def save_picture(picture: Picture, place: Path, kinds: Sequence[str] = ("png",))
 
 
 def hue(colour: Colour) -> str:
-    """A colour as matplotlib takes it."""
+    """Return a colour as matplotlib takes it."""
     if isinstance(colour, float):
         return to_hex(colormaps["viridis"](colour))
     return str(getattr(style, colour.upper()))
@@ -92,7 +91,6 @@ def _words(axes: Axes, mark: Words) -> Text:
 
 
 def _mark(axes: Axes, mark: Mark) -> None:
-    """All marks but words, which are kept clear of each other."""
     if isinstance(mark, Bars):
         draws = axes.bar if mark.upright else axes.barh
         fill: dict[str, Any] = (
@@ -109,28 +107,28 @@ def _mark(axes: Axes, mark: Mark) -> None:
 
 def _look(line: Line) -> dict[str, Any]:
     dash = (0, tuple(line.dash)) if line.dash else "-"
-    found: dict[str, Any] = {"color": hue(line.colour), "marker": line.marker, "markersize": line.size}
-    found |= {"linestyle": dash if line.width else "", "linewidth": line.width, "zorder": 1 if line.behind else 2}
+    look: dict[str, Any] = {"color": hue(line.colour), "marker": line.marker, "markersize": line.size}
+    look |= {"linestyle": dash if line.width else "", "linewidth": line.width, "zorder": 1 if line.behind else 2}
     if line.hollow:
-        found["fillstyle"] = "none"
+        look["fillstyle"] = "none"
     if line.marker == "|":
-        found["markeredgewidth"] = 2.5
-    return found
+        look["markeredgewidth"] = 2.5
+    return look
 
 
 def _axis(axes: Axes, name: Literal["x", "y"], axis: Axis) -> None:
-    own = axes.xaxis if name == "x" else axes.yaxis
+    ticks_axis = axes.xaxis if name == "x" else axes.yaxis
     axes.set(**{f"{name}label": axis.label})
     if axis.log:
         axes.set(**{f"{name}scale": "log"})
-        own.set_major_locator(LogLocator(10.0, tuple(axis.log), numticks=12))
-        own.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        own.set_minor_locator(LogLocator(10.0, (), numticks=12))
+        ticks_axis.set_major_locator(LogLocator(10.0, tuple(axis.log), numticks=12))
+        ticks_axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        ticks_axis.set_minor_locator(LogLocator(10.0, (), numticks=12))
     if axis.ends is not None:
         axes.set(**{f"{name}lim": axis.ends})
     if axis.ticks is not None:
-        own.set_ticks([place for place, _ in axis.ticks], [text for _, text in axis.ticks])
-        own.set_minor_locator(NullLocator())
+        ticks_axis.set_ticks([place for place, _ in axis.ticks], [text for _, text in axis.ticks])
+        ticks_axis.set_minor_locator(NullLocator())
     if not axis.grid:
         axes.grid(axis=name, visible=False)
         if name == "y":
@@ -138,7 +136,6 @@ def _axis(axes: Axes, name: Literal["x", "y"], axis: Axis) -> None:
 
 
 def _named(picture: Picture) -> Sequence[Mark]:
-    """Marks of the legend: those given for it, else one for each label; a few of very many."""
     labelled = {getattr(m, "label", ""): m for p in picture.panels for m in p.marks}
     marks = list(picture.legend) or [mark for label, mark in labelled.items() if label]
     if len(marks) <= MOST_ENTRIES:

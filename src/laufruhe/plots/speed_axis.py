@@ -24,17 +24,17 @@ STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 
 
 def order_entries(facts: MountingFacts, colour: str) -> list[Artist]:
-    """Of a legend."""
+    """Return legend entries of the orders."""
     return [entry(f"order {o:g}", color=colour, linestyle=STYLES[k]) for k, o in enumerate(facts.orders)]
 
 
 def limits_on(result: Result, channel: Channel) -> list[Limit]:
-    """Limits of the problem on one channel."""
+    """Return the limits on one channel."""
     return [limit for limit in result.problem.limits if limit.measure.channel is channel]
 
 
 def mark_points(axes: Axes, result: Result, lift: float = 0.06) -> None:
-    """Operating points as thin lines, when the ends of the axis are known; above the panel their names, of many two.
+    """Mark operating points by thin lines, with names above the panel; set the ends of the axis before.
 
     Parameters
     ----------

@@ -65,7 +65,7 @@ _SETTINGS: Any = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Fonts and colours of all that is drawn meanwhile; a decorator of what makes a figure."""
+    """Apply fonts and colours within the block or the decorated function."""
     with mpl.rc_context({**_SETTINGS, "font.family": families()}), warnings.catch_warnings():
         # letters that no font has are told once; the tables have them right
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
@@ -89,7 +89,7 @@ def page(
     lead: float = 0.0,
     across: float | None = None,
 ) -> Page:
-    """Panels of one size [inch]; margins come with the heading.
+    """Return panels of one size [inch]; `heading` adds the margins.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def page(
 
 
 def heading(figure: Figure, title: str, lines: str, legend: Sequence[Artist], source: str, engine: str = "") -> None:
-    """Title, the engine, what is seen, the legend, and where the data come from; the page grows around it all."""
+    """Add title, engine, description, legend and source; the page grows around them."""
     with styled():
         for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
             axis.set_label_text(typeset(axis.get_label_text()))
@@ -147,7 +147,6 @@ def heading(figure: Figure, title: str, lines: str, legend: Sequence[Artist], so
 
 
 def _moved(figure: Figure, size: tuple[float, float], by: tuple[float, float]) -> None:
-    """A page of another size, its panels as large as before and moved by so much [inch]."""
     before = figure.get_size_inches()
     places = [axes.get_position(original=True) for axes in figure.axes]
     figure.set_size_inches(size)
@@ -157,7 +156,7 @@ def _moved(figure: Figure, size: tuple[float, float], by: tuple[float, float]) -
 
 
 def headed(drawn: Page, result: Result, title: str, lines: str, legend: Sequence[Artist], note: str = "") -> Figure:
-    """The page of a result, finished; the note says what it leaves out."""
+    """Finish the page of a result; the note says what it leaves out."""
     problem = result.problem
     described = f"Source: {problem.source}. " if problem.source else ""
     source = f"{note}{described}Computed with Laufruhe, {problem.fidelity.summary}."
@@ -176,7 +175,6 @@ def _legend(figure: Figure, entries: Sequence[Artist], room: float, columns: int
 
 
 def _legend_shape(labels: Sequence[str], room: float) -> tuple[int, int]:
-    """Rows and columns of a legend: as many entries side by side as there is room for."""
     size = SMALL / 72.0
     for columns in range(len(labels), 0, -1):
         split = [list(part) for part in np.array_split(list(labels), columns)]
@@ -187,26 +185,26 @@ def _legend_shape(labels: Sequence[str], room: float) -> tuple[int, int]:
 
 
 def point_name(result: Result, k: int) -> str:
-    """An operating point, and why it is the one shown."""
+    """Return the name of an operating point, and the reason for its choice."""
     points = result.problem.points
     return points[k].name if len(points) == 1 else f"{points[k].name} (largest loads of {len(points)} points)"
 
 
 @dataclass(frozen=True)
 class Series:
-    """One design of a result as pictures show it."""
+    """One design of a result with its colour and name."""
 
     design: Evaluation
     colour: str
     name: str
 
     def entry(self, text: str = "", **look: Any) -> Artist:
-        """Of a legend."""
+        """Return a legend entry."""
         return entry(f"{self.name}{text}", color=self.colour, **({"linewidth": 2.0} | look))
 
 
 def series_of(result: Result, loads: bool = False) -> list[Series]:
-    """As given and as decided; one where nothing was decided, or where it is loads that only one design has."""
+    """Return the given and the decided design; only one if nothing was decided, or if one lacks loads."""
     if not changed(result):
         return [Series(result.final, AFTER, "as given")]
     both = [Series(result.initial, BEFORE, "as given"), Series(result.final, AFTER, "as decided")]
@@ -214,17 +212,17 @@ def series_of(result: Result, loads: bool = False) -> list[Series]:
 
 
 def entry(label: str, **look: Any) -> Line2D:
-    """A line or a dot of a legend."""
+    """Return a legend entry of a line or a dot."""
     return Line2D([], [], label=label, **look)
 
 
 def entry_of_dots(label: str, **look: Any) -> Line2D:
-    """Dots without a line."""
+    """Return a legend entry of dots without a line."""
     return entry(label, **({"marker": "o", "linestyle": "none"} | look))
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a PNG or an SVG, as the ending says."""
+    """Write a PNG or an SVG, by the ending."""
     if path.suffix == ".svg":
         path.write_text(as_svg(figure), encoding="utf-8", newline="\n")
     else:
@@ -232,7 +230,7 @@ def save(figure: Figure, path: Path) -> None:
 
 
 def as_png(figure: Figure) -> bytes:
-    """The picture as PNG."""
+    """Return the picture as PNG."""
     canvas: Any = FigureCanvasAgg(figure)
     with styled():
         canvas.draw()
@@ -244,7 +242,7 @@ def as_png(figure: Figure) -> bytes:
 
 
 def as_svg(figure: Figure) -> str:
-    """The picture as SVG, letters as outlines, the same every time."""
+    """Return the picture as SVG, letters as outlines, identical on every run."""
     drawn = io.StringIO()
     with styled():
         figure.savefig(drawn, format="svg", metadata={"Date": None, "Creator": None})
@@ -252,5 +250,5 @@ def as_svg(figure: Figure) -> str:
 
 
 def thin(values: Iterable[float]) -> float:
-    """Largest value, or one where all are zero: the end of an axis."""
+    """Return the largest value, or one if all are zero: the end of an axis."""
     return max(values, default=0.0) or 1.0

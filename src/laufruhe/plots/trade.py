@@ -29,26 +29,25 @@ _PLAIN = FuncFormatter(lambda value, _: _power(value))
 
 
 def _power(value: float) -> str:
-    """A number of an axis; small ones as powers of ten."""
     exponent = round(math.log10(value)) if value > 0.0 else 0
     return typeset(f"10^{exponent}") if exponent < -3 and math.isclose(value, 10.0**exponent) else f"{value:g}"
 
 
-def has_picture(found: Trade) -> bool:
-    """Whether the fidelities differ in anything but time."""
-    return any(row.error > 0.0 for row in found.rows)
+def has_picture(trade: Trade) -> bool:
+    """Return True if the fidelities differ in more than time."""
+    return any(row.error > 0.0 for row in trade.rows)
 
 
-def figure(found: Trade) -> Figure:
-    """One panel: evaluation time of another design against error, the front joined."""
-    prepare([found.problem.title])
-    return _drawn(found)
+def figure(trade: Trade) -> Figure:
+    """Draw evaluation time against error, the Pareto front joined."""
+    prepare([trade.problem.title])
+    return _drawn(trade)
 
 
 @styled()
-def _drawn(found: Trade) -> Figure:
+def _drawn(trade: Trade) -> Figure:
     drawn = page(1, 1, PANEL)
-    axes, rows = drawn.panels[0], found.rows
+    axes, rows = drawn.panels[0], trade.rows
     times = np.array([1e6 * row.evaluation for row in rows])
     axes.set(xscale="log", yscale="log", xlabel="time of another design [µs]", ylabel="relative error of the objective")
     axes.set_xlim(0.75 * times.min(), 1.4 * times.max())
@@ -78,13 +77,13 @@ def _drawn(found: Trade) -> Figure:
     heading(
         drawn.figure, "Speed against accuracy", "Every fidelity: time of one evaluation against its error.", [],
         f"Joined: beaten by none in both. Regrets under {_power(LEAST_REGRET)} are drawn as that.{hollow} "
-        "Computed with Laufruhe.", found.problem.title,
+        "Computed with Laufruhe.", trade.problem.title,
     )  # fmt: skip
     return drawn.figure
 
 
 def _places(axes: Axes, errors: Array, times: Array) -> Array:
-    """Errors as they are drawn: those too small to tell stand beside each other in a band under the axis."""
+    """Return the drawn errors; very small ones stand in a band under the axis."""
     small = errors < LEAST_ERROR
     wide, high = PANEL
     low, end = np.log10(axes.get_xlim())
@@ -116,7 +115,6 @@ def _colour_bar(drawn: Page, dots: PathCollection) -> None:
 
 
 def _front(rows: tuple[Row, ...]) -> list[Row]:
-    """Rows that no other beats in time and error, in the order of time."""
     front: list[Row] = []
     for row in sorted(rows, key=lambda r: (r.evaluation, r.error)):
         if not front or row.error < front[-1].error:
@@ -125,7 +123,6 @@ def _front(rows: tuple[Row, ...]) -> list[Row]:
 
 
 def _name(axes: Axes, rows: tuple[Row, ...], times: Array, errors: Array) -> None:
-    """Names in a column beside the panel, each joined to its dot."""
     (left, right), (low, high) = (np.log10(side) for side in (axes.get_xlim(), axes.get_ylim()))
     # of dots at one height the nearest to the names is named lowest: no line crosses another dot's name
     heights = (np.log10(errors) - low) / (high - low) - 1e-6 * np.argsort(np.argsort(times))

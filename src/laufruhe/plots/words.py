@@ -37,7 +37,7 @@ LARGE = 1e4
 
 
 def width_of(text: str, size: float = SMALL, weight: str = "normal") -> float:
-    """Of one line of text [inch]."""
+    """Return the width of one line of text [inch]."""
     return _width_in(tuple(families()) if not text.isascii() else (FONT,), text, size, weight)
 
 
@@ -48,16 +48,16 @@ def _width_in(fonts: tuple[str, ...], text: str, size: float, weight: str) -> fl
 
 
 def fitted(text: str, inches: float, size: float = SMALL) -> str:
-    """Text cut to one line of this width."""
+    """Return text cut to one line of this width [inch]."""
     text = " ".join(text.split())
     if width_of(text, size) <= inches:
         return text
-    kept = next((k for k in range(len(text) - 1, 0, -1) if width_of(f"{text[:k]}…", size) <= inches), 0)
-    return f"{text[:kept].rstrip()}…"
+    length = next((k for k in range(len(text) - 1, 0, -1) if width_of(f"{text[:k]}…", size) <= inches), 0)
+    return f"{text[:length].rstrip()}…"
 
 
 def wrapped(text: str, inches: float, size: float = SMALL, weight: str = "normal") -> list[str]:
-    """Text broken into lines of this width; a word that is wider alone is cut."""
+    """Break text into lines of this width [inch]; a wider word is cut."""
     lines: list[str] = []
     # widths of words add up; most stand in several pictures
     space, wide = width_of("n n", size, weight) - width_of("nn", size, weight), 0.0
@@ -72,18 +72,18 @@ def wrapped(text: str, inches: float, size: float = SMALL, weight: str = "normal
 
 
 def contrast(one: str, other: str) -> float:
-    """Between two colours, 1 to 21, as WCAG 2 counts it."""
+    """Return the contrast of two colours, 1 to 21 (WCAG 2)."""
     low, high = sorted(_luminance(colour) for colour in (one, other))
     return (high + 0.05) / (low + 0.05)
 
 
 def ink_on(colour: str) -> str:
-    """Black or white, whichever is read better on a colour."""
+    """Return black or white, whichever is read better on a colour."""
     return max(("#000000", "#ffffff"), key=lambda ink: contrast(ink, colour))
 
 
 def legible(colour: str) -> str:
-    """A colour for letters on white: as dark as they need, its hue kept."""
+    """Return a colour darkened until it is legible on white."""
     share = next(k for k in range(21) if contrast(_darker(colour, k), "#ffffff") >= READ)
     return _darker(colour, share)
 
@@ -99,19 +99,18 @@ def _luminance(colour: str) -> float:
 
 
 def spread(places: Array, least: float, low: float = 0.0, high: float = 1.0) -> Array:
-    """Places between two ends at least so far apart, their order kept, moved by the least squares."""
+    """Move places by least squares to a minimum distance within two ends, keeping their order."""
     if len(places) == 0:
         return places
     order = np.argsort(places, kind="stable")
     steps = least * np.arange(len(places))
     moved = np.clip(_rising(places[order] - steps), low, max(high - steps[-1], low))
-    found = np.empty(len(places))
-    found[order] = moved + steps
-    return found
+    result = np.empty(len(places))
+    result[order] = moved + steps
+    return result
 
 
 def _rising(values: Array) -> Array:
-    """The nearest values that nowhere fall, by least squares: neighbours that fall share their mean."""
     shared: list[tuple[float, int]] = []
     for value in values:
         mean, count = float(value), 1
@@ -123,7 +122,7 @@ def _rising(values: Array) -> Array:
 
 
 def beside(axes: Axes, heights: Sequence[float], texts: Sequence[str]) -> None:
-    """Names of horizontal lines, right of the panel: none covers another, and each is joined to its line."""
+    """Write names of horizontal lines to the right of the panel, without overlaps."""
     low, high = axes.get_ylim()
     least = 1.3 * SMALL / _POINTS / (axes.bbox.height / axes.figure.dpi)
     places = spread((np.asarray(heights, dtype=float) - low) / (high - low), least)
@@ -137,31 +136,31 @@ def beside(axes: Axes, heights: Sequence[float], texts: Sequence[str]) -> None:
 
 
 def in_thousands(largest: float, unit: str) -> tuple[float, str]:
-    """What numbers up to this size are multiplied by, and the unit that they then have: kN from 10 000 N on."""
+    """Return factor and unit of numbers up to this size: kN from 10 000 N on."""
     return (1e-3, f"k{unit}") if abs(largest) >= LARGE else (1.0, unit)
 
 
 def label_of(name: str, unit: str, inches: float) -> str:
-    """Of the axis of an objective, which is called so where its name is longer than the axis."""
+    """Return the axis label of an objective; a name longer than the axis becomes "objective"."""
     behind = f" [{unit}]" if unit else ""
     return f"{name if width_of(f'{name}{behind}') <= inches else 'objective'}{behind}"
 
 
 def empty(axes: Axes, words: str) -> None:
-    """A panel with nothing in it says why."""
+    """Write the reason into an empty panel."""
     axes.set_yticks([])
     axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center", color=FAINT, size=SMALL)
 
 
 def left_out(largest: float, most: float, unit: str) -> str:
-    """What is said of a load too small to be drawn beside the largest one; empty where it is drawn."""
+    """Return what is said of a load too small to draw; empty if it is drawn."""
     if largest > UNSEEN * most:
         return ""
-    return "none: balanced" if largest <= NOTHING * most else f"at most {number(largest, 2)} {unit}"
+    return "zero" if largest <= NOTHING * most else f"at most {number(largest, 2)} {unit}"
 
 
 def apart(texts: Sequence[Text]) -> None:
-    """Words that would cover each other moved up and down, as little as may be."""
+    """Move overlapping words up and down, as little as possible."""
     left = [(text, text.get_window_extent()) for text in texts]
     while left:
         group = [left.pop(0)]
@@ -179,9 +178,9 @@ def apart(texts: Sequence[Text]) -> None:
 
 
 def typeset(words: str) -> str:
-    """Units as they are printed: m² for m^2, ° for degrees, µs for us."""
-    words = re.sub(r"\^(-?\d+)", lambda found: found[1].translate(_RAISED), words)
-    return re.sub(r"\[(.*?)\]", lambda found: f"[{_UNITS.get(found[1], found[1])}]", words)
+    """Return units as printed: m² for m^2, ° for degrees, µs for us."""
+    words = re.sub(r"\^(-?\d+)", lambda match: match[1].translate(_RAISED), words)
+    return re.sub(r"\[(.*?)\]", lambda match: f"[{_UNITS.get(match[1], match[1])}]", words)
 
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -189,7 +188,7 @@ _UNITS = {"deg": "°", "us": "µs", "um": "µm", "degC": "°C"}
 
 
 def aligned(panels: Sequence[Axes]) -> None:
-    """Labels of the upright axes of one column above each other, clear of the longest number."""
+    """Align the labels of the vertical axes of one column, clear of the longest number."""
     longest = 0.0
     for axes in panels:
         low, high = sorted(axes.get_ylim())
@@ -201,27 +200,27 @@ def aligned(panels: Sequence[Axes]) -> None:
 
 
 class PlainNumbers(ScalarFormatter):
-    """Numbers of an axis in full, thousands apart from 10 000 on, as SI writes them."""
+    """Numbers of an axis in full, with thin spaces between thousands from 10 000 on (SI)."""
 
     def __init__(self) -> None:
         super().__init__(useOffset=False, useMathText=False)
         self.set_scientific(False)
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        """The text of a tick."""
+        """Return the text of a tick."""
         return grouped(str(super().__call__(x, pos)))
 
 
 def grouped(number: str) -> str:
-    """A number with its thousands apart where it has five digits or more before the point."""
-    whole, point, rest = number.partition(".")
-    digits = whole.lstrip("-−")
+    """Return a number with thin spaces between thousands, from five digits on."""
+    integer, point, rest = number.partition(".")
+    digits = integer.lstrip("-−")
     if not digits.isdecimal() or len(digits) < 5:
         return number
-    return whole[: len(whole) - len(digits)] + f"{int(digits):,}".replace(",", THIN_SPACE) + point + rest
+    return integer[: len(integer) - len(digits)] + f"{int(digits):,}".replace(",", THIN_SPACE) + point + rest
 
 
 def round_ticks(axis: Axis, most: int, **more: Any) -> None:
-    """Ticks at steps of 1, 2 or 5, their numbers in full."""
+    """Set ticks at steps of 1, 2 or 5, their numbers in full."""
     axis.set_major_locator(MaxNLocator(most, steps=_ROUND, **more))
     axis.set_major_formatter(PlainNumbers())

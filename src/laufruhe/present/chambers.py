@@ -15,7 +15,7 @@ from laufruhe.solvers.result import Result
 
 
 def points_with_chambers(result: Result) -> list[tuple[OperatingPoint, Chambers]]:
-    """Operating points whose chambers on both sides of pistons are told."""
+    """Return operating points with chambers on both sides of pistons."""
     if not has_loads(result):
         return []
     return [(point, point.gas) for point in result.problem.points if isinstance(point.gas, Chambers)]
@@ -23,7 +23,7 @@ def points_with_chambers(result: Result) -> list[tuple[OperatingPoint, Chambers]
 
 @dataclass(frozen=True)
 class Indicator:
-    """What an indicator draws of one cylinder.
+    """Indicator diagram of one cylinder.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Indicator:
 
 
 def indicator_of(gas: Chambers, part: SliderCrank, point: OperatingPoint, angles: Array) -> Indicator:
-    """Diagrams of a cylinder, at crank angles from its dead centre [rad] (G14)."""
+    """Return the diagram of a cylinder at crank angles from its dead centre [rad] (G14)."""
     mass, (_, _, acceleration) = part.motion(np, part.fires_at + part.shaft.ratio * angles).points[0]
     return Indicator(
         swept_volume(part, angles),

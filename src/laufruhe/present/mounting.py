@@ -23,7 +23,7 @@ MOST_ORDERS = 3
 
 @dataclass(frozen=True, eq=False)
 class MountingFacts:
-    """Modes of one design and what its scene does to them [SI].
+    """Modes of one design and their excitation [SI].
 
     Attributes
     ----------
@@ -59,12 +59,12 @@ class MountingFacts:
 
 
 def is_elastic(result: Result) -> bool:
-    """Whether the design has a block on elastic mounts."""
+    """Return True for a block on elastic mounts."""
     return result.final.engine.block is not None and has_mounts(result)
 
 
 def facts_of(evaluation: Evaluation) -> MountingFacts:
-    """Of a design on elastic mounts."""
+    """Return the facts of a design on elastic mounts."""
     mounting = mounting_in(evaluation.engine)
     excited = sorted({j for loads in evaluation.loads for j in mounting.excited(loads.wrench)})
     weight = static_motion(mounting.modes, weight_wrench(mounting.block))
@@ -86,32 +86,32 @@ def facts_of(evaluation: Evaluation) -> MountingFacts:
 
 
 def at_which_stiffness(facts: MountingFacts) -> str:
-    """A sentence for pictures of modes, where stiffness depends on frequency."""
+    """Return a sentence about the stiffness of the modes; empty if it is constant."""
     return " Modes are of the stiffness at rest, which changes with frequency." if facts.depends_on_frequency else ""
 
 
 def main_orders(evaluation: Evaluation, mounting: ElasticMounting) -> tuple[float, ...]:
-    """Orders above zero whose drive of the modes is at least a tenth of the strongest."""
-    found: dict[float, float] = {}
+    """Return orders above zero whose excitation is at least a tenth of the strongest."""
+    sizes: dict[float, float] = {}
     for loads in evaluation.loads:
         drive = np.linalg.norm(mounting.drives(loads.wrench.coefficients), axis=1)
         for order, size in zip(loads.wrench.orders[1:].tolist(), drive[1:].tolist(), strict=True):
-            found[order] = max(found.get(order, 0.0), size)
-    top = max(found.values(), default=0.0)
-    strong = sorted((order for order, size in found.items() if size > MAIN_SHARE * top > 0.0), key=lambda o: -found[o])
+            sizes[order] = max(sizes.get(order, 0.0), size)
+    top = max(sizes.values(), default=0.0)
+    strong = sorted((order for order, size in sizes.items() if size > MAIN_SHARE * top > 0.0), key=lambda o: -sizes[o])
     return tuple(strong[:MOST_ORDERS])
 
 
 def critical_speed(frequency: float, order: float) -> float:
-    """Crank speed at which an order meets a natural frequency [rad/s]."""
+    """Return the crank speed at which an order meets a natural frequency [rad/s]."""
     return math.tau * frequency / order
 
 
 def driven(facts: MountingFacts) -> list[float]:
-    """Natural frequencies that the engine excites; the highest where it excites none [Hz]."""
+    """Return the excited natural frequencies; the highest one if there is none [Hz]."""
     return [float(facts.modes.frequencies[j]) for j in facts.excited] or [float(facts.modes.frequencies[-1])]
 
 
 def main_order(facts: MountingFacts) -> float:
-    """The order that loads the mounts most."""
+    """Return the order that excites the mounts most."""
     return facts.orders[0] if facts.orders else 1.0

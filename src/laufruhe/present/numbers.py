@@ -14,7 +14,7 @@ NOTHING = 1e-9
 
 
 def number(value: float, digits: int = 4, scale: float = 0.0) -> str:
-    """To `digits` figures, without an exponent where it can be read without.
+    """Return a number with `digits` figures, without an exponent where possible.
 
     Parameters
     ----------
@@ -34,26 +34,26 @@ def number(value: float, digits: int = 4, scale: float = 0.0) -> str:
 
 
 def aligned(value: float, largest: float, digits: int = 5) -> str:
-    """As many decimals as the largest number of its column needs for `digits` figures."""
+    """Return a number with as many decimals as the largest of its column needs for `digits` figures."""
     if value == 0.0 or largest <= 0.0 or not math.isfinite(largest) or not -4 <= math.log10(largest) < digits:
         return number(value, scale=largest)
     return f"{value:.{digits - 1 - math.floor(math.log10(largest))}f}"
 
 
 def trimmed(value: float, digits: int = 4) -> str:
-    """As `number`, without zeros that say nothing: bounds and limits as they were typed."""
+    """Return a number as `number` does, without trailing zeros."""
     text = number(value, digits)
     return text.rstrip("0").rstrip(".") if "." in text and "e" not in text else text
 
 
 def with_unit(value: float, unit: str) -> str:
-    """A value in readable units: 90 deg, 2500 rpm, 1.25 kg."""
+    """Return a value in readable units: 90 deg, 2500 rpm, 1.25 kg."""
     name, factor = readable(unit)
     return f"{trimmed(value * factor)} {name}".rstrip()
 
 
 def figure(value: float, unit: str, digits: int = 4, scale: float = 0.0) -> str:
-    """As `number`, in readable units and with the unit's name."""
+    """Return a number as `number` does, in readable units with the unit's name."""
     name, factor = readable(unit)
     return f"{number(value * factor, digits, scale * factor)} {name}".rstrip()
 
@@ -62,7 +62,7 @@ _WORKSHOP = {"kg": ("g", 1e3), "kg m": ("g mm", 1e6)}
 
 
 def in_grams(value: float, unit: str, scale: float) -> str:
-    """A mass in g or an unbalance in g mm, as a workshop has them, behind an equals sign; empty for all else."""
+    """Return " = " and a mass in g or an unbalance in g mm; empty for other units."""
     if unit not in _WORKSHOP or abs(value) <= NOTHING * scale:
         return ""
     name, factor = _WORKSHOP[unit]
@@ -70,12 +70,12 @@ def in_grams(value: float, unit: str, scale: float) -> str:
 
 
 def percent(share: float) -> str:
-    """A change as a reader expects it: with its sign."""
+    """Return a relative change in percent, with sign."""
     return f"{100.0 * share:+.1f} %" if math.isfinite(share) else DASH
 
 
 def price_of(price: float, unit: str, of: str, counts: bool = False) -> str:
-    """A shadow price in readable units: N per kg; N alone for a plain number. One of zero where it `counts`."""
+    """Return a shadow price in readable units, such as N per kg; a dash for zero unless `counts`."""
     if math.isnan(price):
         return "not known"
     if not price and not counts:
@@ -90,19 +90,19 @@ class Priced(Protocol):
 
     @property
     def unit(self) -> str:
-        """Unit of the number that is priced."""
+        """Unit of the priced number."""
 
     @property
     def shadow_price(self) -> float:
-        """Price as the edge is relaxed."""
+        """Price of relaxing the edge."""
 
     @property
     def tightening_price(self) -> float | None:
-        """Price as the edge is tightened, where that is another."""
+        """Price of tightening the edge, if it differs."""
 
 
 def prices_of(priced: Priced, unit: str, counts: bool = False) -> str:
-    """The shadow price of a limit or bound, and behind a slash what it costs to tighten it, where that is another."""
+    """Return the shadow price of a limit or bound, and the price of tightening it if that differs."""
     other = priced.tightening_price
     if other is None or math.isnan(other):
         return price_of(priced.shadow_price, unit, priced.unit, counts)

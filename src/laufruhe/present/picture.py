@@ -18,13 +18,13 @@ DASHES = ((6.0, 2.0), (2.0, 2.0), (1.0, 3.0))
 
 
 def colour(k: int, count: int) -> Colour:
-    """Of the k-th line: told apart by hue, or ordered from dark to light where there are too many."""
+    """Return the colour of the k-th line: a hue, or a shade from dark to light for many lines."""
     return SERIES[k] if count <= len(SERIES) else k / (count - 1)
 
 
 @dataclass(frozen=True)
 class Line:
-    """Dots, joined unless `width` is zero. One with a label stands in the legend, drawn or not.
+    """Dots, joined unless `width` is zero; a label puts the line into the legend.
 
     Width, size of dots and dashes (lengths drawn and left out) are in points; markers are matplotlib's.
     """
@@ -43,7 +43,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Bars:
-    """Bars at places along the first axis, or lying where `upright` is false, with their numbers on top."""
+    """Bars along the first axis, or lying if `upright` is false, with their numbers on top."""
 
     places: Any = ()
     values: Any = ()
@@ -57,7 +57,7 @@ class Bars:
 
 @dataclass(frozen=True)
 class Area:
-    """What lies between two lines."""
+    """Area between two lines."""
 
     x: Any = ()
     low: Any = ()
@@ -68,7 +68,7 @@ class Area:
 
 @dataclass(frozen=True)
 class Words:
-    """Text at a place; `across` and `along` say which end or side of it stands there, `inside` the colour it is on."""
+    """Text at a place; `across` and `along` align it, `inside` is the colour behind it."""
 
     x: float
     y: float
@@ -85,7 +85,7 @@ Mark: TypeAlias = Line | Bars | Area | Words
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis, of numbers or of texts at their places (`ticks`).
+    """One axis of numbers, or of texts at their places (`ticks`).
 
     The end may be the smaller value; without ends the marks decide. A logarithmic axis is told the first figures
     of its ticks.
@@ -110,7 +110,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Picture:
-    """Panels side by side or one under the other, a title and what is seen above, the credit below.
+    """Panels with a title, a description above and a credit below.
 
     Size of each panel and the gap between them are in inches.
     """
@@ -126,11 +126,11 @@ class Picture:
 
     @property
     def width(self) -> float:
-        """Of each panel [inch], where all that stand side by side share a page."""
+        """Width of each panel [inch]."""
         return min(self.size[0], (WIDEST - (self.columns - 1) * self.gap) / self.columns)
 
 
 def credit(data: Any, note: str = "") -> str:
-    """Source line of a study's dataset."""
+    """Return the source line of a study's dataset."""
     source = f"{data.attrs['source']}. " if data.attrs["source"] else ""
     return f"{source}{note}Computed with Laufruhe."

@@ -10,7 +10,7 @@ from laufruhe.extension import extended
 
 @dataclass(frozen=True)
 class ResultPicture:
-    """A picture of a result.
+    """Entry of a result's picture.
 
     Attributes
     ----------
@@ -28,7 +28,7 @@ class ResultPicture:
 
     @property
     def module(self) -> str:
-        """Return the address of the module that draws it."""
+        """Address of the module that draws it."""
         return self.home or f"laufruhe.plots.results.{self.name}"
 
 
@@ -41,14 +41,14 @@ _CAPTIONS = {
     "cycle": "Shaking force, moments, and the force on every mount over the crank angle of one cycle.",
     "bars": "Mean and maximum of each mount's force over one cycle.",
     "indicator": "Indicator diagrams of steam cylinders and pumps, and the force on each rod over its stroke.",
-    "willans": "Fuel over the load at the brake, or drag over speed, and the line that tells the friction.",
+    "willans": "Fuel over the load at the brake, or drag over speed, and the line that gives the friction.",
     "torque": "Torque of gas, pistons and rods, its work and its orders, and the speed that a flywheel makes of it.",
-    "bearings": "Force on each main bearing over a cycle, as block and crankshaft feel it, and where they wear.",
-    "spectrum": "What orders of crank speed the loads are made of.",
-    "transmissibility": "Force on the elastic mounts over that on the same mounts if they gave no way.",
+    "bearings": "Force on each main bearing over a cycle, on block and crankshaft, and where they wear.",
+    "spectrum": "Amplitudes of the loads by order of crank speed.",
+    "transmissibility": "Force on the elastic mounts over the force on rigid ones.",
     "campbell": "Orders of crank speed against natural frequencies: where they cross, speed is critical.",
     "modes": "Share of each motion in the kinetic energy of each natural mode.",
-    "trade": "What slightly uneven firing buys.",
+    "trade": "Objective over the allowed deviation from even firing.",
 }
 PICTURES: Mapping[str, ResultPicture] = extended(
     "pictures", ResultPicture, [ResultPicture(*each) for each in _CAPTIONS.items()]
@@ -56,7 +56,7 @@ PICTURES: Mapping[str, ResultPicture] = extended(
 
 
 def rows_of(count: int, most: int) -> tuple[list[range], int]:
-    """So many in rows of at most so many, all about as long; and how many one holds."""
+    """Split `count` items into rows of at most `most`, of similar length; return the rows and their length."""
     rows = max(-(-count // max(most, 1)), 1)
     side = max(-(-count // rows), 1)
     return [range(first, min(first + side, count)) for first in range(0, count, side)], side

@@ -19,7 +19,7 @@ LONG_ROD = 4.0
 
 @dataclass(frozen=True)
 class Pose:
-    """Where a slider-crank is, zeta = z + i y [m] (C4), the foot of its rod, and the bodies of one without a piston."""
+    """Positions of a slider-crank, zeta = z + i y [m] (C4), and outlines of its rotating bodies."""
 
     part: SliderCrank
     crank: complex
@@ -30,7 +30,7 @@ class Pose:
 
     @classmethod
     def of(cls, part: SliderCrank, phi: float) -> Pose:
-        """At a crank angle (C5)."""
+        """Return the pose at a crank angle [rad] (C5)."""
         centre, axis = complex(part.shaft.z, part.shaft.y), cmath.exp(1j * part.bank)
         turn = part.throw + part.shaft.ratio * phi
         rod = part.rod_length if math.isfinite(part.rod_length) else LONG_ROD * part.crank_radius
@@ -46,15 +46,15 @@ class Pose:
 
 
 def half_disc(unbalance: float) -> float:
-    """Radius of a half disc of steel with this unbalance [m]: its area centre lies 4 R / 3 pi off."""
+    """Return the radius of a steel half disc with this unbalance [m]: its centroid is 4 R / 3 pi off."""
     return math.cbrt(1.5 * unbalance / (STEEL * THICKNESS))
 
 
 def direction(rotor: Rotor, phi: float) -> float:
-    """Angle of its unbalance from z towards y [rad]."""
+    """Return the angle of a rotor's unbalance from z towards y [rad]."""
     return cmath.phase(rotor.unbalance) + rotor.shaft.ratio * phi
 
 
 def bore_of(engine: Engine) -> float:
-    """Of the largest cylinder; as wide as the stroke where it is not told [m]."""
+    """Return the largest bore; the stroke where no bore is given [m]."""
     return max(part.bore or part.stroke for part in engine.slider_cranks)

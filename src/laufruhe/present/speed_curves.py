@@ -21,14 +21,14 @@ SPEEDS = 400
 
 
 def fastest(result: Result) -> float:
-    """End of the axis: past the highest operating point and the isolation of the strongest order [rad/s]."""
+    """Return the end of the speed axis, beyond operating points and isolation [rad/s]."""
     facts = facts_of(result.final)
     highest = max(point.speed for point in result.problem.points)
     return REACH * max(highest, 2.0 * critical_speed(max(driven(facts)), main_order(facts)))
 
 
 def speeds_of(result: Result) -> Array:
-    """Where transmissibility is shown [rad/s]."""
+    """Return the speeds of transmissibility curves [rad/s]."""
     top = fastest(result)
     return np.linspace(top / SPEEDS, top, SPEEDS)
 
@@ -36,7 +36,7 @@ def speeds_of(result: Result) -> Array:
 def transmissibility_of(
     design: Evaluation, point: OperatingPoint, speeds: Array, orders: tuple[float, ...]
 ) -> Iterator[tuple[int, Array]]:
-    """Force on the mounts over that on mounts that give no way, of those orders that the loads have: which, and values.
+    """Yield index and values of the transmissibility of every order that the loads have.
 
     None of a design on a resonance that nothing damps.
     """

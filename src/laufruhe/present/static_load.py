@@ -9,14 +9,14 @@ from laufruhe.problem.static_load import static_part, with_alternating_loads
 
 
 def static_sentence(problem: Problem, evaluation: Evaluation) -> str:
-    """Return what of the objective is static, in a sentence; empty where that is negligible."""
+    """Return a sentence about the static part of the objective; empty if that is negligible."""
     part = static_part(problem, evaluation)
     if part is None:
         return ""
     unit = problem.objective_unit or ""
-    alone, rest, whole = (figure(value, unit) for value in (part.static, part.alternating, part.whole))
+    alone, rest, total = (figure(value, unit) for value in (part.static, part.alternating, part.whole))
     if with_alternating_loads(problem).objective == problem.objective:
-        return f"Left out is the steady reaction to the mean torque, {alone} alone; with it the objective is {whole}."
+        return f"Left out is the steady reaction to the mean torque, {alone} alone; with it the objective is {total}."
     lead = f"The steady reaction to the mean torque alone makes {alone}"
     if part.is_floor:
         return (

@@ -20,17 +20,17 @@ Parts: TypeAlias = dict[tuple[str, int], tuple[complex, complex]]
 
 
 def is_twin(result: Result) -> bool:
-    """Whether there are two cylinders, and something of these orders is left of their loads."""
+    """Return True for two cylinders with loads of first or second order."""
     engine = result.final.engine
     if len(engine.cylinders) != 2 or not has_loads(result):
         return False
     k = hardest_point(result)
-    given, left = (abs(np.array([*parts_of(result, each, k).values()])) for each in (result.initial.engine, engine))
-    return bool(left.max() > NEXT_TO_NOTHING * max(given.max(), left.max()))
+    initial, final = (abs(np.array([*parts_of(result, each, k).values()])) for each in (result.initial.engine, engine))
+    return bool(final.max() > NEXT_TO_NOTHING * max(initial.max(), final.max()))
 
 
 def parts_of(result: Result, engine: Engine, k: int) -> Parts:
-    """Forward and backward part of force and couple of every order at an operating point."""
+    """Return forward and backward part of force and couple by order, at an operating point."""
     wrench = shaking_loads(engine, result.problem.points[k], result.problem.fidelity)
     return {
         (kind, order): turning_parts(*wrench.at(order)[list(columns)])

@@ -14,53 +14,53 @@ from laufruhe.present.tables import Table, escaped
 
 @dataclass(frozen=True)
 class Heading:
-    """Of a section."""
+    """Heading of a section."""
 
     text: str
 
     def as_markdown(self) -> str:
-        """On a line of its own."""
+        """Return the heading as Markdown."""
         return f"## {escaped(self.text)}"
 
 
 @dataclass(frozen=True)
 class Paragraph:
-    """Sentences; `marked` where code and emphasis in them are marked as Markdown does."""
+    """Sentences; `marked` if code and emphasis in them are marked as in Markdown."""
 
     text: str
     marked: bool = False
 
     def as_markdown(self) -> str:
-        """As it is where it is marked."""
+        """Return the paragraph as Markdown."""
         return self.text if self.marked else escaped(self.text)
 
 
 @dataclass(frozen=True)
 class Bullets:
-    """A list, and the words that lead it; `marked` as of a paragraph."""
+    """A list with its introduction; `marked` as for a paragraph."""
 
     lead: str
     items: Sequence[str]
     marked: bool = False
 
     def as_markdown(self) -> str:
-        """A line each."""
-        shown = str if self.marked else escaped
-        return f"{self.lead}\n\n" + "\n".join(f"- {shown(text)}" for text in self.items)
+        """Return the list as Markdown."""
+        convert = str if self.marked else escaped
+        return f"{self.lead}\n\n" + "\n".join(f"- {convert(text)}" for text in self.items)
 
 
 @dataclass(frozen=True)
 class Illustration:
-    """A picture by its name without an ending, and what it shows."""
+    """A picture by its name without ending, and its caption."""
 
     name: str
     caption: str
     is_captioned: bool = True
 
     def as_markdown(self, ending: str) -> str:
-        """With its caption below; the ending is that of the file beside the page."""
-        shown = f"![{escaped(self.caption)}]({self.name}{ending})"
-        return f"{shown}\n\n*{self.caption}*" if self.is_captioned else shown
+        """Return the picture with its caption as Markdown; `ending` is that of the picture file."""
+        image = f"![{escaped(self.caption)}]({self.name}{ending})"
+        return f"{image}\n\n*{self.caption}*" if self.is_captioned else image
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class Code:
     text: str
 
     def as_markdown(self) -> str:
-        """For a shell."""
+        """Return a block for a shell."""
         return f"```sh\n{self.text}\n```"
 
 
@@ -79,18 +79,18 @@ Block: TypeAlias = Heading | Paragraph | Bullets | Illustration | Code | Table
 
 @dataclass(frozen=True)
 class Document:
-    """A whole report."""
+    """A report."""
 
     title: str
     blocks: tuple[Block, ...]
 
     def showing(self, pictures: Collection[str]) -> Document:
-        """Without the illustrations that there is no picture of."""
-        kept = (block for block in self.blocks if not isinstance(block, Illustration) or block.name in pictures)
-        return Document(self.title, tuple(kept))
+        """Return the document with only these illustrations."""
+        blocks = (block for block in self.blocks if not isinstance(block, Illustration) or block.name in pictures)
+        return Document(self.title, tuple(blocks))
 
     def as_markdown(self, ending: str) -> str:
-        """The text of `report.md`; the ending is that of the picture files beside it."""
+        """Return the text of `report.md`; `ending` is that of the picture files."""
         parts = (
             block.as_markdown(ending) if isinstance(block, Illustration) else block.as_markdown()
             for block in self.blocks

@@ -14,15 +14,15 @@ from laufruhe.report.strict_json import strict
 
 
 def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tuple[float, float]) -> str:
-    """What is kept, what not and why, and what that saves.
+    """Return the computed and neglected physics with reasons and cost, as text.
 
     Parameters
     ----------
     milliseconds
         Of one evaluation of a further design: as chosen, and exact over the whole cycle.
     """
-    pruned, whole = choice.numbers
-    fewer = f", one in {trimmed(whole / pruned, 2)}" if 0 < pruned < whole else ""
+    pruned, exact = choice.numbers
+    fewer = f", one in {trimmed(exact / pruned, 2)}" if 0 < pruned < exact else ""
     met = "" if choice.error_estimate <= tolerance else "; even the reference is no better: give a smoother gas trace"
     lines = [
         f"{problem.title}",
@@ -34,14 +34,14 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
         *(_line(part.what, part.why, part.share) for part in choice.left_out),
         *_static(problem),
         "Cost:",
-        f"  {pruned} of {whole} samples of force components{fewer}",
+        f"  {pruned} of {exact} samples of force components{fewer}",
         f"  another design is evaluated in {milliseconds[0]:.3f} ms, exactly in {milliseconds[1]:.3f} ms",
     ]
     return "\n".join(lines) + "\n"
 
 
 def as_json(problem: Problem, choice: Choice, tolerance: float, milliseconds: tuple[float, float]) -> str:
-    """The same for scripts."""
+    """Return the content of `as_text` as JSON."""
     part = static_part(problem, evaluate_start(problem)) if problem.load_terms else None
     return strict({
         "problem": problem.name,

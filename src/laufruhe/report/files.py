@@ -51,7 +51,7 @@ def result_files() -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Set:
-    """The files that one command makes in a folder.
+    """Files that one command makes in a folder.
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Set:
     beside: Collection[str] = ()
 
     def checked(self) -> frozenset[str]:
-        """The files that earlier runs made there; what they did not make is never touched (`InputError`)."""
+        """Return the files that earlier runs made; raise `InputError` if foreign files are in the way."""
         folder = self.folder
         above = next(path for path in (folder, *folder.parents) if path.exists())
         if not above.is_dir():
@@ -96,13 +96,13 @@ class Set:
         return made
 
     def refused(self, rule: str) -> InputError:
-        """One line about the folder."""
+        """Return an error about the folder."""
         return refused(self.option, str(self.folder), rule, "name another place")
 
 
 @contextmanager
 def staged(wanted: Set) -> Iterator[Path]:
-    """A hidden folder that takes the place of the set's when all files are made, at once.
+    """Yield a hidden folder that replaces the target folder atomically when all files are made.
 
     Whether it can is found out on entry. After an error, an interrupt or a kill at any
     moment the folder is as it was before, or all new; the next run takes away what a
@@ -125,7 +125,7 @@ def staged(wanted: Set) -> Iterator[Path]:
             # there may be none, or none while another run puts its own there
             with suppress(FileNotFoundError):
                 shutil.copymode(wanted.folder, stage)
-        with _named(stage, wanted.folder):
+        with _with_final_name(stage, wanted.folder):
             yield stage
         with held(wanted.folder.parent):
             made = wanted.checked()
@@ -133,8 +133,8 @@ def staged(wanted: Set) -> Iterator[Path]:
                 for name in made - {entry.name for entry in stage.iterdir()}:
                     shutil.copy2(wanted.folder / name, stage)
             _note(stage, wanted.verb, sorted({entry.name for entry in stage.iterdir()} - {MADE}))
-            _put(stage, wanted.folder)
-            _swept(stage, wanted.folder)
+            _swap(stage, wanted.folder)
+            _clear(stage, wanted.folder)
 
 
 @contextmanager
@@ -146,8 +146,7 @@ def _reporting(wanted: Set) -> Iterator[None]:
 
 
 @contextmanager
-def _named(stage: Path, wanted: Path) -> Iterator[None]:
-    """What cannot be written is told by the name that was asked for, not by that of its stage."""
+def _with_final_name(stage: Path, wanted: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
@@ -158,7 +157,7 @@ def _named(stage: Path, wanted: Path) -> Iterator[None]:
 
 @contextmanager
 def staged_file(path: Path, option: str) -> Iterator[Path]:
-    """A place to write data to; it becomes `path` when it is whole.
+    """Yield a path to write data to; it replaces `path` when it is complete.
 
     Raises
     ------
@@ -180,25 +179,25 @@ def staged_file(path: Path, option: str) -> Iterator[Path]:
     with ExitStack() as until_then:
         with _reporting(place):
             stage = until_then.enter_context(_stage_for(path))
-        with _named(stage, path):
+        with _with_final_name(stage, path):
             yield stage / path.name
         if (stage / path.name).exists():
             os.replace(stage / path.name, path)
 
 
 def placed(folder: Path, page: str) -> str:
-    """Where the files are, and which of them to open first."""
+    """Return where the files are, and which to open first."""
     return f"Results: {printed(str(folder))} (begin with {printed(page)})"
 
 
 def write(path: Path, text: str) -> None:
-    """Text as UTF-8, the same on every system."""
+    """Write text as UTF-8, the same on every system."""
     # a file name that is no text leaves lone surrogates behind; JSON writes them as \udcxx
     path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def write_all(texts: Mapping[Path, str]) -> None:
-    """Texts as files, whole and all of them, or none; folders are made."""
+    """Write all texts as files, or none; create folders."""
     with ExitStack() as undone:
         staged = {}
         for path, text in texts.items():
@@ -218,7 +217,7 @@ def write_all(texts: Mapping[Path, str]) -> None:
 
 @contextmanager
 def _stage_for(place: Path) -> Iterator[Path]:
-    """An unfinished folder beside a place; those that killed runs left there are swept away first."""
+    """Yield an unfinished folder beside a place; remove those that killed runs left there."""
     missing = [path for path in place.parents if not path.exists() and not path.is_symlink()]
     mark = f".unfinished-{hashlib.sha256(place.name.encode(errors='surrogateescape')).hexdigest()[:8]}-"
     with ExitStack() as undone:
@@ -228,23 +227,22 @@ def _stage_for(place: Path) -> Iterator[Path]:
             for left in place.parent.glob(f"{mark}*"):
                 with held(left, wait=False) as ours:
                     if ours:
-                        _swept(left, place)
+                        _clear(left, place)
             stage = place.parent / f"{mark}{secrets.token_hex(4)}"
             stage.mkdir()
-            undone.callback(_swept, stage, place)
+            undone.callback(_clear, stage, place)
             _note(stage, "", None)
             undone.enter_context(held(stage))
         yield stage
 
 
 def _note(folder: Path, verb: str, names: list[str] | None) -> None:
-    """Note what was made in a folder; no names where it is unfinished, and all in it is."""
     write(folder / _NEXT, json.dumps({"made_by": verb, "files": names}, ensure_ascii=False) + "\n")
     os.replace(folder / _NEXT, folder / MADE)
 
 
 def _made(folder: Path) -> tuple[str, frozenset[str]]:
-    """Return the command that made what is in a folder, and names of its files there; none if it is no such folder."""
+    """Return the command that made the files in a folder, and their names; empty for a foreign folder."""
     try:
         noted: Any = json.loads((folder / MADE).read_text(encoding="utf-8"))
         verb, names = noted["made_by"], noted["files"]
@@ -257,8 +255,8 @@ def _made(folder: Path) -> tuple[str, frozenset[str]]:
     return "", frozenset()
 
 
-def _swept(left: Path, place: Path) -> None:
-    """Take away what was made in a folder left behind; what was not goes to the place that it was taken from."""
+def _clear(left: Path, place: Path) -> None:
+    """Delete files that Laufruhe made in an abandoned folder; move all others back to their place."""
     if not left.is_dir():
         return
     verb, made = _made(left)
@@ -277,8 +275,8 @@ def _swept(left: Path, place: Path) -> None:
         left.rmdir()
 
 
-def _put(stage: Path, folder: Path) -> None:
-    """A folder in the place of another, which then stands in its own."""
+def _swap(stage: Path, folder: Path) -> None:
+    """Swap a folder with another."""
     with suppress(OSError):
         # there is none yet, or an empty one
         stage.rename(folder)

@@ -8,12 +8,12 @@ from laufruhe.present.pictures import PICTURES
 from laufruhe.report.document import Block, Bullets, Code, Document, Heading, Illustration, Paragraph
 from laufruhe.report.sections import tables_of
 from laufruhe.report.versions import versions
-from laufruhe.report.wording import explained, fidelity_of, headline, told
+from laufruhe.report.wording import details, explained, fidelity_of, headline
 from laufruhe.solvers.result import Result
 
 
 def result_document(result: Result, pictures: Sequence[str], command: str) -> Document:
-    """The report of a result.
+    """Return the report of a result.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def _blocks(result: Result, pictures: Sequence[str], command: str) -> Iterator[B
         yield Bullets("Numbers to check:", [str(doubt) for doubt in problem.plausibility_warnings])
     yield Heading("Result")
     yield Paragraph(headline(result))
-    yield from map(Paragraph, told(result))
+    yield from map(Paragraph, details(result))
     yield from (Illustration(name, PICTURES[name].caption) for name in pictures)
     yield from tables_of(result)
     yield Heading("Proof")

@@ -25,12 +25,11 @@ def _numbers(entry: Any) -> Any:
         return entry
     # the price as an edge is tightened is told again where it is the same
     same = entry.get("tightening_price") in (None, entry.get("shadow_price"))
-    kept = {k: v for k, v in entry.items() if not (same and k == "tightening_price")}
-    return {k: math.nan if v is None else v for k, v in kept.items()}
+    entries = {k: v for k, v in entry.items() if not (same and k == "tightening_price")}
+    return {k: math.nan if v is None else v for k, v in entries.items()}
 
 
 def _named(entries: Any) -> Any:
-    """Decisions stand under their names."""
     if not isinstance(entries, dict):
         return entries
     return {name: {"name": name, **each} if isinstance(each, dict) else each for name, each in entries.items()}
@@ -40,7 +39,7 @@ _NULLS = BeforeValidator(_numbers)
 
 
 class _File(BaseModel):
-    """Keys of `result.json` that are read by name; those beside them are kept as they are."""
+    """Keys of `result.json` that are read by name; other keys are retained unchanged."""
 
     problem: str
     title: str
@@ -55,7 +54,7 @@ class _File(BaseModel):
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class SavedResult(Told):
-    """A result as its `result.json` has it [SI].
+    """A result as read from its `result.json` [SI].
 
     Attributes
     ----------
@@ -73,12 +72,12 @@ class SavedResult(Told):
 
     @property
     def name(self) -> str:
-        """Of the problem."""
+        """Name of the problem."""
         return self.problem
 
     @property
     def values(self) -> dict[str, str]:
-        """What was decided, as a problem file has it; `problem.with_values` takes it."""
+        """Decided values as a problem file writes them; `problem.with_values` takes them."""
         return {d.name: f"{d.value!r} {d.unit}".rstrip() for d in self.decisions}
 
 
@@ -96,7 +95,7 @@ def write_result(result: Result, path: str | Path, series: bool = False) -> None
 
 
 def read_result(path: str | Path) -> SavedResult:
-    """Read the `result.json` of `laufruhe solve` or `evaluate` back.
+    """Read the `result.json` of `laufruhe solve` or `evaluate`.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ from laufruhe.present.tables import Table, unmarked
 from laufruhe.report.document import Bullets, Document, Heading, Paragraph
 from laufruhe.report.files import PAGE, placed
 from laufruhe.report.sections import tables_of
-from laufruhe.report.wording import explained, fidelity_of, headline, told
+from laufruhe.report.wording import details, explained, fidelity_of, headline
 from laufruhe.solvers.result import Result, Status
 
 PIPE_WIDTH = 110
@@ -26,13 +26,13 @@ _COLOURS = {Status.OPTIMAL: "green", Status.FEASIBLE: "green", Status.INFEASIBLE
 
 
 def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
-    """Print a result, and where its files are."""
+    """Print a result and the place of its files."""
     console = _console(stream)
     console.print(Text(result.problem.title, style="bold"))
     console.print(Text(headline(result), style=_COLOURS[result.status]))
     if result.certificate is not None:
         console.print(Text(explained(result), style="dim"))
-    for sentence in told(result):
+    for sentence in details(result):
         console.print(Text(sentence))
     for grid in tables_of(result):
         _print_grid(console, grid)
@@ -43,7 +43,7 @@ def show(result: Result, stream: TextIO, folder: Path | None = None) -> None:
 
 
 def show_document(document: Document, stream: TextIO, folder: Path, page: str) -> None:
-    """Print words and tables of a page, and where its files are; pictures and lines to type stand there."""
+    """Print words and tables of a page, and the place of its files."""
     console = _console(stream)
     console.print(Text(document.title, style="bold"))
     for block in document.blocks:
@@ -64,7 +64,6 @@ def show_document(document: Document, stream: TextIO, folder: Path, page: str) -
 
 
 def _console(stream: TextIO) -> Console:
-    """Titles and names are the user's: what looks like markup in them is text."""
     console = Console(file=stream, markup=False, emoji=False, highlight=False)
     if not console.is_terminal:
         console.width = PIPE_WIDTH
@@ -77,7 +76,6 @@ def _print_place(console: Console, folder: Path, page: str) -> None:
 
 
 def _print_item(console: Console, text: str) -> None:
-    """An entry of a list, its lines below each other."""
     item = RichTable.grid(padding=(0, 1))
     item.add_row("-", Text(text))
     console.print(item)
@@ -96,7 +94,7 @@ def _print_grid(console: Console, grid: Table) -> None:
 
 
 def _parts(grid: Table, width: int) -> Iterator[Sequence[int]]:
-    """Columns of tables that are no wider than the screen: each begins with the leading columns of text."""
+    """Split the columns into tables that fit the screen; each begins with the leading text columns."""
     least = [least for least, _ in _widths(grid)]
     lead = next(k for k in range(len(grid.head) + 1) if k not in grid.texts or k == len(grid.head) - 1)
     columns = list(range(lead))
@@ -109,14 +107,13 @@ def _parts(grid: Table, width: int) -> Iterator[Sequence[int]]:
 
 
 def _widths(grid: Table) -> list[tuple[int, int]]:
-    """Of every column the least width at which no number and no word of it is broken, and that of whole lines."""
-    found = []
+    widths = []
     for k, head in enumerate(grid.head):
         cells = [row[k] for row in grid.rows]
-        whole = [piece for text in ([head, *cells] if k in grid.texts else [head]) for piece in text.split()]
-        least = max(map(cell_len, whole if k in grid.texts else [*whole, *cells]), default=1)
-        found.append((least, max(map(cell_len, [head, *cells]))))
-    return found
+        words = [piece for text in ([head, *cells] if k in grid.texts else [head]) for piece in text.split()]
+        least = max(map(cell_len, words if k in grid.texts else [*words, *cells]), default=1)
+        widths.append((least, max(map(cell_len, [head, *cells]))))
+    return widths
 
 
 def _table(grid: Table, columns: Sequence[int], width: int) -> RichTable:
@@ -127,9 +124,9 @@ def _table(grid: Table, columns: Sequence[int], width: int) -> RichTable:
     caps = range(max(most for _, most in widths), 0, -1)
     shares = ([min(most, max(least, cap)) for least, most in widths] for cap in caps)
     fitting: Sequence[int | None] = next((share for share in shares if sum(share) <= room), [None] * len(columns))
-    for column, own in zip(columns, fitting, strict=True):
+    for column, width_ in zip(columns, fitting, strict=True):
         side: Literal["left", "right"] = "left" if column in grid.texts else "right"
-        table.add_column(Text(grid.head[column]), justify=side, overflow="fold", width=own)
+        table.add_column(Text(grid.head[column]), justify=side, overflow="fold", width=width_)
     for row in grid.rows:
         table.add_row(*(Text(row[k], style="red" if row[k] == "broken" else "") for k in columns))
     return table

@@ -18,7 +18,7 @@ LONGEST_BEGIN = 200
 
 
 def is_ours(path: Path) -> bool:
-    """Return whether a file begins as `strict` begins one, or is empty."""
+    """Return True for an empty file, or one that begins as `strict` begins it."""
     with suppress(OSError), path.open("rb") as stream:
         begin = stream.read(LONGEST_BEGIN)
         return not begin or _BEGIN.match(begin) is not None
@@ -26,14 +26,14 @@ def is_ours(path: Path) -> bool:
 
 
 def strict(content: Any, indent: int = 2) -> str:
-    """Return JSON of plain Python and NumPy values: who made it first, null in place of what is no finite number."""
+    """Return JSON of plain Python and NumPy values: the maker first, null for numbers that are not finite."""
     if isinstance(content, dict):
         content = {**MADE_BY, **content}
     return json.dumps(finite(content), indent=indent, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def finite(value: Any) -> Any:
-    """Null in place of what is no finite number."""
+    """Return the value with null for numbers that are not finite."""
     if isinstance(value, dict):
         return {key: finite(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):

@@ -21,7 +21,7 @@ from laufruhe.studies.text import Text
 
 
 def file_names(study: StudyFile) -> list[str]:
-    """Everything that `write_study` makes."""
+    """Return the names of all files of `write_study`."""
     common = (files.REPORT, files.PAGE, files.BOOK)
     pictures = [f"{part.name}.svg" for part in study.study.parts if "png" in part.ends]
     return [*common, *pictures, *(f"{part.name}.{end}" for part in study.study.parts for end in part.ends)]
@@ -37,7 +37,7 @@ def write_study(
     draw: Callable[[Picture, Path], Callable[[], str]],
     ending: str,
 ) -> None:
-    """Datasets, tables, pictures and the report into a folder that exists.
+    """Write datasets, tables, pictures and the report into an existing folder.
 
     Parameters
     ----------
@@ -72,13 +72,13 @@ def write_study(
 def study_document(
     study: StudyFile, datasets: Mapping[str, xr.Dataset], seconds: Mapping[str, float], command: str
 ) -> Document:
-    """The report of a study."""
+    """Return the report of a study."""
     blocks: list[Block] = [Paragraph(f"Source: {study.source}", marked=True)] if study.source else []
     blocks.append(Paragraph(f"Made by `{command}`.", marked=True))
     if study.assumptions:
         blocks.append(Bullets("Assumptions:", study.assumptions))
-    found = [kind.summary(datasets.values()) for kind in dict.fromkeys(type(part) for part in study.study.parts)]
-    blocks += [Paragraph(text, marked=True) for text in found if text]
+    summaries = [kind.summary(datasets.values()) for kind in dict.fromkeys(type(part) for part in study.study.parts)]
+    blocks += [Paragraph(text, marked=True) for text in summaries if text]
     for part in study.study.parts:
         blocks += _part(part, datasets[part.name])
     if datasets:
@@ -94,13 +94,13 @@ def _part(part: Part, data: xr.Dataset) -> Iterator[Block]:
     kind = data.attrs["kind"].capitalize()
     yield Paragraph(f"{kind}." + (f" Source: {source}" if source else ""), marked=True)
     for text in part.table(data):
-        yield from told(text)
+        yield from blocks_of(text)
     if "png" in part.ends:
         yield Illustration(part.name, title, is_captioned=False)
 
 
-def told(text: Text) -> Iterator[Block]:
-    """A paragraph or a table; how many rows stand in the CSV file only."""
+def blocks_of(text: Text) -> Iterator[Block]:
+    """Yield a paragraph or a table, and the number of rows that only the CSV file has."""
     if not isinstance(text, Table):
         yield Paragraph(text, marked=True)
         return
@@ -110,7 +110,7 @@ def told(text: Text) -> Iterator[Block]:
 
 
 def _flat(data: xr.Dataset) -> Any:
-    """A row a point: what stands for every mount, decision, measure ... of a point becomes a column each."""
+    """Return a row per point; values per mount, decision or measure become a column each."""
     across = {name: values for name, values in data.data_vars.items() if values.dims[:1] == ("point",) != values.dims}
     narrow = data.drop_dims({str(values.dims[1]) for values in across.values()})
     units = {str(name): values.attrs.get("units", "") for name, values in narrow.variables.items()}
@@ -119,9 +119,9 @@ def _flat(data: xr.Dataset) -> Any:
     columns: dict[str, Any] = {}
     for name, values in across.items():
         along = values.dims[1]
-        own = [values.attrs.get("units", "")] * data.sizes[along]
+        units_all = [values.attrs.get("units", "")] * data.sizes[along]
         units_of = values.attrs.get("unit_of", f"{along}_unit")
-        named = data[units_of].values.tolist() if units_of in data.coords else own
+        named = data[units_of].values.tolist() if units_of in data.coords else units_all
         for k, (of, unit) in enumerate(zip(data[along].values, named, strict=True)):
             # a reason has no unit
             columns[_headed(f"{name}: {of}", unit if values.dtype.kind in "fiu" else "")] = values.values[:, k]
@@ -134,7 +134,7 @@ def _headed(name: str, unit: str) -> str:
 
 
 def as_json(study: StudyFile, datasets: Mapping[str, xr.Dataset], seconds: Mapping[str, float]) -> str:
-    """All parts as strict JSON: what xarray says of a dataset, with null for what is no number."""
+    """Return all parts as strict JSON in xarray's form, null for numbers that are not finite."""
     parts = {
         name: {"seconds": seconds[name], **data.to_dict(data="list", encoding=False)} for name, data in datasets.items()
     }

@@ -64,14 +64,12 @@ def write_book(tables: Mapping[str, Table], path: Path) -> None:
 
 
 def _write_text(page: Any, row: int, column: int, text: str, _: Any, plain: Any) -> int | None:
-    """Write a text that XlsxWriter would take for its own formatting as two pieces; else return None."""
     if not (text.startswith("<r>") and text.endswith("</r>")):
         return None
     return int(page.write_rich_string(row, column, text[:2], plain, text[2:]))
 
 
 def _page_names(names: Iterable[str]) -> list[str]:
-    """Return page names: at most 31 letters, none that a workbook forbids, no two that differ in case only."""
     pages: list[str] = []
     for name in names:
         allowed = re.sub(r"[\[\]:*?/\\]|^'|'$", "-", name)

@@ -74,19 +74,18 @@ def _as_number(cell: str) -> str | float:
         return cell
 
 
-def _values(found: Sequence[DecisionValue | LimitValue]) -> Table:
-    return Table([field.name for one in found[:1] for field in fields(one)], [list(astuple(one)) for one in found])
+def _values(entries: Sequence[DecisionValue | LimitValue]) -> Table:
+    return Table([field.name for one in entries[:1] for field in fields(one)], [list(astuple(one)) for one in entries])
 
 
 def _measures(result: Result) -> Table:
-    """Mean, maximum and RMS of every place, before and after."""
     rows = [
         [places.title, point.name, design, name, each.mean, each.max, each.rms, places.channel.unit]
         for places in places_of(result)
         for k, point in enumerate(result.problem.points)
-        for design, found in loaded(result).items()
+        for design, evaluation in loaded(result).items()
         for name, each in zip(
-            places.channel.places(found.engine), measured(found, k, places.channel), strict=True
+            places.channel.places(evaluation.engine), measured(evaluation, k, places.channel), strict=True
         )
     ]  # fmt: skip
     return Table(["quantity", "point", "design", "place", "mean", "maximum", "rms", "unit"], rows)
@@ -101,9 +100,9 @@ def _transmissibility(result: Result) -> Table:
     speeds, orders = speeds_of(result), facts_of(result.final).orders
     columns = [
         (f"{design}, {point.name}: order {orders[k]:g}", curve.tolist())
-        for design, found in loaded(result).items()
+        for design, evaluation in loaded(result).items()
         for point in result.problem.points
-        for k, curve in transmissibility_of(found, point, speeds, orders)
+        for k, curve in transmissibility_of(evaluation, point, speeds, orders)
     ]
     rows = zip((RPM * speeds).tolist(), *(values for _, values in columns), strict=True)
     return Table(["speed [rpm]", *(head for head, _ in columns)], [list(row) for row in rows] if columns else [])
@@ -136,26 +135,25 @@ TURN = math.tau * np.arange(STEPS) / STEPS
 
 
 def _torque(result: Result) -> Table:
-    """Torque part by part, the work that it stores and the speed that it makes, of every design and point."""
     points, fidelity = result.problem.points, result.problem.fidelity
     angles = result.final.engine.cycle.angle * np.arange(STEPS) / STEPS
-    found = [
+    columns_by_point = [
         {f"{name}: {of}": values for name, design in result.designs.items()
          for of, values in _torques(design.engine, point, fidelity, angles).items()}
         for point in points
     ]  # fmt: skip
     # without gas at one point there is none of that part
-    names = list(dict.fromkeys(name for columns in found for name in columns))
+    names = list(dict.fromkeys(name for columns in columns_by_point for name in columns))
     rows = [
         [point.name, *row]
-        for point, columns in zip(points, found, strict=True)
+        for point, columns in zip(points, columns_by_point, strict=True)
         for row in np.column_stack([np.degrees(angles), *(columns.get(name, 0.0 * angles) for name in names)]).tolist()
     ]
     return Table(["point", "angle [deg]", *names], rows)
 
 
 def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, angles: Array) -> dict[str, Array]:
-    """Columns of one design at one point; no speed of a crank that would stop."""
+    """Return the columns of one design at one point; no speed for a crank that would stop."""
     parts = torque_parts(engine, point, fidelity)
     work = parts["all"].integral.values(angles)
     columns = {f"torque of {part} [N m]": torque.values(angles) for part, torque in parts.items()}
@@ -169,7 +167,6 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, angles: 
 
 
 def _uneven_firing(result: Result) -> Table:
-    """What deviations from even firing buy, and what no design with them goes under."""
     unit = objective_unit(result) or "-"
     rows = [
         [math.degrees(one.allowed), math.degrees(one.deviation), one.value, one.lower_bound]
@@ -179,17 +176,16 @@ def _uneven_firing(result: Result) -> Table:
 
 
 def _indicator(result: Result) -> Table:
-    """Pressure in every chamber on both sides of pistons, and what drives the rods, of the final design."""
     parts, rows, named = result.final.engine.slider_cranks, [], dict[str, None]()
-    found = [
+    diagrams = [
         (point.name, part.name, indicator_of(gas, part, point, TURN))
         for point, gas in points_with_chambers(result)
         for part in parts
         if gas.of(part)
     ]
-    for _, _, one in found:
+    for _, _, one in diagrams:
         named |= dict.fromkeys(one.pressures)
-    for point, part, one in found:
+    for point, part, one in diagrams:
         # a cylinder has not every chamber
         pressures = (one.pressures.get(name, np.full(STEPS, math.nan)) for name in named)
         columns = np.column_stack([np.degrees(TURN), one.travel, one.force, one.needed, *pressures])
@@ -200,27 +196,26 @@ def _indicator(result: Result) -> Table:
 
 
 def _willans(result: Result) -> Table:
-    """Readings of friction tests, the line through them, what is asked of it, and the friction that it tells."""
-    rows = [row for test in result.problem.friction for row in _of_test(test)]
+    rows = [row for test in result.problem.friction for row in _test_rows(test)]
     head = ["point", "what", "brake mean pressure [Pa]", "speed [rpm]", "fuel, as measured", "drag [Pa]",
             "least squares, as measured", "standard deviation [Pa]"]  # fmt: skip
     return Table(head, rows)
 
 
-def _of_test(test: FrictionTest) -> Iterator[list[Any]]:
+def _test_rows(test: FrictionTest) -> Iterator[list[Any]]:
     (intercept, slope), none = test.line, math.nan
     friction = test.friction
     for x, y in zip(test.x, test.y, strict=True):
         places = (none, RPM * x, none, y) if test.is_motored else (x, none, y, none)
         yield [test.at, "measured", *places, intercept + slope * x, none]
-    asked, line = test.asked, intercept + slope * test.asked
-    yield [test.at, "asked", *((none, RPM * asked) if test.is_motored else (asked, none)), none, none, line, none]
-    told = (none, RPM * asked, none, friction.mean) if test.is_motored else (-friction.mean, none, 0.0, none)
+    target, line = test.asked, intercept + slope * test.asked
+    yield [test.at, "asked", *((none, RPM * target) if test.is_motored else (target, none)), none, none, line, none]
+    told = (none, RPM * target, none, friction.mean) if test.is_motored else (-friction.mean, none, 0.0, none)
     yield [test.at, "friction", *told, line if test.is_motored else 0.0, friction.deviation]
 
 
 def _on_crank(result: Result) -> Table:
-    """Forces on main bearings along and across the crank as it turns, of every design and point (B4)."""
+    """Return forces on main bearings along and across the turning crank (B4)."""
     names, rows, heads = BEARINGS.channel.places(result.final.engine), [], []
     designs = loaded(result)
     for k, point in enumerate(result.problem.points):
@@ -238,7 +233,6 @@ def _on_crank(result: Result) -> Table:
 
 
 def _wear(result: Result) -> Table:
-    """Load that every direction of each main bearing takes over a cycle, over that of the most loaded (B10)."""
     names, angles = BEARINGS.channel.places(result.final.engine), math.tau * np.arange(DIRECTIONS) / DIRECTIONS
     rows = []
     for name, design in loaded(result).items():
@@ -250,7 +244,6 @@ def _wear(result: Result) -> Table:
 
 
 def _turning(result: Result) -> Table:
-    """Forward and backward parts of force and couple of a twin, of every design and point."""
     rows = [
         [name, point.name, kind, order, abs(forward), math.degrees(cmath.phase(forward)), abs(backward),
          math.degrees(cmath.phase(backward)), KINDS[kind][1]]
@@ -264,7 +257,6 @@ def _turning(result: Result) -> Table:
 
 
 def _mount_criticals(result: Result) -> Table:
-    """Where the orders that load a block most meet its natural frequencies on its mounts."""
     rows = []
     for name, design in loaded(result).items():
         facts = facts_of(design)
@@ -299,7 +291,7 @@ _TABLES: NumberTables = {
 
 @contextmanager
 def writing_tables(result: Result, folder: Path) -> Iterator[Callable[[], None]]:
-    """A CSV file for every sheet, and all of them as one workbook, into a folder that exists.
+    """Write a CSV file for every table, and a workbook, into an existing folder.
 
     Gives what waits for the workbook: a process of its own writes one of many cells.
     """

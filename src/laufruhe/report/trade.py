@@ -55,89 +55,88 @@ INDEX_COLUMNS = (
 OPEN_FLYWHEEL = "the flywheel is open, and a cheap model makes one that breaks its limits"
 
 
-def trade_document(found: Trade, picture: str | None, command: str) -> Document:
-    """Table, picture if there is one, by its name, and the choice for one problem."""
-    problem = found.problem
-    given, least = (figure(value, problem.objective_unit or "", 6) for value in (found.value, found.optimum))
-    optimum = "" if math.isnan(found.optimum) else f", of the optimum {least}"
+def trade_document(trade: Trade, picture: str | None, command: str) -> Document:
+    """Return table, picture (if `picture` names one) and choice for one problem."""
+    problem = trade.problem
+    initial, least = (figure(value, problem.objective_unit or "", 6) for value in (trade.value, trade.optimum))
+    optimum = "" if math.isnan(trade.optimum) else f", of the optimum {least}"
     blocks: list[Block] = [
         Paragraph(
-            f"Reference: {REFERENCE_NAME} over the cycle; {problem.objective_name} of the design as given {given}"
+            f"Reference: {REFERENCE_NAME} over the cycle; {problem.objective_name} of the design as given {initial}"
             f"{optimum}."
         ),
-        Paragraph(f"**Take** {advice(found)}", marked=True),
+        Paragraph(f"**Take** {advice(trade)}", marked=True),
     ]
     if picture:
         blocks.append(Illustration(picture, "Time against error of every fidelity; colour is regret", False))
     elif not problem.load_terms:
         blocks.append(Paragraph("What is asked depends on no load, so every fidelity gives the same number."))
-    blocks.append(Table(HEAD, [_cells(row) for row in found.rows]))
-    if not found.whole:
+    blocks.append(Table(HEAD, [_cells(row) for row in trade.rows]))
+    if not trade.whole:
         blocks.append(Paragraph("Stopped at the time limit: fidelities beyond the last row were not measured."))
     mounts = OF_MOUNTS if problem.mount_decisions and problem.load_terms else ""
     searched = OF_STARS if compares_stars(problem) else LOCAL if is_local(problem) else ""
     blocks.append(Paragraph(COLUMNS + searched + mounts, marked=True))
     static = static_sentence(problem, evaluate_start(problem)) if problem.load_terms else ""
-    blocks.extend(Paragraph(line) for line in (*([static] if static else []), *found.left_out, *_beyond(found)))
+    blocks.extend(Paragraph(line) for line in (*([static] if static else []), *trade.left_out, *_beyond(trade)))
     return Document(f"{TITLE}: {problem.title}", (*blocks, Code(command)))
 
 
-def _beyond(found: Trade) -> list[str]:
-    """What no fidelity at constant speed, or none in the frequency domain, sees."""
+def _beyond(trade: Trade) -> list[str]:
+    """Return what the fidelities at constant speed, or in the frequency domain, neglect."""
     lines = []
-    if found.flywheel is not None:
-        inertia, change = found.flywheel
+    if trade.flywheel is not None:
+        inertia, change = trade.flywheel
         lines.append(
             f"Constant crank speed: with a flywheel of {inertia:.3g} kg m2 for all that turns, at which the speed "
             f"varies by some 2 %, the objective changes by {100.0 * change:+.2f} %. "
             "No fidelity at constant speed sees that."
         )
-    if found.time_domain is not None:
-        own = found.time_domain
+    if trade.time_domain is not None:
+        time = trade.time_domain
         lines.append(
-            f"Time domain ({own.point}): mount forces integrated in time agree with the same equations in the "
-            f"frequency domain to {own.integration:.0e} of their peak. Hysteretic loss has no law in time; the viscous "
-            f"damping in its place changes them by up to {100.0 * own.loss:.2g} % of the peak."
+            f"Time domain ({time.point}): mount forces integrated in time agree with the same equations in the "
+            f"frequency domain to {time.integration:.0e} of their peak. Hysteretic loss has no law in time; the "
+            f"viscous damping in its place changes them by up to {100.0 * time.loss:.2g} % of the peak."
         )
     return lines
 
 
-def advice(found: Trade) -> str:
-    """The choices in words."""
-    number, decided = choices(found)
+def advice(trade: Trade) -> str:
+    """Return the choices in words."""
+    number, decided = choices(trade)
     text = f"`{number.name}` for values within 0.1 % ({_time(number.evaluation)} per design)"
     if decided is not None:
         text += f"; `{decided.name}` for decisions within 0.1 % of the best ({_time(decided.solve)})"
     return text + "."
 
 
-def choices(found: Trade) -> tuple[Row, Row | None]:
-    """The cheapest fidelity whose number, and the cheapest whose decision, is good to a thousandth."""
-    good = [row for row in found.rows if row.error <= 1e-3]
-    number = _quick(good, lambda row: row.evaluation) if good else found.rows[-1]
-    deciding = [row for row in found.rows if row.decides and row.regret <= 1e-3]
-    return number, _quick(deciding, lambda row: row.solve) if deciding else None
+def choices(trade: Trade) -> tuple[Row, Row | None]:
+    """Return the cheapest fidelity with a value, and with a decision, within a thousandth."""
+    good = [row for row in trade.rows if row.error <= 1e-3]
+    number = _fastest(good, lambda row: row.evaluation) if good else trade.rows[-1]
+    deciding = [row for row in trade.rows if row.decides and row.regret <= 1e-3]
+    return number, _fastest(deciding, lambda row: row.solve) if deciding else None
 
 
-def _quick(rows: Sequence[Row], time: Callable[[Row], float]) -> Row:
-    """The safest of those that are not clearly slower than the fastest: times scatter from run to run."""
+def _fastest(rows: Sequence[Row], time: Callable[[Row], float]) -> Row:
     fastest = min(map(time, rows))
     return min((row for row in rows if time(row) <= ALIKE * fastest), key=lambda row: row.estimate)
 
 
-def as_json(found: Trade) -> str:
-    """The table for scripts."""
+def as_json(trade: Trade) -> str:
+    """Return the table as JSON."""
     return strict({
-        "problem": found.problem.name,
-        "reference": {"objective": found.value, "optimum": found.optimum},
-        "uneven_speed": found.flywheel and dict(zip(("crank_inertia", "change"), found.flywheel, strict=True)),
-        "time_domain": found.time_domain and asdict(found.time_domain),
-        "rows": [asdict(row) for row in found.rows],
+        "problem": trade.problem.name,
+        "reference": {"objective": trade.value, "optimum": trade.optimum},
+        "uneven_speed": trade.flywheel and dict(zip(("crank_inertia", "change"), trade.flywheel, strict=True)),
+        "time_domain": trade.time_domain and asdict(trade.time_domain),
+        "rows": [asdict(row) for row in trade.rows],
     })  # fmt: skip
 
 
 def index(trades: Sequence[Trade], refused: Sequence[str] = ()) -> Document:
-    """One line for every problem, and what they have in common; those for whose open flywheel nothing is traded."""
+    """Return one line per problem, and their common findings; `refused` names problems without a trade."""
     rows = [*map(_index_row, trades), *([f"`{name}`", *[DASH] * (len(INDEX) - 2), OPEN_FLYWHEEL] for name in refused)]
     short = (
         "`auto` is the safe choice: it states a bound of its error and keeps it. Problems that ask only for modes or "
@@ -157,56 +156,56 @@ def index(trades: Sequence[Trade], refused: Sequence[str] = ()) -> Document:
     return Document(TITLE, (Bullets(lead, short, marked=True), table, Paragraph(INDEX_COLUMNS, marked=True)))
 
 
-def _index_row(found: Trade) -> list[str]:
-    two, auto, gas = (_named(found, name) for name in (TWO_ORDER, "auto 0.001", NO_GAS))
-    number, decided = choices(found)
+def _index_row(trade: Trade) -> list[str]:
+    two, auto, gas = (_named(trade, name) for name in (TWO_ORDER, "auto 0.001", NO_GAS))
+    number, decided = choices(trade)
     deciding = (f"`{decided.name}`", _time(decided.solve)) if decided else (DASH, DASH)
-    name, uneven = found.problem.name, DASH if found.flywheel is None else f"{100.0 * found.flywheel[1]:+.2f} %"
+    name, uneven = trade.problem.name, DASH if trade.flywheel is None else f"{100.0 * trade.flywheel[1]:+.2f} %"
     return [f"[{name}]({name}.md)", f"`{number.name}`", _time(number.evaluation), *deciding, _error(two), _error(gas),
-            _error(auto), _regret(two), _regret(auto), uneven, _why_dashes(found)]  # fmt: skip
+            _error(auto), _regret(two), _regret(auto), uneven, _why_dashes(trade)]  # fmt: skip
 
 
-def _why_dashes(found: Trade) -> str:
-    """Why a number of the index is missing."""
-    problem, (_, decided) = found.problem, choices(found)
-    told = {
+def _why_dashes(trade: Trade) -> str:
+    """Return the reasons for missing numbers of the index."""
+    problem, (_, decided) = trade.problem, choices(trade)
+    reasons = {
         "nothing is open": not is_open(problem),
-        "no design is found within the limits": is_open(problem) and math.isnan(found.optimum),
-        "the optimum is zero": found.optimum == 0.0,
-        "no fidelity decides as well": decided is None and found.optimum > 0.0,
+        "no design is found within the limits": is_open(problem) and math.isnan(trade.optimum),
+        "the optimum is zero": trade.optimum == 0.0,
+        "no fidelity decides as well": decided is None and trade.optimum > 0.0,
         "what is minimised feels no load": not problem.load_terms,
-        "there is no gas": _named(found, NO_GAS) is None,
-        "a load inside is asked at even speed alone": bool(problem.load_terms) and found.flywheel is None,
+        "there is no gas": _named(trade, NO_GAS) is None,
+        "a load inside is asked at even speed alone": bool(problem.load_terms) and trade.flywheel is None,
     }
-    return "; ".join(why for why, holds in told.items() if holds)
+    return "; ".join(why for why, holds in reasons.items() if holds)
 
 
-def _named(found: Trade, name: str) -> Row | None:
-    return next((row for row in found.rows if row.name == name), None)
+def _named(trade: Trade, name: str) -> Row | None:
+    return next((row for row in trade.rows if row.name == name), None)
 
 
 def _cost(trades: Sequence[Trade], name: str, what: str) -> str:
-    """What a fidelity costs of the number and of the design, at worst and in the middle."""
-    rows = [row for found in trades if found.problem.load_terms and (row := _named(found, name)) is not None]
+    """Return the errors that a fidelity causes in values and designs, largest and median."""
+    rows = [row for trade in trades if trade.problem.load_terms and (row := _named(trade, name)) is not None]
     errors = sorted(row.error for row in rows)
     regrets = sorted(row.regret for row in rows if row.decides and not math.isnan(row.regret))
     broken = sum(row.excess > KEEPS for row in rows)
     if not errors:
         return f"{what} nothing that these problems show."
-    text = f"{what} {_most(errors[-1])} of the number{_middle(errors)}"
+    text = f"{what} {_up_to(errors[-1])} of the number{_median(errors)}"
     if regrets:
-        text += f"; of the design {_most(regrets[-1])}{_middle(regrets)}"
+        text += f"; of the design {_up_to(regrets[-1])}{_median(regrets)}"
     if broken:
         text += f"; it takes {broken} design{'s' * (broken > 1)} beyond a limit"
     return text + "."
 
 
-def _middle(shares: Sequence[float]) -> str:
+def _median(shares: Sequence[float]) -> str:
     count = len(shares)
     return f", {_percent(shares[count // 2])} in the middle of {count} problems" if count > 2 else ""
 
 
-def _most(share: float) -> str:
+def _up_to(share: float) -> str:
     return _percent(share) if share < SMALLEST else f"up to {_percent(share)}"
 
 

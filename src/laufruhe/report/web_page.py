@@ -22,7 +22,7 @@ HEADING = "Move the decisions"
 
 
 def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | None = None) -> str:
-    """A report as HTML.
+    """Return a report as HTML.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | N
 
 @cache
 def template() -> Template:
-    """What a page is made of; it takes longer to read than to fill."""
+    """Return the compiled template of a page."""
     import jinja2
 
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
@@ -46,7 +46,6 @@ def template() -> Template:
 
 
 def _live(model: LiveModel | None) -> dict[str, Any] | None:
-    """What the template puts in the place of a live model; no script where nothing moves."""
     if model is None or not (model.sliders or model.unmoved):
         return None
     why = model.why_not or model.too_large
@@ -58,12 +57,11 @@ def _live(model: LiveModel | None) -> dict[str, Any] | None:
 
 
 def inlined(svg: str) -> str:
-    """A picture as an address that holds it: names within it cannot meet those of another."""
+    """Return a picture as a data address; names within it cannot clash with those of another."""
     return "data:image/svg+xml;base64," + base64.b64encode(svg.encode("utf-8")).decode("ascii")
 
 
 def _marked(text: str, marked: bool) -> Markup:
-    """Text with code and emphasis as they are marked; nothing else in it means anything."""
     safe = str(escape(re.sub(r"\\(.)", r"\1", text) if marked else text))
     if marked:
         safe = re.sub(r"\*\*(.+?)\*\*", r"<strong>\1</strong>", safe)

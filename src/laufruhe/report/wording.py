@@ -16,13 +16,15 @@ from laufruhe.solvers.stars.ranking import RankedStar
 
 # A change that would be printed as 0.0 %.
 UNFELT = 5e-4
-NO_BOUND = "no useful bound yet"
+NO_BOUND = "no useful bound was found in the time given"
+NEGLIGIBLE = 1e-9
+"""Relative error of the objective that is not stated as a number."""
 LOOSE = 1e-3
 """Residual of the optimality conditions from which they are not said to hold."""
 
 
 def headline(result: Result) -> str:
-    """The result in one sentence."""
+    """Return the result in one sentence."""
     o = result.objective
     if result.status in (Status.INFEASIBLE, Status.FAILED):
         return f"{result.message[:1].upper()}{result.message[1:]}." if result.message else "No design was found."
@@ -32,39 +34,40 @@ def headline(result: Result) -> str:
     if not changed(result):
         return f"{name} of the design as given: {figure(o.value, o.unit)}."
     if math.isinf(o.initial):
-        found = f"{name} is {figure(o.value, o.unit)}, {_proven(result.certificate)}"
-        return f"{found}; the design as given stands on a resonance."
+        text = f"{name} is {figure(o.value, o.unit)}, {_proven(result.certificate)}"
+        return f"{text}; the design as given stands on a resonance."
     if abs(o.value - o.initial) <= UNFELT * max(abs(o.value), abs(o.initial)):
         return f"{name} stays at {figure(o.initial, o.unit)}, {_proven(result.certificate)}."
     # of nothing there is no share
     change = f" ({percent(-o.reduction)})" if o.initial else ""
-    given, decided = figure(o.initial, o.unit), figure(o.value, o.unit, scale=o.initial)
-    sentence = f"{name} falls from {given} to {decided}"
+    initial, decided = figure(o.initial, o.unit), figure(o.value, o.unit, scale=o.initial)
+    sentence = f"{name} falls from {initial} to {decided}"
     if o.value > o.initial:
         why = ", which breaks a limit," if breaks_a_limit(result.problem, result.initial) else ""
-        sentence = f"{name} goes from {given}{why} to {decided}"
+        sentence = f"{name} goes from {initial}{why} to {decided}"
     return f"{sentence}{change}, {_proven(result.certificate)}."
 
 
-def told(result: Result) -> list[str]:
-    """What is said below the headline: what limits can reach, when cylinders fire, and why its star is the best."""
+def details(result: Result) -> list[str]:
+    """Return the sentences below the headline: attainable limits, firing order, comparison of stars."""
     static = "" if result.objective is None else static_sentence(result.problem, result.final)
     return [sentence for sentence in (*sentences(result), static, fired(result), why_star(result)) if sentence]
 
 
 def fidelity_of(result: Result) -> str:
-    """Which physics was computed, and how far the objective may be off."""
+    """Return the computed physics, and the error of the objective."""
     f = result.problem.fidelity
     text = f"{f.summary.capitalize()}, {result.final.samples} steps over the working cycle."
     if result.objective is None:
         return text
     chosen = "" if f.tolerance is None else f" Chosen for an error of {f.tolerance:g}."
-    kept = ", of the physics that is kept" if f.tolerance is None else ""
-    return f"{text}{chosen} Error of the objective at most {100.0 * result.error_estimate:.1g} %{kept}."
+    if result.error_estimate < NEGLIGIBLE:
+        return f"{text}{chosen} Numerical error: negligible."
+    return f"{text}{chosen} Numerical error of the objective: at most {100.0 * result.error_estimate:.1g} %."
 
 
 def fired(result: Result) -> str:
-    """Firing order and intervals of the design, and which cylinders fire at once; empty of a single one."""
+    """Return firing order and intervals, and simultaneous firings; empty for one cylinder."""
     engine = result.final.engine
     if len(engine.cylinders) < 2:
         return ""
@@ -73,23 +76,23 @@ def fired(result: Result) -> str:
     order = "-".join(str(k + 1) for k in sorted(range(len(turns)), key=lambda k: (round(turns[k], 9), k)))
     angles = [trimmed(math.degrees(interval), 5) for interval in engine.firing_intervals]
     lead = f"Firing order {order}" if firing else f"Dead centres at the head end in the order {order}"
-    shown = f"intervals {', '.join(angles)} deg" if len(set(angles)) > 1 else f"every {angles[0]} deg"
-    sentence, do = f"{lead}, {shown}.", "fire" if firing else "stand there"
+    spacing = f"intervals {', '.join(angles)} deg" if len(set(angles)) > 1 else f"every {angles[0]} deg"
+    sentence, do = f"{lead}, {spacing}.", "fire" if firing else "stand there"
     groups = [f"{', '.join(names[:-1])} and {names[-1]} {do} at once" for names in together(engine)]
     text = "; ".join(groups)
     return f"{sentence} {text[:1].upper()}{text[1:]}." if text else sentence
 
 
 def why_star(result: Result) -> str:
-    """What tells the best star from the next one, in sentences; empty where no other was ranked."""
+    """Return what distinguishes the best star from the next; empty without another."""
     stars = result.phasing.ranking if result.phasing is not None else ()
     k, rival = next(((k, star) for k, star in enumerate(stars, 1) if star.throws != stars[0].throws), (0, None))
     if rival is None or not rival.value:
         return ""
-    gain, told = 1.0 - stars[0].value / rival.value, _told_apart(result, stars[0], rival)
-    less = [text for ours, theirs, text in told if ours < theirs]
-    more = [text for ours, theirs, text in told if ours > theirs]
-    if not told:
+    gain, differences = 1.0 - stars[0].value / rival.value, _differences(result, stars[0], rival)
+    less = [text for ours, theirs, text in differences if ours < theirs]
+    more = [text for ours, theirs, text in differences if ours > theirs]
+    if not differences:
         return f"Star {k} has the same free forces and couples as star 1." if abs(gain) < UNFELT else ""
     if gain < UNFELT:
         return f"Star {k} is as good."
@@ -99,20 +102,20 @@ def why_star(result: Result) -> str:
     return said + (f" {lead} a larger {' and '.join(more)}." if more else "")
 
 
-def _told_apart(result: Result, best: RankedStar, rival: RankedStar) -> list[tuple[float, float, str]]:
-    """Free force or couple of each order asked in which two stars differ, of both, and in words."""
-    asked = {order for measure in result.problem.measures for order in measure.orders or best.orders}
+def _differences(result: Result, best: RankedStar, rival: RankedStar) -> list[tuple[float, float, str]]:
+    """Return the free loads in which two stars differ, of both stars and in words."""
+    requested = {order for measure in result.problem.measures for order in measure.orders or best.orders}
     moved = {drive.rotor for decision in result.problem.unbalances for drive in decision.rotor_drives}
     acting = {abs(rotor.shaft.ratio) for rotor in result.final.engine.rotors if rotor.name in moved}
-    found = []
+    differences = []
     for j, order in enumerate(best.orders):
         pairs = (("force", best.forces[j], rival.forces[j]), ("couple", best.couples[j], rival.couples[j]))
-        for kind, ours, theirs in pairs if order in asked else ():
+        for kind, ours, theirs in pairs if order in requested else ():
             if abs(ours - theirs) > UNFELT * max(ours, theirs):
-                also = ", on which what was decided acts" if order in acting else ""
+                also = ", the part that counterweights can cancel" if order in acting else ""
                 sizes = f"{number(ours, 3, 1.0)} against {number(theirs, 3, 1.0)}"
-                found.append((ours, theirs, f"{kind} of order {order} ({sizes}{also})"))
-    return found
+                differences.append((ours, theirs, f"{kind} of order {order} ({sizes}{also})"))
+    return differences
 
 
 def _proven(certificate: Certificate | None) -> str:
@@ -129,18 +132,18 @@ def _proven(certificate: Certificate | None) -> str:
 
 
 def percent_of(share: float) -> str:
-    """To two figures."""
+    """Return a share in percent, to two figures."""
     return f"{trimmed(100.0 * share, 2)} %"
 
 
 def explained(result: Result) -> str:
-    """The certificate in two sentences."""
+    """Return the certificate in two sentences."""
     c, o = result.certificate, result.objective
     if result.status is Status.INFEASIBLE:
         ruled_out = "Every star and firing order allowed was ruled out" if result.problem.phasing is not None else ""
         needed = bool(result.conflict) and {one.name for one in result.reached if one.decisions} >= {*result.conflict}
-        said = f"{ruled_out or 'It is proven that no design keeps the limits named'}."
-        return said + needed * " Each limit that is named is needed for that: without it the others can be met."
+        text = f"{ruled_out or 'It is proven that no design keeps the limits named'}."
+        return text + needed * " Each limit that is named is needed for that: without it the others can be met."
     if c is None or o is None:
         return "Nothing was decided, so there is nothing to prove."
     if result.status is Status.FAILED:
@@ -167,7 +170,6 @@ def explained(result: Result) -> str:
 
 
 def _conditions(residual: float) -> str:
-    """What is known of the optimality conditions; nothing of a design that no smooth search ended at."""
     if not math.isfinite(residual):
         return "no search ended at this design, so its optimality conditions are not known"
     if residual > LOOSE:

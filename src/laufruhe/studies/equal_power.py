@@ -16,7 +16,7 @@ _FRACTION, _LENGTH, _MASS, _UNBALANCE = "", "m", "kg", "kg m"
 
 
 def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
-    """The problem with every cylinder rebuilt so that the engine has the reference's power.
+    """Return the problem with every cylinder resized so that the engine has the reference's power.
 
     Brake mean pressure and mean piston speed stay, so the gas model is untouched. `ModelError` where cylinders differ
     in bore or stroke, or stand on elastic mounts: the rules have none for a block and its springs.
@@ -74,7 +74,6 @@ def _layout(layout: Layout, scale: EqualPowerScale) -> Layout:
 
 
 def _decision(decision: Decision, scale: EqualPowerScale) -> Decision:
-    """Bounds grow with the size in its unit; gains turn that unit into kg m."""
     sizes = {_FRACTION: 1.0, _LENGTH: scale.length, _MASS: scale.mass, _UNBALANCE: scale.mass * scale.length}
     size = sizes[decision.unit]
     gain = scale.mass * scale.length / size

@@ -18,7 +18,7 @@ _SUM = 32
 
 
 class KeptPoints(AbstractContextManager["KeptPoints"]):
-    """Those records of a file that are wanted, by fingerprint; each is on disk as soon as it is known.
+    """Finished points of a file by fingerprint; each is on disk as soon as it is known.
 
     Every line begins with a checksum of the rest of it. What is cut, changed or no point at all does not fit its
     checksum, counts as not there, and is left alone: its point is solved again. Lines are added whole, between two ends
@@ -30,16 +30,16 @@ class KeptPoints(AbstractContextManager["KeptPoints"]):
         self._records: Record = {}
         self.seconds: dict[str, float] = {}
         self._stream: FileIO | None = None
-        for mark, seconds, record in _sound(path):
+        for mark, seconds, record in _intact_lines(path):
             if mark in wanted:
                 self._records[mark], self.seconds[mark] = record, seconds
 
     def read(self, mark: str) -> Record:
-        """What was kept of a point."""
+        """Return the record of a point."""
         return dict(self._records[mark])
 
     def keep(self, mark: str, seconds: float, record: Record) -> None:
-        """Write a record and what it took; it has left the process when this returns."""
+        """Write a record and its seconds; it has left the process when this returns."""
         if self._stream is None:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._stream = FileIO(self.path, "a")
@@ -56,13 +56,12 @@ class KeptPoints(AbstractContextManager["KeptPoints"]):
             self._stream.close()
 
 
-def _sound(path: Path) -> Iterator[tuple[str, float, Record]]:
-    """Fingerprint, seconds and record of every line that is as it was written."""
+def _intact_lines(path: Path) -> Iterator[tuple[str, float, Record]]:
     if path.is_file():
         with path.open("rb") as lines:
             for line in lines:
-                found, _, rest = line.rstrip(b"\n").partition(b" ")
-                if found == _checksum(rest):
+                checksum, _, rest = line.rstrip(b"\n").partition(b" ")
+                if checksum == _checksum(rest):
                     yield json.loads(rest)
 
 

@@ -22,7 +22,7 @@ Record: TypeAlias = dict[str, Any]
 
 @dataclass(frozen=True)
 class Column:
-    """A number that every draw has."""
+    """A number of every draw."""
 
     unit: str
     words: str
@@ -30,7 +30,7 @@ class Column:
 
 @dataclass(frozen=True)
 class Template:
-    """How the numbers of many draws are laid out before any is known.
+    """Layout of the numbers of many draws.
 
     Attributes
     ----------
@@ -64,75 +64,75 @@ class Part(Table):
     )
 
     def each_reading(self) -> list[Part]:
-        """The part in each reading of a doubtful number, which is set in all of its cases; itself where none is."""
+        """Return the part once per reading of a doubtful number; itself without readings."""
         return [self._in_reading(*reading) for reading in self.readings.items()] or [self]
 
     def _in_reading(self, name: str, values: dict[str, Value]) -> Part:
-        def read(told: Any) -> Any:
-            if isinstance(told, list):
-                return [read(one) for one in told]
-            return told.model_copy(update={"set": {**values, **told.set}}) if isinstance(told, CaseTable) else told
+        def read(value: Any) -> Any:
+            if isinstance(value, list):
+                return [read(entry) for entry in value]
+            return value.model_copy(update={"set": {**values, **value.set}}) if isinstance(value, CaseTable) else value
 
         slug = re.sub("[^a-z0-9]+", "-", name.lower()).strip("-")
-        own = {"name": f"{self.name}-{slug}", "title": f"{self.title}; {name}", "readings": {}}
-        return self.model_copy(update={**{key: read(told) for key, told in self}, **own})
+        changes = {"name": f"{self.name}-{slug}", "title": f"{self.title}; {name}", "readings": {}}
+        return self.model_copy(update={**{key: read(value) for key, value in self}, **changes})
 
     def settings(self) -> dict[str, Any]:
-        """What is asked of every point: all but words, cases, and what is swept."""
+        """Return the settings shared by all points."""
         return self.model_dump(exclude={"name", "title", "source", "cases", "readings", "sweep"})
 
     def swept_or_drawn(self) -> list[tuple[str, Callable[[], object]]]:
-        """Tables that name quantities, by their keys, and what reads them: `Refused` where one does not fit."""
+        """Return the tables that name quantities, by key, and functions that read them (`Refused` for a misfit)."""
         return []
 
     def size(self) -> int:
-        """How many points it makes at least, counted before any is made."""
+        """Return a lower bound of the number of points, without making any."""
         return len(self.cases)
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """The pieces of work. What is wrong with the part is refused here, before any is done."""
+        """Return the pieces of work; refuse a wrong part before any work begins."""
         raise NotImplementedError
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """One piece of work as JSON can hold it; it depends on the settings and the point alone.
+        """Return one piece of work as JSON values; it depends on the settings and the point only.
 
         A `ModelError` is the fault of the point, and is told so.
         """
         raise NotImplementedError
 
     def template(self, scenes: Scenes) -> Template | None:  # noqa: ARG002
-        """How records of points with a span are laid out; None where each point has a record of its own shape."""
+        """Return the layout of records of points with a span; None if each record has a shape of its own."""
         return None
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Records, in the order of the points, as one labelled dataset."""
+        """Return records, in the order of the points, as one labelled dataset."""
         raise NotImplementedError
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """What the report says of the dataset."""
+        """Return the paragraphs and tables of the report."""
         raise NotImplementedError
 
     @staticmethod
     def picture(data: xr.Dataset) -> Picture:
-        """What is drawn of the dataset."""
+        """Return the picture of the dataset."""
         raise NotImplementedError
 
     @staticmethod
     def summary(datasets: Iterable[xr.Dataset]) -> str:  # noqa: ARG004
-        """Return what a report says of the datasets of all parts together; empty where that is nothing."""
+        """Return what a report says of the datasets of all parts together; may be empty."""
         return ""
 
     @property
     def ends(self) -> tuple[str, ...]:
-        """Kinds of files that are written."""
+        """Endings of the files of this part."""
         return ("nc", "csv", "png")
 
     def about(self, **more: Any) -> dict[str, Any]:
-        """Attributes of the dataset that every part has, and more."""
+        """Return the attributes of the dataset."""
         return {"title": self.title, "kind": self.settings()["kind"], "source": self.source, **more}
 
 
 def variable(dims: str | tuple[str, ...], values: Any, words: str, unit: str = "1") -> tuple[Any, Any, dict[str, str]]:
-    """Values along dimensions with their unit and what they are, as xarray takes them."""
+    """Return values along dimensions with unit and long name, as xarray takes them."""
     return dims, values, {"units": unit, "long_name": words}

@@ -29,7 +29,7 @@ _REST = re.compile(r"[ \t]*(?:[#\n]|$)")
 
 @cache
 def program() -> str:
-    """Return a hash of all but the scene that an answer depends on.
+    """Return a hash of the code and the libraries that an answer depends on.
 
     The version alone would keep the points of a changed working copy. Comments, docstrings and blank lines
     change no answer, so `statements` leaves them out.
@@ -37,19 +37,19 @@ def program() -> str:
     package = Path(__file__).parents[1]
     source = [package / name for name in ("__init__.py", "units.py", "errors.py")]
     source += [path for room in ROOMS for path in sorted((package / room).rglob("*.py"))]
-    found = hashlib.sha256(json.dumps(library_versions()).encode())
+    digest = hashlib.sha256(json.dumps(library_versions()).encode())
     for path in source:
-        found.update(path.relative_to(package).as_posix().encode() + b"\n")
-        found.update(statements(path.read_text(encoding="utf-8")).encode())
-    return found.hexdigest()
+        digest.update(path.relative_to(package).as_posix().encode() + b"\n")
+        digest.update(statements(path.read_text(encoding="utf-8")).encode())
+    return digest.hexdigest()
 
 
 def statements(source: str) -> str:
-    """Return Python source without comments, blank lines and strings that stand as statements."""
-    return "".join(_kept(source))
+    """Return Python source without comments, blank lines and docstrings."""
+    return "".join(_pieces(source))
 
 
-def _kept(source: str) -> Iterator[str]:
+def _pieces(source: str) -> Iterator[str]:
     depth, place, begins = 0, 0, True
     for token in _TOKEN.finditer(source):
         code, text, place = source[place : token.start()], token.group(), token.end()

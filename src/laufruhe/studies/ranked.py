@@ -18,29 +18,29 @@ MOST, SPREAD = 4, 200.0
 
 
 def side_by_side(data: xr.Dataset, words: str) -> p.Picture:
-    """The metric where it is one quantity and not among the others, and all further quantities."""
+    """Draw the metric, unless it is one of the further quantities, and all further quantities."""
     order = np.argsort(np.nan_to_num(data["objective"].values, nan=np.inf), kind="stable")
     names = [str(name) for name in data["case"].values[order]]
     units = data["quantity_unit"].values.tolist()
-    told = [
+    quantities = [
         (str(name), *readable(str(unit)), data["further"].values[order, k])
         for k, (name, unit) in enumerate(zip(data["quantity"].values.tolist(), units, strict=True))
     ]
     unit, metric = data["objective"].attrs["units"], data.attrs["metric"]
-    if unit and metric not in [name for name, *_ in told]:
-        told.insert(0, (metric, *readable(unit), data["objective"].values[order]))
+    if unit and metric not in [name for name, *_ in quantities]:
+        quantities.insert(0, (metric, *readable(unit), data["objective"].values[order]))
     # in rows of about as many
-    columns = -(-len(told) // -(-len(told) // MOST))
+    columns = -(-len(quantities) // -(-len(quantities) // MOST))
     panels = [
         _panel(f"{name}\n[{unit}]" if unit else f"{name}\n", factor * values, names if k % columns == 0 else [])
-        for k, (name, unit, factor, values) in enumerate(told)
+        for k, (name, unit, factor, values) in enumerate(quantities)
     ]
-    proven, whole = int((data["proof"].values == "global").sum()), data.sizes["point"]
-    decided = "Each at its proven optimum" if proven == whole else f"{proven} of {whole} at a proven optimum"
+    proven, count = int((data["proof"].values == "global").sum()), data.sizes["point"]
+    decided = "Each at its proven optimum" if proven == count else f"{proven} of {count} at a proven optimum"
     size = (p.WIDEST / columns, AROUND + ROW * len(names))
-    said = f"{words} {decided}, the best first."
-    gap = 0.12 if len(told) == columns else 0.5
-    return p.Picture(data.attrs["title"], said, panels, p.credit(data), size=size, columns=columns, gap=gap)
+    text = f"{words} {decided}, the best first."
+    gap = 0.12 if len(quantities) == columns else 0.5
+    return p.Picture(data.attrs["title"], text, panels, p.credit(data), size=size, columns=columns, gap=gap)
 
 
 def _panel(title: str, values: np.ndarray, names: list[str]) -> p.Panel:
@@ -52,10 +52,10 @@ def _panel(title: str, values: np.ndarray, names: list[str]) -> p.Panel:
     known, places = np.isfinite(values), np.arange(len(values), dtype=float)
     marks: list[p.Mark] = [p.Bars(places[known], values[known], 0.62, upright=False)]
     for place, value in zip(places.tolist(), values.tolist(), strict=True):
-        is_told = math.isfinite(value)
-        shown = number(value, scale=most) if is_told else "not told"
-        at = value if is_told else low
-        marks.append(p.Words(at * math.exp(0.03 * span) if low else at + 0.03 * span, place, shown))
+        is_known = math.isfinite(value)
+        text = number(value, scale=most) if is_known else "not told"
+        at = value if is_known else low
+        marks.append(p.Words(at * math.exp(0.03 * span) if low else at + 0.03 * span, place, text))
     ticks = [(float(row), each) for row, each in enumerate(names)]
     side = p.Axis(ends=(len(values) - 0.4, -0.6), ticks=ticks, grid=False)
     end = low * math.exp(1.7 * span) if low else 1.7 * span
@@ -63,7 +63,6 @@ def _panel(title: str, values: np.ndarray, names: list[str]) -> p.Panel:
 
 
 def _decades(low: float, high: float) -> list[tuple[float, str]] | None:
-    """A few ticks of a logarithmic axis, from its end on; None where it is none."""
     if not low:
         return None
     first, last = round(math.log10(low)), math.floor(math.log10(high))

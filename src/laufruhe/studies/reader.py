@@ -33,11 +33,14 @@ class StudyTable(Table):
 
     @model_validator(mode="before")
     @classmethod
-    def _common(cls, given: Any) -> Any:
-        parts = given.get("parts") if isinstance(given, dict) else None
-        if not isinstance(parts, list) or not isinstance(given.get("common"), dict):
-            return given
-        return {**given, "parts": [joined(given["common"], part) if isinstance(part, dict) else part for part in parts]}
+    def _common(cls, tables: Any) -> Any:
+        parts = tables.get("parts") if isinstance(tables, dict) else None
+        if not isinstance(parts, list) or not isinstance(tables.get("common"), dict):
+            return tables
+        return {
+            **tables,
+            "parts": [joined(tables["common"], part) if isinstance(part, dict) else part for part in parts],
+        }
 
 
 class StudyFile(Table):
@@ -49,17 +52,17 @@ class StudyFile(Table):
     study: StudyTable
 
 
-def _once(found: Sequence[Complaint], tables: Mapping[str, Any]) -> tuple[Complaint, ...]:
-    """What is wrong with keys that all parts have in common is said once."""
+def _merged(complaints: Sequence[Complaint], tables: Mapping[str, Any]) -> tuple[Complaint, ...]:
+    """Report an error of a key in `common` once, not for each part."""
     study = tables["study"]
     common = study.get("common") if isinstance(study, dict) else None
     keys = common if isinstance(common, dict) else {}
-    kept: dict[str, Complaint] = {}
-    for one in found:
-        key = re.sub(r"^study\.parts\[\d+\]\.", "", one.where)
-        where = f"study.common.{key}" if re.split(r"[.\[]", key)[0] in keys else one.where
-        kept.setdefault(where, replace(one, where=where))
-    return tuple(kept.values())
+    first: dict[str, Complaint] = {}
+    for complaint in complaints:
+        key = re.sub(r"^study\.parts\[\d+\]\.", "", complaint.where)
+        where = f"study.common.{key}" if re.split(r"[.\[]", key)[0] in keys else complaint.where
+        first.setdefault(where, replace(complaint, where=where))
+    return tuple(first.values())
 
 
 def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
@@ -73,12 +76,12 @@ def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
     try:
         file = StudyFile.model_validate(tables)
     except ValidationError as error:
-        raise InputError(str(path), _once(complaints_of(error, StudyFile), tables)) from None
-    parts = [own for part in file.study.parts for own in part.each_reading()]
+        raise InputError(str(path), _merged(complaints_of(error, StudyFile), tables)) from None
+    parts = [reading for part in file.study.parts for reading in part.each_reading()]
     names = [part.name for part in parts]
     for k, part in enumerate(file.study.parts):
         where = f"study.parts[{k + 1}]"
-        if max(names.count(own.name) for own in part.each_reading()) > 1:
+        if max(names.count(reading.name) for reading in part.each_reading()) > 1:
             raise refused(f"{where}.name", part.name, "is given twice", "give each part its own name", path)
         cases = [case.name for case in part.cases]
         if len(set(cases)) < len(cases):
@@ -87,9 +90,9 @@ def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
         if part.size() > MOST_POINTS:
             rule = f"makes {part.size()} points; a study takes {MOST_POINTS}"
             raise refused(where, "", rule, "ask for fewer", path)
-    whole = sum(part.size() for part in parts)
-    if whole > MOST_POINTS:
-        rule = f"make {whole} points; a study takes {MOST_POINTS}"
+    count = sum(part.size() for part in parts)
+    if count > MOST_POINTS:
+        rule = f"make {count} points; a study takes {MOST_POINTS}"
         raise refused("study.parts", "", rule, "make two studies of them", path)
     return file.model_copy(update={"study": file.study.model_copy(update={"parts": parts})})
 
@@ -99,5 +102,5 @@ def _check_quantities(part: Part, path: Path, where: str) -> None:
         try:
             read()
         except Refused as error:
-            found = error.complaint
-            raise InputError(str(path), (replace(found, where=f"{where}.{key}.{found.where}"),)) from None
+            complaint = error.complaint
+            raise InputError(str(path), (replace(complaint, where=f"{where}.{key}.{complaint.where}"),)) from None

@@ -31,7 +31,7 @@ _SUM = hashlib.sha256().digest_size
 
 @dataclass(frozen=True)
 class Region:
-    """Draws of one case, from one number to another."""
+    """A range of draws of one case."""
 
     case: int
     first: int
@@ -39,7 +39,7 @@ class Region:
 
 
 class Regions:
-    """The numbers of one part: `values` along case, draw and quantity, and `done` along case and piece.
+    """Numbers of one part: `values` along case, draw and quantity, and `done` along case and piece.
 
     Parameters
     ----------
@@ -64,32 +64,32 @@ class Regions:
                 self.seconds[mark] = seconds
 
     def keep(self, mark: str, seconds: float, record: Record) -> None:
-        """Write the values of a piece, then that it is done."""
+        """Write the values of a piece, then mark it as done."""
         region, values = self._wanted[mark], np.ascontiguousarray(record[VALUES], dtype="<f8")
-        told = _SECONDS.pack(seconds)
+        packed = _SECONDS.pack(seconds)
         self._values[region.case, region.first : region.last] = values
-        found = _checksum(mark, told, values) + told
-        self._done[region.case, region.first // self._chunk] = np.frombuffer(found, dtype=np.uint8)
+        noted = _checksum(mark, packed, values) + packed
+        self._done[region.case, region.first // self._chunk] = np.frombuffer(noted, dtype=np.uint8)
         self.seconds[mark] = seconds
 
     def read(self, mark: str) -> Record:
-        """What was kept of a piece."""
+        """Return the record of a piece."""
         region = self._wanted[mark]
         values = np.asarray(self._values[region.case, region.first : region.last])
         return {VALUES: values, COLUMNS: self._columns}
 
     def _found(self, mark: str, region: Region) -> float | None:
-        """Seconds that a piece took; None where it is not done, or not as it was written."""
+        """Return the seconds that a piece took; None if it is not done, or damaged."""
         try:
             noted = bytes(np.asarray(self._done[region.case, region.first // self._chunk]))
-            told = noted[_SUM:]
+            packed = noted[_SUM:]
             if not any(noted):
                 return None
             values = np.ascontiguousarray(self.read(mark)[VALUES], dtype="<f8")
         except Exception:
             # a damaged file ends in whatever its codec makes of it
             return None
-        return float(_SECONDS.unpack(told)[0]) if noted[:_SUM] == _checksum(mark, told, values) else None
+        return float(_SECONDS.unpack(packed)[0]) if noted[:_SUM] == _checksum(mark, packed, values) else None
 
 
 def _checksum(mark: str, seconds: bytes, values: NDArray[np.float64]) -> bytes:
@@ -97,8 +97,8 @@ def _checksum(mark: str, seconds: bytes, values: NDArray[np.float64]) -> bytes:
 
 
 def _laid_out(root: Path, name: str, template: Template) -> tuple[Any, Any]:
-    """Arrays of a part, as they stand there or new."""
-    whole = _store_at(root)
+    """Return the arrays of a part: existing ones if they fit, else new ones."""
+    store = _store_at(root)
     columns = {key: asdict(column) for key, column in template.columns.items()}
     about = {"columns": columns, "cases": [*template.cases], "chunk": template.chunk}
     cases, pieces = len(template.cases), -(-template.draws // template.chunk)
@@ -107,17 +107,17 @@ def _laid_out(root: Path, name: str, template: Template) -> tuple[Any, Any]:
         VALUES: (np.dtype("float64"), (1, template.chunk, len(template.columns))),
         DONE: (np.dtype("uint8"), (1, 1, shapes[DONE][-1])),
     }
-    arrays = _standing(whole, name, about, forms)
+    arrays = _standing(store, name, about, forms)
     if arrays is not None:
         for key, array in zip(shapes, arrays, strict=True):
             # more draws go on from those that are there
             if array.shape != shapes[key]:
                 array.resize(shapes[key])
         return arrays
-    if (root / name).exists() and name not in whole.attrs["parts"]:
+    if (root / name).exists() and name not in store.attrs["parts"]:
         raise refused("results", str(root / name), f"is {_FOREIGN}", _ELSEWHERE)
-    whole.attrs["parts"] = sorted({*whole.attrs["parts"], name})
-    group = whole.create_group(name, overwrite=True, attributes=about)
+    store.attrs["parts"] = sorted({*store.attrs["parts"], name})
+    group = store.create_group(name, overwrite=True, attributes=about)
     values = group.create_array(
         VALUES, shape=shapes[VALUES], dtype="float64", chunks=forms[VALUES][1],
         fill_value=np.nan, dimension_names=("case", "draw", "quantity"),
@@ -129,10 +129,9 @@ def _laid_out(root: Path, name: str, template: Template) -> tuple[Any, Any]:
     return values, done
 
 
-def _standing(whole: Any, name: str, about: Mapping[str, Any], forms: Mapping[str, Any]) -> tuple[Any, Any] | None:
-    """Return the arrays of a part that was laid out like this; None where another stands there, or a damaged one."""
+def _standing(store: Any, name: str, about: Mapping[str, Any], forms: Mapping[str, Any]) -> tuple[Any, Any] | None:
     with suppress(Exception):
-        group = whole[name]
+        group = store[name]
         alike = all((group[key].dtype, group[key].chunks) == form for key, form in forms.items())
         if alike and {key: group.attrs.get(key) for key in about} == about:
             return group[VALUES], group[DONE]
@@ -140,7 +139,7 @@ def _standing(whole: Any, name: str, about: Mapping[str, Any], forms: Mapping[st
 
 
 def _store_at(root: Path) -> Any:
-    """Return the group of a store, new in an empty folder; what is not ours stays as it is.
+    """Return the group of a store, new in an empty folder; foreign files stay untouched.
 
     Raises
     ------
@@ -154,20 +153,20 @@ def _store_at(root: Path) -> Any:
     if not (root / _ROOT).is_file():
         raise refused("results", str(root), f"holds {_FOREIGN}", _ELSEWHERE)
     try:
-        whole = zarr.open_group(root, mode="r+", zarr_format=3)
-        is_ours = whole.attrs.get("made_by") == MADE_BY and isinstance(whole.attrs.get("parts"), list)
+        store = zarr.open_group(root, mode="r+", zarr_format=3)
+        is_ours = store.attrs.get("made_by") == MADE_BY and isinstance(store.attrs.get("parts"), list)
     except Exception:
         # an array, no JSON, a number for a name: each ends in another error of Zarr
         rule, remedy = f"has a '{_ROOT}' that is damaged or no group", f"delete the folder, or {_ELSEWHERE}"
         raise refused("results", str(root), rule, remedy) from None
     if not is_ours:
         raise refused("results", str(root), f"holds {_FOREIGN}", _ELSEWHERE)
-    return whole
+    return store
 
 
 @contextmanager
 def kept_to_one(root: Path) -> Iterator[None]:
-    """A store that no other run writes to at once.
+    """Lock a store against other runs.
 
     Raises
     ------

@@ -38,11 +38,11 @@ SHARES = 4
 def run(
     study: StudyFile,
     folder: Path,
-    kept: Path,
+    finished: Path,
     say: Callable[[int, int], None] = lambda _done, _all: None,
     jobs: int = 1,
 ) -> tuple[dict[str, xr.Dataset], dict[str, float]]:
-    """All parts of a study, each as one dataset, and the seconds that its points took on one core.
+    """Return all parts of a study as datasets, and the seconds that their points took on one core.
 
     `InputError` where a scene is bad.
 
@@ -63,29 +63,33 @@ def run(
     # a scene that stands in two parts of one kind is solved once
     wanted = dict(zip(marks, work, strict=True))
     with ExitStack() as stores:
-        store = {mark: own for own, marked in stores_of(study, scenes, kept, wanted, stores) for mark in marked}
+        store = {
+            mark: points_of
+            for points_of, marked in stores_of(study, scenes, finished, wanted, stores)
+            for mark in marked
+        }
         todo = {mark: task for mark, task in wanted.items() if mark not in store[mark].seconds}
         names, whole = list(todo), len(wanted)
         say(whole - len(todo), whole)
-        with closing(answers(list(todo.values()), scenes, jobs)) as found:
-            for count, answer in enumerate(found, 1):
+        with closing(answers(list(todo.values()), scenes, jobs)) as results:
+            for count, answer in enumerate(results, 1):
                 mark = names[answer.task]
                 if answer.mark != mark:
                     raise _other_files(answer, todo[mark])
-                with _making_room():
+                with _disk_errors():
                     store[mark].keep(mark, answer.seconds, answer.record)
                 say(whole - len(todo) + count, whole)
         datasets, seconds = {}, {}
         for part in study.study.parts:
-            own = [(mark, point) for mark, (of, point) in zip(marks, work, strict=True) if of is part]
-            records = Records([mark for mark, _ in own], store)
-            datasets[part.name] = part.dataset([point for _, point in own], records)
-            seconds[part.name] = sum(store[mark].seconds[mark] for mark in {mark for mark, _ in own})
+            points_of = [(mark, point) for mark, (of, point) in zip(marks, work, strict=True) if of is part]
+            records = Records([mark for mark, _ in points_of], store)
+            datasets[part.name] = part.dataset([point for _, point in points_of], records)
+            seconds[part.name] = sum(store[mark].seconds[mark] for mark in {mark for mark, _ in points_of})
     return datasets, seconds
 
 
 @contextmanager
-def _making_room() -> Iterator[None]:
+def _disk_errors() -> Iterator[None]:
     try:
         yield
     except OSError as error:
@@ -95,7 +99,7 @@ def _making_room() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Answer:
-    """Outcome of a task, and how long it took on one core [s].
+    """Outcome of a task.
 
     Attributes
     ----------
@@ -114,7 +118,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class _Piece:
-    """Several tasks for one worker, and all that it needs to know: scenes, and where they are named from."""
+    """Several tasks for one worker, with the scenes and the folder that scenes are named from."""
 
     numbers: Sequence[int]
     tasks: Sequence[Task]
@@ -123,7 +127,7 @@ class _Piece:
 
 
 def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[Answer, None, None]:
-    """Every task's answer as it comes, in any order; the error of the first task that fails.
+    """Yield the answer of every task in any order; raise the error of the first task that fails.
 
     Those who were given the work do all of it; processes of this machine are started once what is left would take
     them clearly less time.
@@ -137,19 +141,18 @@ def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[Answe
             answer = _answer(k, task, scenes)
             if passed():
                 # what a limit may have cut short is no answer
-                raise _over()
+                raise _time_limit_error()
             yield answer
             first = k + 1
     if first < len(tasks):
-        yield from _shared(tasks, first, scenes, jobs)
+        yield from _distributed(tasks, first, scenes, jobs)
 
 
-def _over() -> SolverError:
+def _time_limit_error() -> SolverError:
     return TimeIsOver("the time limit is over; finished points are kept, the same command goes on")
 
 
 def _other_files(answer: Answer, task: Task) -> SolverError:
-    """Return the error of an answer that depends on other files or another program than its task."""
     where = f"on {answer.host}" if current_executor() is not None else "while it was worked at"
     rule = f"'{task[1]}' had other files, another Laufruhe or other libraries {where}, so its answer is not kept"
     return SolverError(f"{rule}; have the same everywhere, and the same command goes on")
@@ -164,8 +167,8 @@ def _answer(k: int, task: Task, scenes: Scenes) -> Answer:
     return Answer(k, scenes.fingerprint(point, part.settings()), socket.gethostname(), record, seconds)
 
 
-def _shared(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -> Iterator[Answer]:
-    """Tasks from the first on, as many in a piece as are worth handing out, told by those that are done."""
+def _distributed(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -> Iterator[Answer]:
+    """Yield answers of the tasks from `first` on; pieces grow with the measured speed."""
     done, spent = 0, 0.0
     worth = NEAR if current_executor() is None else FAR
     folder = Path.cwd()
@@ -181,19 +184,19 @@ def _shared(tasks: Sequence[Task], first: int, scenes: Scenes, jobs: int) -> Ite
 
     with executor_for(jobs) as executor:
         try:
-            with closing(unordered_map(_served, pieces(), executor)) as found:
-                for _, some in found:
-                    done, spent = done + len(some), spent + sum(answer.seconds for answer in some)
+            with closing(unordered_map(_work, pieces(), executor)) as results:
+                for _, done_now in results:
+                    done, spent = done + len(done_now), spent + sum(answer.seconds for answer in done_now)
                     if passed():
-                        raise _over()
-                    yield from some
+                        raise _time_limit_error()
+                    yield from done_now
         except TimeIsOver:
-            raise _over() from None
+            raise _time_limit_error() from None
         except WorkersGone as error:
             raise WorkersGone(f"{error}; finished points are kept, the same command goes on") from None
 
 
-def _served(piece: _Piece) -> list[Answer]:
+def _work(piece: _Piece) -> list[Answer]:
     if Path.cwd() != piece.folder:
         piece.scenes.folder = piece.folder / piece.scenes.folder
     return [_answer(k, task, piece.scenes) for k, task in zip(piece.numbers, piece.tasks, strict=True)]

@@ -35,20 +35,20 @@ class Sampled(Part):
     own_chunk: ClassVar[int] = 1000
 
     def settings(self) -> dict[str, Any]:
-        """All that a piece hangs on; more draws keep those that are there."""
+        """Return the settings of a piece; a larger number of draws keeps existing ones."""
         return {**super().settings(), "name": self.name, "draws": None, "chunk": self.piece}
 
     @property
     def piece(self) -> int:
-        """Draws in one piece of work."""
+        """Number of draws in one piece of work."""
         return self.chunk or self.own_chunk
 
     def size(self) -> int:
-        """Pieces of all cases."""
+        """Return the number of pieces of all cases."""
         return len(self.cases) * -(-self.draws // self.piece)
 
     def check_objective(self, scenes: Scenes) -> None:
-        """Whether all cases have an objective, and one and the same (`InputError`)."""
+        """Raise `InputError` unless all cases have the same objective."""
         names = [(case, scenes.problem(Point(case)).objective_name) for case in self.cases]
         for case, name in names:
             if not name:
@@ -58,52 +58,52 @@ class Sampled(Part):
                 raise scenes.refused(case, "objective", rule, "give each its own part")
 
     def spans(self) -> list[tuple[int, int]]:
-        """Of every piece, the first draw and that after the last."""
+        """Return (first draw, end) of every piece."""
         return [(k, min(k + self.piece, self.draws)) for k in range(0, self.draws, self.piece)]
 
     def random(self, span: tuple[int, int], width: int) -> Array:
-        """Numbers from 0 to 1 of some draws, shape (draws, width); the same whichever piece a draw is in."""
+        """Return numbers from 0 to 1, shape (draws, width); they do not depend on the pieces."""
         steps = -(-width // _WORDS)
         generator = np.random.Philox(key=self.seed)
         generator.advance(span[0] * steps)
         return np.random.Generator(generator).random((span[1] - span[0], steps * _WORDS))[:, :width]
 
     def gathered(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """All draws along case and draw, a variable for each column."""
+        """Return all draws along case and draw, a variable for each column."""
         first = next(k for k, point in enumerate(points) if point.span is not None)
         columns, cases = records[first][COLUMNS], [case.name for case in self.cases]
         values = np.empty((len(columns), len(cases), self.draws))
         for k, point in enumerate(points):
             if point.span is not None:
                 values[:, cases.index(point.case.name), slice(*point.span)] = records[k][VALUES].T
-        found = {
-            name: (("case", "draw"), own, {"units": column.unit, "long_name": column.words})
-            for own, (name, column) in zip(values, columns.items(), strict=True)
+        variables = {
+            name: (("case", "draw"), column_values, {"units": column.unit, "long_name": column.words})
+            for column_values, (name, column) in zip(values, columns.items(), strict=True)
         }
-        return xr.Dataset(found, {"case": cases}, self.about(seed=self.seed))
+        return xr.Dataset(variables, {"case": cases}, self.about(seed=self.seed))
 
     def columns(self, scenes: Scenes) -> dict[str, Column]:
-        """The numbers of a draw."""
+        """Return the numbers of a draw, by name."""
         raise NotImplementedError
 
     def template(self, scenes: Scenes) -> Template | None:
-        """A row a draw."""
+        """Return the layout of draws."""
         return Template(tuple(case.name for case in self.cases), self.draws, self.piece, self.columns(scenes))
 
     @property
     def ends(self) -> tuple[Literal["nc", "csv", "png"], ...]:
-        """A table beside, as long as it is one."""
+        """Endings of the files; a CSV file up to `MOST_TABLED` draws."""
         return ("nc", "csv", "png") if len(self.cases) * self.draws <= MOST_TABLED else ("nc", "png")
 
 
 def in_unit(values: xr.DataArray) -> tuple[Array, str]:
-    """Numbers as a reader expects them, and their unit."""
+    """Return numbers in readable units, and the unit."""
     unit, factor = readable(str(values.attrs["units"]))
     return factor * np.asarray(values.values, dtype=float), unit
 
 
 def share_below(values: Array, colour: p.Colour, label: str, dash: Sequence[float] = ()) -> p.Line:
-    """How many of some numbers stay below, over the number."""
+    """Return the line of the share of values [%] below each value."""
     known = values[np.isfinite(values)]
     if not len(known):
         return p.Line((), (), colour, label, dash=dash)
@@ -111,6 +111,6 @@ def share_below(values: Array, colour: p.Colour, label: str, dash: Sequence[floa
 
 
 def listed(values: Array) -> list[float]:
-    """Numbers that 5, 50 and 95 of 100 stay below; not a number where there is none."""
+    """Return the values that 5, 50 and 95 % stay below; NaN without values."""
     known = values[np.isfinite(values)]
     return [float(one) for one in np.percentile(known, LISTED)] if len(known) else [float("nan")] * len(LISTED)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Point:
-    """One piece of work of a part: a scene, values put into it by their paths, a metric in place of its objective.
+    """One piece of work: a scene, changed values by their paths, a metric in place of its objective.
 
     Of balancer shafts those named are kept, all when None; it starts from `base` in place of
     the tables of the case's problem file. A span is that of many draws, from one number to another.
@@ -45,14 +45,14 @@ class Point:
 
 
 class Scenes:
-    """Problem files of a study, named from its folder, each read once."""
+    """Problem files of a study, paths relative to its folder, each read once."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self._files: dict[Path, dict[str, Any]] = {}
 
     def tables(self, point: Point) -> dict[str, Any]:
-        """Tables of the problem of a point, not to be changed; `InputError` where it has no such table or quantity."""
+        """Return the tables of a point's problem, not to be modified; `InputError` for a missing table or quantity."""
         case = point.case
         tables = dict(self.file(case.problem) if point.base is None else point.base)
         for name in case.without:
@@ -68,7 +68,7 @@ class Scenes:
         return tables
 
     def file(self, name: str) -> dict[str, Any]:
-        """Tables of a problem file; not to be changed."""
+        """Return the tables of a problem file, not to be modified."""
         path = self.folder / name
         if path not in self._files:
             if not path.exists():
@@ -80,11 +80,11 @@ class Scenes:
         return self._files[path]
 
     def refused(self, case: CaseTable, where: str, rule: str, remedy: str) -> InputError:
-        """One line about the scene of a case."""
+        """Return the error about the scene of a case."""
         return refused(where, "", rule, remedy, self.folder / case.problem)
 
     def problem(self, point: Point) -> Problem:
-        """The problem of a point, with its shafts, at the power that its case asks for; `InputError` where bad."""
+        """Return the problem of a point with its shafts, scaled to equal power if its case asks for it."""
         problem = load_tables(self.tables(point), self.folder / point.case.problem)
         if point.shafts is not None:
             problem = with_shafts(problem, point.shafts)
@@ -95,18 +95,18 @@ class Scenes:
             return at_equal_power(problem, reference)
 
     def refuse_open_phasing(self, problem: Problem, case: CaseTable) -> None:
-        """Of sets of shafts: an open star has a choice of its own (`InputError`)."""
+        """Raise `InputError` for an open star, which selects shafts by itself."""
         if problem.phasing is not None:
             rule, remedy = "is open, and decides on shafts by itself", "use laufruhe solve, or fix it"
             raise self.refused(case, "phasing", rule, remedy)
 
     def named(self, case: CaseTable) -> AbstractContextManager[None]:
-        """What is refused in the scene of a case is led by the name of its problem file."""
+        """Prefix errors about a case's scene with the name of its problem file."""
         return in_file(self.folder / case.problem)
 
     @contextmanager
     def blamed(self, point: Point, where: str = "point") -> Iterator[None]:
-        """A machine that cannot exist or run is the fault of this point."""
+        """Report a `ModelError` as an `InputError` about this point."""
         try:
             yield
         except ModelError as error:
@@ -122,16 +122,15 @@ class Scenes:
         case = point.case.model_dump(exclude={"name", "sweep"})
         span = [point.case.name, *point.span] if point.span is not None else None
         about = [settings, case, point.shafts, span, tables, program()]
-        found = hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode())
+        digest = hashlib.sha256(json.dumps(about, sort_keys=True, default=str).encode())
         folder = (self.folder / point.case.problem).parent
         for text in sorted({text for _, text in texts_in(tables)}):
             if content := _content_of(folder / text):
-                found.update(text.encode() + content)
-        return found.hexdigest()[:32]
+                digest.update(text.encode() + content)
+        return digest.hexdigest()[:32]
 
 
 def _content_of(path: Path) -> bytes:
-    """Return a hash of a file; empty where there is none."""
     with suppress(OSError, ValueError):
         if path.is_file():
             with path.open("rb") as stream:
@@ -140,13 +139,13 @@ def _content_of(path: Path) -> bytes:
 
 
 def shafts_of(problem: Problem) -> tuple[str, ...]:
-    """Names of the balancer shafts, in the order of the engine."""
+    """Return the names of the balancer shafts, in the order of the engine."""
     return tuple(dict.fromkeys(r.shaft.name for r in problem.engine.rotors if r.role is Role.BALANCER))
 
 
-def with_shafts(problem: Problem, kept: Sequence[str]) -> Problem:
-    """The problem without the balancer shafts that are not named."""
-    unknown = set(kept) - set(shafts_of(problem))
+def with_shafts(problem: Problem, names: Sequence[str]) -> Problem:
+    """Return the problem with only the named balancer shafts."""
+    unknown = set(names) - set(shafts_of(problem))
     if unknown:
         raise ModelError(f"'{min(unknown)}' is no balancer shaft of this engine; name one that is")
-    return without_shafts(problem, set(shafts_of(problem)) - set(kept))
+    return without_shafts(problem, set(shafts_of(problem)) - set(names))

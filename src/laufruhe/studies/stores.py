@@ -22,45 +22,45 @@ Task: TypeAlias = tuple[Part, Point]
 
 
 class Store(Protocol):
-    """What is kept of points, by their fingerprints: lines of a file for any records, regions for many draws."""
+    """Records of finished points by fingerprint."""
 
     @property
     def seconds(self) -> Mapping[str, float]:
-        """What each took."""
+        """Seconds of every point."""
 
     def read(self, mark: str) -> Record:
-        """As it was kept: all of them at once may be more than memory holds."""
+        """Return one record; all of them may exceed memory."""
 
     def keep(self, mark: str, seconds: float, record: Record) -> None:
         """Write a record; it has left the process when this returns."""
 
 
 def stores_of(
-    study: StudyFile, scenes: Scenes, kept: Path, wanted: Mapping[str, Task], stores: ExitStack
+    study: StudyFile, scenes: Scenes, finished: Path, tasks: Mapping[str, Task], stores: ExitStack
 ) -> Iterator[tuple[Store, Collection[str]]]:
-    """Where points are kept, and which: spans of parts that know what their draws look like, and the others."""
-    rest, root = set(wanted), regions_in(kept.parent)
+    """Yield every store with the fingerprints that it holds: regions for draws, one file for all other points."""
+    rest, root = set(tasks), regions_in(finished.parent)
     templates = [(part, template) for part in study.study.parts if (template := part.template(scenes)) is not None]
     if templates:
         stores.enter_context(kept_to_one(root))
     for part, template in templates:
         regions = {
             mark: Region(template.cases.index(point.case.name), *point.span)
-            for mark, (of, point) in wanted.items()
+            for mark, (of, point) in tasks.items()
             if of is part and point.span is not None
         }
         yield Regions(root, part.name, template, regions), regions
         rest -= set(regions)
-    yield stores.enter_context(KeptPoints(kept, rest)), rest
+    yield stores.enter_context(KeptPoints(finished, rest)), rest
 
 
 def regions_in(folder: Path) -> Path:
-    """The store of many draws, beside the folder of the other results: it grows while these stand."""
+    """Return the folder of the store of draws, beside the folder of results."""
     return folder.with_name(f"{folder.name}.zarr")
 
 
 class Records(Sequence[Record]):
-    """Records in the order of points, read when they are asked for."""
+    """Records in the order of points, read on access."""
 
     def __init__(self, marks: Sequence[str], stores: Mapping[str, Store]) -> None:
         self._marks, self._stores = marks, stores

@@ -39,7 +39,7 @@ _ON_MOUNTS = ("mean_given", "maximum_given", "mean", "maximum")
 
 
 def decided(problem: Problem) -> tuple[Result, str, str]:
-    """A scene as decided, its status and its proof; one without a design as given."""
+    """Return the result of a scene, its status and its proof; evaluate the given design if there is no solution."""
     try:
         result = solve(problem)
     except SolverError:
@@ -56,7 +56,7 @@ Further: TypeAlias = Callable[[Evaluation], float]
 
 
 def solved(problem: Problem, further: Mapping[str, Further] | None = None) -> Record:
-    """What is kept of a scene [SI]; NaN for what it has not, as one without a design.
+    """Return the record of a scene [SI], NaN for missing values.
 
     Its metric and the unit of that, status and proof ("as given" where nothing was open), the
     objective as given, as decided, and what no design falls below; mean and maximum force by
@@ -64,13 +64,15 @@ def solved(problem: Problem, further: Mapping[str, Further] | None = None) -> Re
     order; how limits stand, and their shadow prices, by name; and the design in further quantities,
     or why it has none.
     """
-    shown, status, proof = decided(problem)
-    objective, bound = shown.objective, shown.certificate.lower_bound if shown.certificate else math.nan
-    limits = limits_of(shown)
+    result, status, proof = decided(problem)
+    objective, bound = result.objective, result.certificate.lower_bound if result.certificate else math.nan
+    limits = limits_of(result)
     designed = status not in (FAILED, "infeasible")
-    told = {name: _told(shown.final, of) if designed else (math.nan, "") for name, of in (further or {}).items()}
-    nothing = dict.fromkeys(shown.initial.mount_names, (math.nan, math.nan))
-    before, after = _on_mounts(problem, shown.initial), _on_mounts(problem, shown.final) if designed else nothing
+    quantities = {
+        name: _value_or_reason(result.final, of) if designed else (math.nan, "") for name, of in (further or {}).items()
+    }
+    nothing = dict.fromkeys(result.initial.mount_names, (math.nan, math.nan))
+    before, after = _on_mounts(problem, result.initial), _on_mounts(problem, result.final) if designed else nothing
     return {
         "metric": objective.name if objective else "",
         "unit": objective.unit if objective else "",
@@ -83,20 +85,19 @@ def solved(problem: Problem, further: Mapping[str, Further] | None = None) -> Re
         "maximum_given": {name: _finite(most) for name, (_, most) in before.items()},
         "mean": {name: mean for name, (mean, _) in after.items()},
         "maximum": {name: most for name, (_, most) in after.items()},
-        "decided": {decision.name: decision.value for decision in shown.decisions},
-        "units": {decision.name: decision.unit for decision in shown.decisions},
-        "order_force_given": _by_order(shown.initial),
-        "order_force": _by_order(shown.final) if designed else {},
+        "decided": {decision.name: decision.value for decision in result.decisions},
+        "units": {decision.name: decision.unit for decision in result.decisions},
+        "order_force_given": _by_order(result.initial),
+        "order_force": _by_order(result.final) if designed else {},
         "limit_value": {limit.name: _finite(limit.value) for limit in limits},
-        "shadow_price": {limit.name: limit.shadow_price for limit in limits if shown.certificate},
+        "shadow_price": {limit.name: limit.shadow_price for limit in limits if result.certificate},
         "limit_units": {limit.name: limit.unit for limit in limits},
-        "further": {name: value for name, (value, _) in told.items()},
-        "why_none": {name: why for name, (_, why) in told.items()},
+        "further": {name: value for name, (value, _) in quantities.items()},
+        "why_none": {name: why for name, (_, why) in quantities.items()},
     }
 
 
-def _told(design: Evaluation, of: Further) -> tuple[float, str]:
-    """A quantity of a design; NaN and why where it has none, as the mass of a weight without a radius."""
+def _value_or_reason(design: Evaluation, of: Further) -> tuple[float, str]:
     try:
         return _finite(of(design)), ""
     except ModelError as error:
@@ -104,24 +105,21 @@ def _told(design: Evaluation, of: Further) -> tuple[float, str]:
 
 
 def _by_order(design: Evaluation) -> dict[str, float]:
-    """Amplitudes by order, largest of all operating points: of mounts their mean, without any the shaking force [N]."""
-    found: dict[str, float] = {}
+    amplitudes: dict[str, float] = {}
     for loads in design.loads if not design.resonance else ():
         load = main_load(loads)
         sizes = mount_orders(load).mean(axis=1) if loads.mount_forces is not None else shaking_orders(load)[0]
         for order, size in zip(load.orders.tolist(), sizes.tolist(), strict=True):
             if order <= HIGHEST_ORDER:
-                found[f"{order:g}"] = max(found.get(f"{order:g}", 0.0), size)
-    return found
+                amplitudes[f"{order:g}"] = max(amplitudes.get(f"{order:g}", 0.0), size)
+    return amplitudes
 
 
 def _finite(value: float) -> float:
-    """NaN for what has no size: loads of a design as given that stands on a resonance."""
     return value if math.isfinite(value) else math.nan
 
 
 def _on_mounts(problem: Problem, evaluation: Evaluation) -> dict[str, tuple[float, float]]:
-    """Mean and maximum of every mount over the operating points [N]."""
     if not evaluation.engine.mounts:
         return {}
     each = [measured(evaluation, k) for k in range(len(problem.points))]
@@ -135,7 +133,7 @@ def _on_mounts(problem: Problem, evaluation: Evaluation) -> dict[str, tuple[floa
 def dataset(
     points: Sequence[Point], records: Sequence[Mapping[str, Any]], extra: Mapping[str, Any], about: Mapping[str, Any]
 ) -> xr.Dataset:
-    """One labelled dataset of solved scenes, along its points.
+    """Return one labelled dataset of solved scenes along their points.
 
     Engines of one part may have different mounts and decisions; those that one lacks are NaN.
 
@@ -151,13 +149,13 @@ def dataset(
     metrics = {record["metric"]: record["unit"] for record in records if record["metric"]}
     # of several metrics the unit is one, or they were refused
     metric, unit = next(iter(metrics), "") if len(metrics) == 1 else "objective", next(iter(metrics.values()), "")
-    found = {
+    variables = {
         name: variable("point", [record[name] for record in records], words.format(metric), unit)
         for name, words in _WORDS.items()
     }
     for name in _ON_MOUNTS:
         words = f"{name.replace('_', ' ')} of the mount's force"
-        found[name] = variable(("point", "mount"), _table(name, records, mounts), words, "N")
+        variables[name] = variable(("point", "mount"), _table(name, records, mounts), words, "N")
     in_unit = {"long_name": "value decided, in decision_unit"}
     coords = {
         "mount": mounts,
@@ -167,36 +165,35 @@ def dataset(
         "status": ("point", [record["status"] for record in records]),
         "proof": ("point", [record["proof"] for record in records]),
     }
-    values = {**found, "decided": (("point", "decision"), _table("decided", records, list(units)), in_unit)}
+    values = {**variables, "decided": (("point", "decision"), _table("decided", records, list(units)), in_unit)}
     more, named = _orders_and_limits(records, unit)
     return xr.Dataset({**values, **more}, {**coords, **named, **extra}, {**about, "metric": metric})
 
 
 def _orders_and_limits(records: Sequence[Mapping[str, Any]], unit: str) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Forces by order that any scene has, and how limits stand with what they cost; each with its coordinates."""
-    told = {order for record in records for order, size in record["order_force_given"].items() if size}
-    told |= {order for record in records for order, size in record["order_force"].items() if size}
-    orders = sorted(told, key=float)
+    """Return variables and coordinates of forces by order, and of limits with their prices."""
+    names = {order for record in records for order, size in record["order_force_given"].items() if size}
+    names |= {order for record in records for order, size in record["order_force"].items() if size}
+    orders = sorted(names, key=float)
     units = {name: of for record in records for name, of in record["limit_units"].items()}
-    given, decided = (_table(name, records, orders) for name in ("order_force_given", "order_force"))
-    found = {
-        "order_force_given": variable(("point", "order"), given, "amplitude by order, as given", "N"),
+    initial, decided = (_table(name, records, orders) for name in ("order_force_given", "order_force"))
+    variables = {
+        "order_force_given": variable(("point", "order"), initial, "amplitude by order, as given", "N"),
         "order_force": variable(("point", "order"), decided, "amplitude by order, as decided", "N"),
     }
     coords: dict[str, Any] = {"order": [float(order) for order in orders]}
     if not units:
-        return found, coords
+        return variables, coords
     value, price = (_table(name, records, list(units)) for name in ("limit_value", "shadow_price"))
     words = "fall of the metric for a unit by which the limit is relaxed, in price_unit"
-    found["limit_value"] = (("point", "limit"), value, {"long_name": "what is limited, in limit_unit"})
-    found["shadow_price"] = (("point", "limit"), price, {"long_name": words, "unit_of": "price_unit"})
+    variables["limit_value"] = (("point", "limit"), value, {"long_name": "what is limited, in limit_unit"})
+    variables["shadow_price"] = (("point", "limit"), price, {"long_name": words, "unit_of": "price_unit"})
     prices = [f"{unit or '1'} per {of}" if of else unit for of in units.values()]
-    return found, {**coords, "limit": list(units), "limit_unit": ("limit", list(units.values())),
+    return variables, {**coords, "limit": list(units), "limit_unit": ("limit", list(units.values())),
                    "price_unit": ("limit", prices)}  # fmt: skip
 
 
 def _table(name: str, records: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> NDArray[np.float64]:
-    """A row each, NaN where it has no such column, shape (records, columns)."""
     values = [[record[name].get(column, math.nan) for column in columns] for record in records]
     return np.array(values, dtype=float).reshape(len(records), len(columns))
 
@@ -208,96 +205,96 @@ class SweptPart(Part):
     sweep: list[SweepTable] = Field(default_factory=list, max_length=2)
 
     def swept_or_drawn(self) -> list[tuple[str, Callable[[], object]]]:
-        """Of every sweep."""
+        """Return the readers of the sweeps."""
         return [(f"sweep[{k + 1}]", partial(axis_of, sweep)) for k, sweep in enumerate(self.sweep)]
 
     def size(self) -> int:
-        """Every case at every combination."""
+        """Return the number of cases times combinations."""
         return len(self.cases) * math.prod(sweep.count for sweep in self.sweep)
 
     def axes(self) -> list[Axis]:
-        """What is swept."""
+        """Return the swept axes."""
         return [axis_of(sweep) for sweep in self.sweep]
 
     def combinations(self, without: str | None = None) -> list[dict[str, Any]]:
-        """Every combination of the swept values, the last sweep fastest; one empty one without sweeps."""
+        """Return every combination of swept values, the last sweep fastest; one empty combination without sweeps."""
         grids = [[(a.quantity, value) for value in a.values] for a in self.axes() if a.quantity != without]
         return [dict(grid) for grid in itertools.product(*grids)]
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """Every case at every combination."""
+        """Return every case at every combination."""
         self.checked(scenes)
         return [Point(case, changes, self.metric) for case in self.cases for changes in self.combinations()]
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """The proven optimum of one scene, or its numbers as given where nothing is open."""
+        """Return the record of one scene: its proven optimum, or the given design if nothing is open."""
         return solved(scenes.problem(point))
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """All that is kept of every scene, along its point."""
+        """Return the records of all scenes along their points."""
         return dataset(points, records, coordinates(self.axes(), points), self.about())
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """A row a point."""
+        """Return a row per point."""
         return by_point(data)
 
     def checked(self, scenes: Scenes) -> list[Problem]:
-        """The first scene of every case, after the ends of every sweep were tried on each.
+        """Return the first scene of every case, after building both ends of every sweep.
 
         `InputError` where one cannot be made, tells a number twice, or has a metric of another dimension.
         """
         axes = self.axes()
         first = {axis.quantity: axis.values[0] for axis in axes}
-        found = []
+        problems = []
         for case in self.cases:
             self._check_apart(case, scenes)
-            found.append(scenes.problem(Point(case, first, self.metric)))
+            problems.append(scenes.problem(Point(case, first, self.metric)))
             for axis in axes:
                 scenes.problem(Point(case, {**first, axis.quantity: axis.values[-1]}, self.metric))
-            if found[-1].objective_unit is None:
+            if problems[-1].objective_unit is None:
                 rule = "is missing, so a study has nothing to compare"
                 raise scenes.refused(case, "objective", rule, "give a metric")
-        units = {problem.objective_unit: case for problem, case in zip(found, self.cases, strict=True)}
+        units = {problem.objective_unit: case for problem, case in zip(problems, self.cases, strict=True)}
         if len(units) > 1:
             (one, first_case), (two, second_case) = list(units.items())[:2]
-            said = [unit or "several units together" for unit in (one, two)]
-            rule = f"minimises in {said[0]} in '{first_case.name}' and in {said[1]} in '{second_case.name}'"
+            units_ = [unit or "several units together" for unit in (one, two)]
+            rule = f"minimises in {units_[0]} in '{first_case.name}' and in {units_[1]} in '{second_case.name}'"
             raise scenes.refused(self.cases[0], "objective", rule, "give the part one metric")
-        return found
+        return problems
 
     def _check_apart(self, case: CaseTable, scenes: Scenes) -> None:
-        """Whether every number is told once, however its path is written."""
-        tables, told = scenes.tables(Point(case.model_copy(update={"set": {}}))), {}
+        """Refuse a number that is swept and set, or swept twice, however its path is written."""
+        tables, reasons = scenes.tables(Point(case.model_copy(update={"set": {}}))), {}
         for path, value in case.set.items():
             with scenes.named(case):
-                told[keys_of(tables, path)] = f"is swept, and set by '{case.name}' too"
+                reasons[keys_of(tables, path)] = f"is swept, and set by '{case.name}' too"
                 tables = changed(tables, path, value)
         for sweep in self.sweep:
             with scenes.named(case):
                 keys = keys_of(tables, sweep.quantity)
-            for other, rule in told.items():
+            for other, rule in reasons.items():
                 if keys[: len(other)] == other[: len(keys)]:
                     raise scenes.refused(case, sweep.quantity, rule, "leave out one of the two")
-            told[keys] = "is swept twice"
+            reasons[keys] = "is swept twice"
 
     def check_moved_by_loads(self, problems: Sequence[Problem], scenes: Scenes, what: str) -> None:
-        """`InputError` where balancing cannot change what is minimised: sag and stiffness know no loads."""
+        """Raise `InputError` if the metric, such as a sag, does not depend on loads."""
         for case, problem in zip(self.cases, problems, strict=True):
-            asked = problem.measures
-            if all(measure.is_mounting and measure.channel is not channels.TRANSMISSIBILITY for measure in asked):
+            measures = problem.measures
+            if all(measure.is_mounting and measure.channel is not channels.TRANSMISSIBILITY for measure in measures):
                 rule = f"is {problem.objective_name}, which no {what} changes"
                 raise scenes.refused(case, "objective", rule, "minimise a mount force or transmissibility")
 
 
 def coordinates(axes: Sequence[Axis], points: Sequence[Point]) -> dict[str, Any]:
-    """Swept values along the points, as numbers with their unit, or as labels as a problem file has them."""
-    found: dict[str, Any] = {}
+    """Return swept values along the points: numbers with their unit, or labels as in a problem file."""
+    coords: dict[str, Any] = {}
     for axis in axes:
         values = [point.changes[axis.quantity] for point in points]
         number = axis.by_value()
         # labels as a problem file has them
         labels = [str(value).lower() if isinstance(value, bool) else str(value) for value in values]
-        shown = labels if axis.numbers is None else [number[value] for value in values]
-        found[axis.quantity] = ("point", shown, {"units": axis.unit, "long_name": axis.name, "swept": 1})
-    return found
+        column = labels if axis.numbers is None else [number[value] for value in values]
+        coords[axis.quantity] = ("point", column, {"units": axis.unit, "long_name": axis.name, "swept": 1})
+    return coords

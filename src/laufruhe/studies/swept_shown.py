@@ -24,23 +24,23 @@ _PROOFS = {"global": "proven", "global within gap": "proven within gap", "local"
 
 
 def swept_names(data: xr.Dataset) -> list[str]:
-    """Swept coordinates, in the order of the study file."""
+    """Return the swept coordinates, in the order of the study file."""
     return [str(name) for name, values in data.coords.items() if values.attrs.get("swept")]
 
 
 def with_unit(values: xr.DataArray) -> str:
-    """A quantity's name and unit, as a column or an axis is headed."""
+    """Return a quantity's name and unit, as the head of a column or an axis."""
     name, unit = str(values.attrs.get("long_name", values.name)), str(values.attrs.get("units", ""))
     return name if unit in ("", "1") else f"{name} [{unit}]"
 
 
 def settled(value: float, scale: float) -> float:
-    """Zero for what rounding leaves beside a scale: an engine in balance has no small force."""
+    """Return the value, or zero if it is a rounding relative to the scale."""
     return 0.0 if abs(value) < NEGLIGIBLE * abs(scale) else value
 
 
 def readable_metric(data: xr.Dataset) -> xr.Dataset:
-    """The dataset with its metric in the unit that a reader expects: a sag in mm, a stiffness in N/mm."""
+    """Return the dataset with its metric in a readable unit, such as mm for a sag."""
     unit, factor = readable(data["objective"].attrs["units"])
     if factor == 1.0:
         return data
@@ -51,13 +51,13 @@ def readable_metric(data: xr.Dataset) -> xr.Dataset:
 
 
 def claimed(data: xr.Dataset) -> str:
-    """What may be said of all that was decided."""
+    """Return the claim that holds for all decided designs."""
     decided = (data["proof"].values != "as given") & np.isfinite(data["objective"].values)
     return "proven optimum" if np.all(data["proof"].values[decided] == "global") else "best found"
 
 
 def by_point(data: xr.Dataset, *named: str) -> list[Text]:
-    """A row a point: what is swept with its unit, what is proven and what not.
+    """Return a row per point: swept values with units, the metric and its proof.
 
     Parameters
     ----------
@@ -76,14 +76,14 @@ def by_point(data: xr.Dataset, *named: str) -> list[Text]:
 
 
 def _row(row: xr.Dataset, columns: Sequence[str]) -> list[str]:
-    given, best, bound = (float(row[name]) for name in ("objective_given", "objective", "lower_bound"))
-    best = settled(best, given)
+    initial, best, bound = (float(row[name]) for name in ("objective_given", "objective", "lower_bound"))
+    best = settled(best, initial)
     proof, status = str(row["proof"].item()), str(row["status"].item())
     decided = proof != "as given"
-    change = percent(best / given - 1.0) if decided and given and best == best else NOTHING
+    change = percent(best / initial - 1.0) if decided and initial and best == best else NOTHING
     named = (row[name].item() for name in columns)
     cells = [number(value) if isinstance(value, float) else str(value) for value in named]
-    cells += [number(given), number(best) if decided else NOTHING, number(bound), change]
+    cells += [number(initial), number(best) if decided else NOTHING, number(bound), change]
     if row.sizes["mount"]:
         cells.append(number(float(row["maximum"].max())))
     cells.append("as given" if not decided else _PROOFS[proof] if status in ("optimal", "feasible") else status)
@@ -92,7 +92,7 @@ def _row(row: xr.Dataset, columns: Sequence[str]) -> list[str]:
 
 
 def over_sweep(data: xr.Dataset, told_apart: Sequence[str], words: str) -> p.Picture:
-    """One line for every case and all that tells points apart, over the last sweep."""
+    """Draw one line per case and combination over the last sweep."""
     data = readable_metric(data)
     names = swept_names(data)
     panel = p.Panel(lines(data, [*told_apart, *names]), swept_axis(data, names[-1]), metric_axis(data))
@@ -100,27 +100,27 @@ def over_sweep(data: xr.Dataset, told_apart: Sequence[str], words: str) -> p.Pic
 
 
 def lines(data: xr.Dataset, names: Sequence[str]) -> list[p.Mark]:
-    """The metric over the last of these coordinates, a line for every case and combination of the others."""
+    """Return the metric over the last coordinate, a line for every case and combination of the others."""
     place, numbers = spread(data, names[-1]), data[names[-1]].dtype.kind in "fi"
-    found: list[p.Mark] = []
+    marks: list[p.Mark] = []
     for label, chosen, colour in groups(data, names[:-1]):
         # nothing lies between two labels, and dots would hide a line of many points
         dots = not numbers or chosen.sum() <= MOST_DOTS
         size, width = (2.5, 1.5) if numbers else (6.0, 0.0)
         y = data["objective"].values[chosen]
-        found.append(p.Line(place[chosen], y, colour, label, width, marker="o" if dots else "", size=size))
-    return found
+        marks.append(p.Line(place[chosen], y, colour, label, width, marker="o" if dots else "", size=size))
+    return marks
 
 
 def spread(data: xr.Dataset, name: str) -> Any:
-    """Numbers along an axis; labels stand side by side."""
+    """Return numbers along an axis; labels become 0, 1, 2 ..."""
     values = data[name].values
     labels = list(dict.fromkeys(values.tolist()))
     return values if values.dtype.kind in "fi" else np.array([labels.index(value) for value in values.tolist()])
 
 
 def swept_axis(data: xr.Dataset, name: str, named: bool = True) -> p.Axis:
-    """The axis of a swept coordinate: logarithmic for values that grow by equal factors."""
+    """Return the axis of a swept coordinate, logarithmic for values that grow by equal factors."""
     values, label = data[name].values, with_unit(data[name]) if named else ""
     if values.dtype.kind not in "fi":
         return p.Axis(label, ticks=[(float(k), str(text)) for k, text in enumerate(dict.fromkeys(values.tolist()))])
@@ -131,27 +131,27 @@ def swept_axis(data: xr.Dataset, name: str, named: bool = True) -> p.Axis:
 
 
 def metric_axis(data: xr.Dataset, *drawn: str) -> p.Axis:
-    """From zero to a little over the largest objective and whatever else is drawn."""
+    """Return an axis from zero to a little over the largest drawn value."""
     unit = data["objective"].attrs["units"]
     top = max(float(np.nanmax(data[name].values, initial=0.0)) for name in ("objective", *drawn))
     return p.Axis(f"{data.attrs['metric']} [{unit}]" if unit else data.attrs["metric"], (0.0, 1.08 * top or 1.0))
 
 
 def groups(data: xr.Dataset, names: Sequence[str]) -> list[tuple[str, Any, p.Colour]]:
-    """Label, points and colour of every line: cases, where there are several, and what else is named."""
-    told = [*(["case"] if len(set(data["case"].values.tolist())) > 1 else []), *names]
-    columns = [data[name].values.tolist() for name in told]
-    keys = list(zip(*columns, strict=True)) if told else [()] * data.sizes["point"]
+    """Return label, points and colour of every line."""
+    columns_ = [*(["case"] if len(set(data["case"].values.tolist())) > 1 else []), *names]
+    columns = [data[name].values.tolist() for name in columns_]
+    keys = list(zip(*columns, strict=True)) if columns_ else [()] * data.sizes["point"]
     each = list(dict.fromkeys(keys))
-    found = []
+    groups_ = []
     for k, key in enumerate(each):
-        words = ", ".join(_said(data[name], value) for name, value in zip(told, key, strict=True))
+        words = ", ".join(_with_unit(data[name], value) for name, value in zip(columns_, key, strict=True))
         chosen = np.array([one == key for one in keys])
-        found.append((words or str(data["case"].values[0]), chosen, p.colour(k, len(each))))
-    return found
+        groups_.append((words or str(data["case"].values[0]), chosen, p.colour(k, len(each))))
+    return groups_
 
 
-def _said(values: xr.DataArray, value: Any) -> str:
+def _with_unit(values: xr.DataArray, value: Any) -> str:
     unit = values.attrs.get("units", "")
     if not isinstance(value, float):
         return str(value)
@@ -159,18 +159,18 @@ def _said(values: xr.DataArray, value: Any) -> str:
 
 
 def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Picture:
-    """As given in grey beside the optimum in blue; one grey bar where nothing is open, or `once` says so."""
+    """Draw bars as given and at the optimum; one bar for points with nothing open, or where `once` says so."""
     data = readable_metric(data)
     count = data.sizes["point"]
     alone = data["proof"].values == "as given"
     single = alone if once is None else np.ones(count, dtype=bool)
     plain = alone | (np.zeros(count, dtype=bool) if once is None else once)
-    given, best = data["objective_given"].values, data["objective"].values
-    most = max(np.nanmax(given, initial=0.0), np.nanmax(best, initial=0.0))
+    initial, best = data["objective_given"].values, data["objective"].values
+    most = max(np.nanmax(initial, initial=0.0), np.nanmax(best, initial=0.0))
     marks: list[tuple[float, p.Mark]] = []
     for k in range(count):
         one = [(k + 0.0, best[k], "before" if plain[k] else "after")]
-        pair = [(k - 0.2, given[k], "before"), (k + 0.2, best[k], "after")]
+        pair = [(k - 0.2, initial[k], "before"), (k + 0.2, best[k], "after")]
         width = 0.5 if single.all() else 0.36
         marks += [(bar[0], _bar(*bar, width, most)) for bar in (one if single[k] else pair)]
     labels = ["\n".join(part for line in str(label).split("\n") for part in wrap(line, LETTERS)) for label in labels]
@@ -197,7 +197,6 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
 
 
 def _bar(place: float, value: float, colour: str, width: float, most: float) -> p.Mark:
-    """A bar and its value; what rounding leaves of a balanced engine is zero."""
     if not np.isfinite(value):
         return p.Words(place, 0.02 * most, "no design", across="center", along="bottom")
     return p.Bars([place], [value], width, colour, numbers=[figures(settled(value, most))])

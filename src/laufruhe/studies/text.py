@@ -29,7 +29,7 @@ ratio of 20.5 instead of 17 five, and the study prints neither."""
 
 @dataclass(frozen=True)
 class Verdict:
-    """One statement, what the study says and what is found here, and the tolerance or the reason that decides."""
+    """One statement of a source beside the value found here, with the tolerance or reason that decides."""
 
     statement: str
     paper: str
@@ -45,16 +45,17 @@ def marked_table(head: Sequence[str], rows: Sequence[Sequence[str]], omitted: in
 
 
 def number(value: float, digits: int = 5) -> str:
-    """A number of a table; a dash where there is none."""
+    """Return a number of a table; a dash for NaN."""
     return NOTHING if value != value else trimmed(value, digits)
 
 
-def said(found: Sequence[Verdict]) -> list[Text]:
-    """What a source says, confirmed or not; nothing where it says nothing."""
-    if not found:
+def said(verdicts: Sequence[Verdict]) -> list[Text]:
+    """Return the table of a source's statements; empty without statements."""
+    if not verdicts:
         return []
-    ours = [f"{v.ours:{'+' if '%' in v.unit else ''}.3g} {v.unit}" for v in found]
+    ours = [f"{v.ours:{'+' if '%' in v.unit else ''}.3g} {v.unit}" for v in verdicts]
     rows = [
-        [v.statement, v.paper, own, "yes" if v.agrees else "**no**", v.why] for v, own in zip(found, ours, strict=True)
+        [v.statement, v.paper, value, "yes" if v.agrees else "**no**", v.why]
+        for v, value in zip(verdicts, ours, strict=True)
     ]
     return [marked_table(["what was said of", "said", "here", "confirmed", "why"], rows)]

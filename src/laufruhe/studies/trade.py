@@ -42,7 +42,7 @@ _LEAST_TIME, _LONG, _MOST_REPEATS = 0.02, 0.1, 50
 
 @dataclass(frozen=True)
 class Row:
-    """One fidelity on one problem.
+    """Measurements of one fidelity on one problem.
 
     Attributes
     ----------
@@ -75,13 +75,13 @@ class Row:
 
     @property
     def decides(self) -> bool:
-        """Whether it has found a design that keeps the limits."""
+        """True if its design keeps the limits."""
         return self.excess <= KEEPS
 
 
 @dataclass(frozen=True)
 class TimeDomain:
-    """Mount forces integrated in time beside those of the frequency domain, over their peak.
+    """Difference between mount forces in the time and frequency domains, relative to their peak.
 
     Attributes
     ----------
@@ -97,7 +97,7 @@ class TimeDomain:
 
 @dataclass(frozen=True)
 class Trade:
-    """All fidelities on one problem, and what they were compared with.
+    """Measurements of all fidelities on one problem, and the reference.
 
     Attributes
     ----------
@@ -132,19 +132,19 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     scale = Scale.of(problem)
     say("solving the reference")
     decided = _Decided(scale)
-    rows, whole, known = [], False, dict[tuple[Fidelity, int], Row]()
-    for name, own in ladder(scale):
+    rows, is_complete, measured = [], False, dict[tuple[Fidelity, int], Row]()
+    for name, variant in ladder(scale):
         say(name)
         # several tolerances may come to the same physics
-        physics = replace(own.fidelity, tolerance=None), len(own.points)
-        row = replace(known[physics], name=name) if physics in known else _row(name, own, scale, decided)
-        known[physics] = row
+        physics = replace(variant.fidelity, tolerance=None), len(variant.points)
+        row = replace(measured[physics], name=name) if physics in measured else _row(name, variant, scale, decided)
+        measured[physics] = row
         if passed():
             # what a limit may have cut short is no measurement
             break
         rows.append(row)
     else:
-        whole = True
+        is_complete = True
     if not rows:
         raise SolverError("the time limit is over before any fidelity was measured; raise it")
     say("uneven crank speed")
@@ -152,40 +152,40 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     flywheel = _price_of_constant_speed(problem) if problem.load_terms and not even_only else None
     return Trade(
         problem, tuple(decided.regretted(row) for row in rows), decided.given, decided.least, flywheel,
-        _price_of_time(problem), left_out, whole,
+        _price_of_time(problem), left_out, is_complete,
     )  # fmt: skip
 
 
 def traded_part(problem: Problem) -> Problem:
-    """What of a problem a trade takes: the drawing, by the first of several objectives."""
+    """Return the problem that a trade measures: the drawing with the first objective only."""
     return problem.changed(ranks=(), extras=())
 
 
 def _left_out(problem: Problem) -> tuple[str, ...]:
-    told = {
+    reasons = {
         f"Of {len(problem.ranks)} objectives in order the first is traded.": len(problem.ranks) > 1,
         **{f"Traded is the drawing, without {extra.words}.": True for extra in problem.extras},
     }
-    return tuple(line for line, holds in told.items() if holds)
+    return tuple(line for line, holds in reasons.items() if holds)
 
 
 def is_open(problem: Problem) -> bool:
-    """Whether a problem leaves anything to be decided."""
+    """Return True if a problem leaves anything to decide."""
     return bool(problem.decisions or problem.phasing)
 
 
 def is_local(problem: Problem) -> bool:
-    """Whether its optimum may be one of many, and is searched for."""
+    """Return True if the optimum may be one of many, and is searched for."""
     return is_open(problem) and not is_convex(problem)
 
 
 def effort(problem: Problem) -> tuple[bool, int]:
-    """By which problems rank in how long their trade takes: those searched for above others, then by what is open."""
+    """Return a sort key for the duration of a trade: searches last, then by the number of decisions."""
     return is_local(problem), len(problem.decisions)
 
 
 class _Decided:
-    """What the reference decides, and each fidelity from there (F14).
+    """Designs of the reference and of each fidelity, which start from it (F14).
 
     Attributes
     ----------
@@ -211,7 +211,7 @@ class _Decided:
             self.of(engine)
 
     def of(self, engine: Engine) -> tuple[float, float]:
-        """Reference objective of a design, and by what share it is beyond a limit."""
+        """Return the reference objective of a design, and its largest relative violation of a limit."""
         problem = self._problem
         final = reference(problem, engine)
         value, excess = objective_value(problem, final), final.excess(problem.limits)
@@ -220,34 +220,34 @@ class _Decided:
             self.least = 0.0 if value <= numerical_zero(problem, engine) else value
         return value, excess
 
-    def by(self, own: Problem) -> Engine | None:
-        """The design that a fidelity decides; None where it finds none within the limits."""
+    def by(self, variant: Problem) -> Engine | None:
+        """Return the design that a fidelity decides; None if it finds none within the limits."""
         # choices about modes of open mounts would change with them, and time decides nothing
-        own = own.at(replace(own.fidelity, tolerance=None))
+        variant = variant.at(replace(variant.fidelity, tolerance=None))
         with working_on(SERIAL), suppress(SolverError, ModelError):
-            if is_convex(own):
-                return by_cones(own)
-            return None if self._known is None else next_to(own, self._known)
+            if is_convex(variant):
+                return by_cones(variant)
+            return None if self._known is None else next_to(variant, self._known)
         return None
 
     def regretted(self, row: Row) -> Row:
-        """A row with its regret, once all designs are known."""
+        """Return a row with its regret; call it after all designs are known."""
         return replace(row, regret=row.optimum / self.least - 1.0) if self.least > 0.0 else row
 
 
-def _row(name: str, own: Problem, scale: Scale, decided: _Decided) -> Row:
-    """What is measured of a fidelity; its regret comes when the best of all designs is known."""
-    evaluation, truth = evaluate(own), decided.given
-    value = objective_value(own, evaluation)
-    prepared, gradient = _prepared_times(own)
+def _row(name: str, variant: Problem, scale: Scale, decided: _Decided) -> Row:
+    """Measure a fidelity, all but its regret."""
+    evaluation, truth = evaluate(variant), decided.given
+    value = objective_value(variant, evaluation)
+    prepared, gradient = _prepared_times(variant)
     solve_time = optimum = excess = math.nan
-    if is_open(own) and own.fidelity.mounts != "time":
+    if is_open(variant) and variant.fidelity.mounts != "time":
         started = time.process_time()
-        engine = decided.by(own)
+        engine = decided.by(variant)
         if engine is not None:
             solve_time = time.process_time() - started
             optimum, excess = decided.of(engine)
-    fresh = seconds(lambda: _from_nothing(own))
+    fresh = seconds(lambda: _from_nothing(variant))
     return Row(
         name=name,
         error=abs(value - truth) / truth if truth > 0.0 else 0.0,
@@ -257,30 +257,28 @@ def _row(name: str, own: Problem, scale: Scale, decided: _Decided) -> Row:
         gradient=gradient,
         solve=solve_time,
         fresh=fresh,
-        memory=_memory(lambda: _from_nothing(own)),
+        memory=_memory(lambda: _from_nothing(variant)),
         optimum=optimum,
         excess=excess,
     )
 
 
-def _from_nothing(own: Problem) -> float:
+def _from_nothing(variant: Problem) -> float:
     forget()
-    return objective_value(own, evaluate(own))
+    return objective_value(variant, evaluate(variant))
 
 
-def _prepared_times(own: Problem) -> tuple[float, float]:
-    """Seconds of another design and of its gradient; NaN where loads are not asked or not linear."""
-    if not own.load_terms or own.fidelity.mounts == "time":
+def _prepared_times(variant: Problem) -> tuple[float, float]:
+    if not variant.load_terms or variant.fidelity.mounts == "time":
         return math.nan, math.nan
-    model = AffineModel(own)
+    model = AffineModel(variant)
     affine = model.at(model.full_samples)
     x = affine.start
-    gradient = seconds(lambda: _value_and_gradient(affine.terms, x)) if own.unbalances else math.nan
+    gradient = seconds(lambda: _value_and_gradient(affine.terms, x)) if variant.unbalances else math.nan
     return seconds(lambda: affine.objective(x)), gradient
 
 
 def _value_and_gradient(terms: tuple[tuple[float, AffineNorm], ...], x: Array) -> tuple[float, Array]:
-    """Objective and a subgradient of it: B^T Z at the rows' own directions (P2)."""
     value, gradient = 0.0, np.zeros(len(x))
     for weight, norm in terms:
         rows = norm.rows(x)
@@ -291,12 +289,12 @@ def _value_and_gradient(terms: tuple[tuple[float, AffineNorm], ...], x: Array) -
 
 
 def _price_of_time(problem: Problem) -> TimeDomain | None:
-    """Elastic mounts by integration beside the frequency domain, at the first operating point."""
+    """Compare integration in time with the frequency domain, at the first operating point."""
     if problem.engine.block is None or not mounting_in(problem.engine).dynamic.has_law:
         return None
     point, mounting = problem.points[0], mounting_in(problem.engine)
     wrench = shaking_loads(problem.engine, point, Fidelity(samples=TIME_SAMPLES, orders=TIME_ORDERS))
-    found, same, own = (
+    in_time, viscous, hysteretic = (
         forces.sample(TIME_SAMPLES)
         for forces in (
             TimeMounting(mounting, TIME_SAMPLES).forces(wrench, point.speed),
@@ -304,12 +302,12 @@ def _price_of_time(problem: Problem) -> TimeDomain | None:
             mounting.forces(wrench, point.speed),
         )
     )
-    peak = float(np.abs(same).max())
-    return TimeDomain(point.name, *(float(np.abs(found - other).max()) / peak for other in (same, own)))
+    peak = float(np.abs(viscous).max())
+    return TimeDomain(point.name, *(float(np.abs(in_time - other).max()) / peak for other in (viscous, hysteretic)))
 
 
 def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:
-    """A flywheel that leaves the speed some 2 % uneven, and what that changes of the objective."""
+    """Return the inertia that leaves 2 % speed variation, and the change of the objective that it causes."""
     reciprocating = sum(p.reciprocating_mass * p.crank_radius**2 for p in problem.engine.slider_cranks)
     inertia = 30.0 * max(reciprocating, 1e-12)
     for _ in range(12):
@@ -329,7 +327,7 @@ def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:
 
 
 def seconds(work: Callable[[], object]) -> float:
-    """Least time of one call, of as many as fit into a moment."""
+    """Return the shortest time of a call [s]."""
     times: list[float] = []
     while sum(times) < _LONG and (len(times) <= 3 or (sum(times) < _LEAST_TIME and len(times) <= _MOST_REPEATS)):
         started = time.perf_counter()

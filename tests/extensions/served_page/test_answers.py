@@ -13,7 +13,7 @@ import pytest
 import laufruhe
 from laufruhe.extensions.served_page import answers
 from laufruhe.extensions.served_page.answers import Source
-from laufruhe.extensions.served_page.asked import Asked, Edit
+from laufruhe.extensions.served_page.page_state import Edit, PageState
 from laufruhe.files.complaints import Refused
 from laufruhe.files.reader import load, tables_of
 from laufruhe.solvers.result import Status
@@ -30,11 +30,11 @@ def source(path: Path) -> Source:
 
 
 def follow(path: Path, **state: Any) -> dict[str, Any]:
-    return json.loads(answers.follow(source(path), Asked(**state)))  # type: ignore[no-any-return]
+    return json.loads(answers.follow(source(path), PageState(**state)))  # type: ignore[no-any-return]
 
 
 def settle(path: Path, **state: Any) -> dict[str, Any]:
-    return json.loads(answers.settle(source(path), Asked(**state), 600.0))  # type: ignore[no-any-return]
+    return json.loads(answers.settle(source(path), PageState(**state), 600.0))  # type: ignore[no-any-return]
 
 
 @pytest.fixture(scope="module")
@@ -104,14 +104,14 @@ def test_limits_that_contradict_each_other_are_named() -> None:
     of = Source(tables, LANCHESTER)
     edits = (Edit("set", "constraints.1.max", "0.05 kg"),)
     for found in (
-        json.loads(answers.follow(of, Asked(edits))),
-        json.loads(answers.settle(of, Asked(edits), 600.0)),
+        json.loads(answers.follow(of, PageState(edits))),
+        json.loads(answers.settle(of, PageState(edits), 600.0)),
     ):
         assert found["design"] is None
         assert found["claim"]["kind"] == "no design"
         assert sorted(found["conflict"]) == ["balancer mass", "maximum mount force"]
         assert len(found["limits"]) == 2
-    assert json.loads(answers.follow(of, Asked()))["design"] is not None
+    assert json.loads(answers.follow(of, PageState()))["design"] is not None
 
 
 @pytest.mark.parametrize(
@@ -149,15 +149,15 @@ def test_numbers_that_were_not_offered_are_refused(name: str) -> None:
 )  # fmt: skip
 def test_what_no_page_asks_is_refused(given: object) -> None:
     with pytest.raises(Refused):
-        Asked.of(given)
+        PageState.from_json(given)
 
 
 def test_what_a_page_asks_is_read() -> None:
     given = {"edits": [["set", "a", "1 kg"]], "held": [["star", "star", {"throws": [0, 180]}]], "design": {"b": 2}}
-    asked = Asked.of(given)
-    assert asked.edits == (Edit("set", "a", "1 kg"),)
-    assert asked.held[0].value == {"throws": [0, 180]}
-    assert asked.design == {"b": 2.0}
+    state = PageState.from_json(given)
+    assert state.edits == (Edit("set", "a", "1 kg"),)
+    assert state.held[0].value == {"throws": [0, 180]}
+    assert state.design == {"b": 2.0}
 
 
 @pytest.mark.slow
@@ -180,25 +180,25 @@ def test_a_crank_is_ranked_held_and_chosen() -> None:
 def test_a_given_crank_may_be_opened() -> None:
     problem = load(LANCHESTER)
     assert problem.phasing is None
-    asked = Asked(edits=(Edit("open crank", "crank", 1),))
-    tables = asked.tables(source(LANCHESTER).tables, with_held=True)
+    state = PageState(edits=(Edit("open crank", "crank", 1),))
+    tables = state.tables(source(LANCHESTER).tables, with_held=True)
     assert load(tables).phasing is not None
 
 
 @pytest.mark.slow
 def test_pictures_are_those_of_what_was_solved_last() -> None:
-    asked = Asked(edits=(TIGHT,))
-    settle(LANCHESTER, edits=asked.edits)
-    first = json.loads(answers.picture(source(LANCHESTER), asked, 0))
+    state = PageState(edits=(TIGHT,))
+    settle(LANCHESTER, edits=state.edits)
+    first = json.loads(answers.picture(source(LANCHESTER), state, 0))
     assert first["name"] == "engine"
     assert first["image"].startswith("data:image/svg+xml;base64,")
-    assert json.loads(answers.picture(source(LANCHESTER), asked, first["of"])) == {"done": True}
-    assert json.loads(answers.picture(source(LANCHESTER), Asked(), 0)) == {"done": True}
+    assert json.loads(answers.picture(source(LANCHESTER), state, first["of"])) == {"done": True}
+    assert json.loads(answers.picture(source(LANCHESTER), PageState(), 0)) == {"done": True}
 
 
 def test_the_state_is_saved_as_a_problem_that_evaluates_alike(tight: dict[str, Any], tmp_path: Path) -> None:
-    asked = Asked(edits=(TIGHT,), design=tight["design"])
-    told = json.loads(answers.save(source(LANCHESTER), asked))
+    state = PageState(edits=(TIGHT,), design=tight["design"])
+    told = json.loads(answers.save(source(LANCHESTER), state))
     path = tmp_path / told["file"]
     path.write_text(told["toml"], encoding="utf-8")
     found = laufruhe.evaluate(path)
@@ -210,7 +210,7 @@ def test_the_state_is_saved_as_a_problem_that_evaluates_alike(tight: dict[str, A
 
 
 def test_a_front_comes_as_a_whole_first_and_no_point_is_dominated() -> None:
-    points = [json.loads(answers.front(source(LANCHESTER), Asked(), "balancer mass", k)) for k in range(9)]
+    points = [json.loads(answers.front(source(LANCHESTER), PageState(), "balancer mass", k)) for k in range(9)]
     by_mass = sorted(points, key=lambda point: point["across"])
     assert {by_mass[0]["across"], by_mass[-1]["across"]} == {point["across"] for point in points[:2]}
     values = [point["value"] for point in by_mass]
@@ -220,12 +220,12 @@ def test_a_front_comes_as_a_whole_first_and_no_point_is_dominated() -> None:
     # the optimum under a limit is on the front of that limit
     found = follow(LANCHESTER, edits=(Edit("set", "constraints.1.max", f"{by_mass[4]['across']!r} kg"),))
     assert found["claim"]["value"] == pytest.approx(by_mass[4]["value"], rel=1e-4)
-    assert "is no measure" in json.loads(answers.front(source(LANCHESTER), Asked(), "beauty", 0))["error"]
+    assert "is no measure" in json.loads(answers.front(source(LANCHESTER), PageState(), "beauty", 0))["error"]
 
 
 def test_a_front_of_a_simpler_problem_has_no_bound() -> None:
     path = PROBLEMS / "tractor-four-elastic.toml"
-    point = json.loads(answers.front(source(path), Asked(), "balancer mass", 0))
+    point = json.loads(answers.front(source(path), PageState(), "balancer mass", 0))
     assert point["bound"] is None
     assert point["simpler"] == " for these mounts"
     assert "no design" not in point["words"]
@@ -233,16 +233,16 @@ def test_a_front_of_a_simpler_problem_has_no_bound() -> None:
 
 def test_files_that_a_problem_names_are_part_of_its_state() -> None:
     first, other = (replace(source(LANCHESTER), content=content) for content in ("a", "b"))
-    keys = [json.loads(answers.follow(of, Asked(has="later")))["key"] for of in (first, other, first)]
+    keys = [json.loads(answers.follow(of, PageState(has="later")))["key"] for of in (first, other, first)]
     assert keys[0] == keys[2] != keys[1]
 
 
 @pytest.mark.slow
 def test_pictures_of_other_files_are_not_shown() -> None:
     first = replace(source(LANCHESTER), content="a")
-    answers.settle(first, Asked(), 600.0)
-    assert json.loads(answers.picture(first, Asked(), 0))["name"] == "engine"
-    assert json.loads(answers.picture(replace(first, content="b"), Asked(), 0)) == {"done": True}
+    answers.settle(first, PageState(), 600.0)
+    assert json.loads(answers.picture(first, PageState(), 0))["name"] == "engine"
+    assert json.loads(answers.picture(replace(first, content="b"), PageState(), 0)) == {"done": True}
 
 
 @pytest.mark.slow

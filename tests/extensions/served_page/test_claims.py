@@ -10,8 +10,8 @@ import pytest
 
 from laufruhe.extensions.served_page import answers, scenes
 from laufruhe.extensions.served_page.answers import Source
-from laufruhe.extensions.served_page.asked import Asked, Edit
 from laufruhe.extensions.served_page.claims import Simpler, conflict_claim, is_broken
+from laufruhe.extensions.served_page.page_state import Edit, PageState
 from laufruhe.files.reader import load, tables_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.solvers.values import LimitValue
@@ -24,12 +24,12 @@ STRONG = ("optimum", "no design", "proven", "gap", "bound", "least")
 
 
 def follow(path: Path, *edits: Edit, held: tuple[Edit, ...] = (), position: int = 0) -> dict[str, Any]:
-    asked = Asked(edits, held, has="later", position=position)
-    return json.loads(answers.follow(Source(tables_of(path), path), asked))  # type: ignore[no-any-return]
+    state = PageState(edits, held, has="later", position=position)
+    return json.loads(answers.follow(Source(tables_of(path), path), state))  # type: ignore[no-any-return]
 
 
 def settle(path: Path, *edits: Edit) -> dict[str, Any]:
-    return json.loads(answers.settle(Source(tables_of(path), path), Asked(edits), 600.0))  # type: ignore[no-any-return]
+    return json.loads(answers.settle(Source(tables_of(path), path), PageState(edits), 600.0))  # type: ignore[no-any-return]
 
 
 def text_of(claim: dict[str, Any]) -> str:
@@ -42,7 +42,7 @@ def is_modest(claim: dict[str, Any]) -> bool:
 
 def exact(path: Path, design: dict[str, float], *edits: Edit) -> float:
     """Objective of a design by the exact model."""
-    found = json.loads(answers.measure(Source(tables_of(path), path), Asked(edits, design=design)))
+    found = json.loads(answers.measure(Source(tables_of(path), path), PageState(edits, design=design)))
     return float(found["objective"])
 
 
@@ -146,7 +146,7 @@ def test_limits_on_numbers_that_wait_are_named_and_measured() -> None:
 def test_a_claim_carries_the_position_of_the_settings_that_it_is_about() -> None:
     path = PROBLEMS / "tractor-four-lanchester.toml"
     assert follow(path, position=41)["claim"]["position"] == 41
-    found = json.loads(answers.settle(Source(tables_of(path), path), Asked(position=42), 600.0))
+    found = json.loads(answers.settle(Source(tables_of(path), path), PageState(position=42), 600.0))
     assert found["claim"]["position"] == 42
 
 
@@ -185,7 +185,7 @@ def test_no_ready_problem_claims_more_than_an_estimate_while_it_is_followed() ->
         tables = tables_of(path)
         if "study" in tables:
             continue
-        found = json.loads(answers.follow(Source(tables, path), Asked(has="later")))
+        found = json.loads(answers.follow(Source(tables, path), PageState(has="later")))
         claim = found["claim"]
         assert not claim["is_last"], path.stem
         if claim["kind"] != "no design":
@@ -199,8 +199,8 @@ def test_no_ready_problem_claims_more_than_an_estimate_while_it_is_followed() ->
 
 def test_the_exact_model_is_asked_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The value, all limits and the drawing of a design come from one evaluation."""
-    asked = []
-    monkeypatch.setattr(scenes, "evaluate", lambda *given: asked.append(given) or evaluate(*given))
+    state = []
+    monkeypatch.setattr(scenes, "evaluate", lambda *given: state.append(given) or evaluate(*given))
     path = INPUTS / "few-angles-below-any-design.toml"
-    json.loads(answers.follow(Source(tables_of(path), path), Asked()))
-    assert len(asked) == 1
+    json.loads(answers.follow(Source(tables_of(path), path), PageState()))
+    assert len(state) == 1

@@ -122,32 +122,32 @@ class Economics(Part):
         return self
 
     def settings(self) -> dict[str, Any]:
-        """Of a front, the masses alone: names and claims change nothing in it."""
+        """Return the mass limits and the kind of load; names and claims change no front."""
         return {"kind": self.kind, "mass_limits": self.mass_limits, "alternating": self.alternating}
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """The plain engine, every build, and every engine with more cylinders rebuilt at equal power."""
+        """Return the plain engine, every build, and every engine with more cylinders at equal power."""
         base = self.cases[0]
-        whole = scenes.problem(Point(base))
-        if not shafts_of(whole):
+        reference = scenes.problem(Point(base))
+        if not shafts_of(reference):
             raise scenes.refused(base, "balancer_shafts", "is missing, so no shafts can be weighed", "add them")
         points = [Point(base, shafts=())]
         points += [self._build(build, scenes) for build in self.builds]
-        points += [_rebuilt(case, whole, scenes) for case in self.more_cylinders]
+        points += [_rebuilt(case, reference, scenes) for case in self.more_cylinders]
         _check_objectives(points, scenes)
         return points
 
     def _build(self, build: BuildTable, scenes: Scenes) -> Point:
         case = next((case for case in self.cases if case.name == build.case), self.cases[0])
-        own = shafts_of(scenes.problem(Point(case)))
+        names = shafts_of(scenes.problem(Point(case)))
         for shaft in build.shafts:
-            if shaft not in own:
+            if shaft not in names:
                 rule = f"has no shaft '{shaft}', which '{build.name}' builds"
-                raise scenes.refused(case, "balancer_shafts", rule, nearest(shaft, own))
+                raise scenes.refused(case, "balancer_shafts", rule, nearest(shaft, names))
         return Point(case, shafts=tuple(build.shafts))
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """The front of one engine."""
+        """Return the front of one engine."""
         problem = scenes.problem(point)
         problem = with_alternating_loads(problem) if self.alternating else problem
         try:
@@ -158,7 +158,7 @@ class Economics(Part):
         return {**of, "shafts": len(shafts_of(problem)), "cylinders": len(problem.engine.cylinders), "points": points}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:  # noqa: ARG002
-        """Fronts side by side, the plain engine first, with what is claimed of each."""
+        """Return fronts side by side, the plain engine first, with the claims about each."""
         following = [case.name for case in self.more_cylinders]
         names = [PLAIN, *(build.name for build in self.builds), *following]
         claims = [NO_CLAIM, *(build.claim or NO_CLAIM for build in self.builds), *(NO_CLAIM for _ in following)]
@@ -187,7 +187,7 @@ class Economics(Part):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Every engine at its optimum, what is worth building, what was said, and the front."""
+        """Return every engine at its optimum, the judgements, the source's statements and the front."""
         judged = {worth.build: worth for worth in worths(data)}
         unit, plain = data["optimum"].attrs["units"], float(data["optimum"].isel(build=0))
         head = ["engine", "shafts", "mass on them [kg]", f"{data.attrs['objective']} [{unit}]", f"lower bound [{unit}]",
@@ -209,7 +209,7 @@ class Economics(Part):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """A front for every set of shafts, and the engines without any beside them."""
+        """Draw a front for every set of shafts, and the engines without shafts."""
         built = _with_shafts(data)
         colours = dict(zip(built, _SERIES * (1 + len(built) // len(_SERIES)), strict=False))
         ends = (1.3 * float(data["optimum_mass"].max()) or 1.0, 1.06 * float(data["optimum"].max()))
@@ -228,25 +228,25 @@ class Economics(Part):
         return p.Picture(data.attrs["title"], words, [fronts], credit, (7.2, 4.6), legend=legend)
 
 
-def _rebuilt(case: CaseTable, whole: Problem, scenes: Scenes) -> Point:
-    """An engine with more cylinders, at the power of the whole one."""
-    given = scenes.problem(Point(case))
-    cylinders = len(whole.engine.slider_cranks)
-    if shafts_of(given):
+def _rebuilt(case: CaseTable, reference: Problem, scenes: Scenes) -> Point:
+    """Return the point of an engine with more cylinders, at the power of the whole one."""
+    problem = scenes.problem(Point(case))
+    cylinders = len(reference.engine.slider_cranks)
+    if shafts_of(problem):
         rule = f"is there, and '{case.name}' is compared without"
         raise scenes.refused(case, "balancer_shafts", rule, 'add without = ["balancer_shafts"] to its case')
-    if len(given.engine.slider_cranks) <= cylinders:
+    if len(problem.engine.slider_cranks) <= cylinders:
         rule = f"has no more cylinders in '{case.name}' than the {cylinders} that it is compared with"
         raise scenes.refused(case, "engine", rule, "name an engine with more")
     with scenes.blamed(Point(case), "more_cylinders"):
-        check_comparable(given, whole)
+        check_comparable(problem, reference)
     return Point(case.model_copy(update={"equal_power_to": cylinders}), shafts=())
 
 
 def check_comparable(problem: Problem, reference: Problem) -> None:
-    """Raise `ModelError` where the number of cylinders does not tell the reference's power (eqs. 14-17)."""
-    own, other = _power_of(problem), _power_of(reference)
-    differ = [what for what in own if own[what] != other[what]]
+    """Raise `ModelError` if engines differ in more than the number of cylinders (eqs. 14-17)."""
+    first, second = _power_of(problem), _power_of(reference)
+    differ = [what for what in first if first[what] != second[what]]
     if differ:
         raise ModelError(
             f"'{problem.name}' and '{reference.name}' differ in {' and '.join(differ)}, so their numbers of cylinders "
@@ -266,7 +266,7 @@ def _power_of(problem: Problem) -> dict[str, object]:
 
 
 def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
-    asked: dict[str, Point] = {}
+    objectives: dict[str, Point] = {}
     for point in points:
         problem = scenes.problem(point)
         scenes.refuse_open_phasing(problem, point.case)
@@ -275,15 +275,15 @@ def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
             rule = f"is {problem.objective_name}, which is no load" if problem.objective_name else "is missing"
             remedy = "minimise a load, such as mean mount force"
             raise scenes.refused(point.case, "objective", f"{rule}, so shafts have nothing to lower", remedy)
-        asked.setdefault(str(objective), point)
-    if len(asked) > 1:
-        first, second = list(asked.values())[:2]
+        objectives.setdefault(str(objective), point)
+    if len(objectives) > 1:
+        first, second = list(objectives.values())[:2]
         rule = f"differs between '{first.case.name}' and '{second.case.name}'"
         raise scenes.refused(second.case, "objective", rule, "give all engines the same")
 
 
 def _efficient(data: xr.Dataset) -> tuple[tuple[str, str], np.ndarray, dict[str, str]]:
-    """Points of the front over all builds: none has less force for no more shafts and no more mass."""
+    """Mark the points of the common front: no other has less force with no more shafts and mass."""
     force, shafts = data["force"].values, data["shafts"].values
     same = data["standing"].values != NEXT
     on_front = np.zeros(force.shape, dtype=bool)
@@ -300,7 +300,6 @@ def _with_shafts(data: xr.Dataset) -> list[str]:
 
 
 def _front_rows(data: xr.Dataset) -> list[Text]:
-    """Least force by mass allowed, efficient points in bold."""
     built = _with_shafts(data)
     rows = []
     for limit, here in data.sel(build=built).groupby("mass_limit"):
@@ -312,16 +311,16 @@ def _front_rows(data: xr.Dataset) -> list[Text]:
 
 
 def _lines(data: xr.Dataset, colours: Mapping[str, p.Colour]) -> list[p.Mark]:
-    """A front each; lines that run together show one beside the other."""
+    """Return the fronts as lines of decreasing width, so that overlapping ones stay visible."""
     limits = data["mass_limit"].values
     marks: list[p.Mark] = []
     for k, (name, colour) in enumerate(colours.items()):
         row = data.sel(build=name)
         mass, force = float(row["optimum_mass"]), float(row["optimum"])
-        shown = limits < mass
-        x, y = limits[shown], row["force"].values[shown]
+        below = limits < mass
+        x, y = limits[below], row["force"].values[below]
         marks.append(p.Line(np.append(x, mass), np.append(y, force), colour, width=max(4.2 - 0.9 * k, 1.2)))
-        best = row["efficient"].values[shown]
+        best = row["efficient"].values[below]
         marks.append(p.Line(x[best], y[best], colour, width=0.0, marker="o", size=4.0))
         marks.append(p.Line(x[~best], y[~best], colour, width=0.0, marker="o", size=4.0, hollow=True))
         marks.append(p.Line([mass], [force], colour, width=0.0, marker="D"))
@@ -329,13 +328,13 @@ def _lines(data: xr.Dataset, colours: Mapping[str, p.Colour]) -> list[p.Mark]:
 
 
 def _levels(data: xr.Dataset, right: float, high: float) -> list[p.Mark]:
-    """Engines without shafts: grey, and dashed where they have more cylinders."""
+    """Return engines without shafts as levels: grey, dashed with more cylinders."""
     dashes = iter(p.DASHES * 4)
     top, marks = math.inf, list[p.Mark]()
-    bare = data.isel(build=np.flatnonzero(data["shafts"].values == 0)).sortby("optimum", ascending=False)
-    for name in bare["build"].values:
-        force = float(bare["optimum"].sel(build=name))
-        more = str(bare["standing"].sel(build=name).item()) == NEXT
+    engines = data.isel(build=np.flatnonzero(data["shafts"].values == 0)).sortby("optimum", ascending=False)
+    for name in engines["build"].values:
+        force = float(engines["optimum"].sel(build=name))
+        more = str(engines["standing"].sel(build=name).item()) == NEXT
         dash, colour = (next(dashes), "ink") if more else ((), "before")
         marks.append(p.Line([0.0, right], [force, force], colour, dash=dash, width=1.2, behind=True))
         # names of levels close together stand one under the other

@@ -49,7 +49,7 @@ _ALLOWED = f"{100.0 * PRINTED_FALL:.0f} points are allowed: what the unprinted r
 
 
 class FrontPoint(NamedTuple):
-    """The least objective under a limit on the mass of the shafts, what no design within it falls below, and the gap.
+    """Least objective under a limit on the shaft mass, its lower bound and gap.
 
     Mass used on the shafts [kg], and the fall of the objective per kilogram more [SI / kg]; that is zero where the
     limit does not bind, and at no mass at all, where the solver's price has nothing to vary. The counterpart is the
@@ -65,12 +65,12 @@ class FrontPoint(NamedTuple):
 
 
 def best(problem: Problem, mass_limit: float = math.inf) -> FrontPoint:
-    """The proven optimum under a limit on the mass of the balancer shafts [kg]; `SolverError` where there is none."""
-    asked = shafts_of(problem) and math.isfinite(mass_limit)
-    limits = (*problem.limits, Limit(LIMIT_NAME, MASS_ON_SHAFTS, mass_limit)) if asked else problem.limits
+    """Return the proven optimum under a limit on the balancer mass [kg]; `SolverError` without a design."""
+    is_limited = shafts_of(problem) and math.isfinite(mass_limit)
+    limits = (*problem.limits, Limit(LIMIT_NAME, MASS_ON_SHAFTS, mass_limit)) if is_limited else problem.limits
     result = solve(replace(problem, limits=limits))
     if result.objective is None or result.status not in ("optimal", "feasible"):
-        within = f" with {mass_limit:g} kg on the shafts" if asked else ""
+        within = f" with {mass_limit:g} kg on the shafts" if is_limited else ""
         raise SolverError(f"'{problem.name}' has no design{within}: {result.message or result.status}")
     value, proof = result.objective.value, result.certificate
     mass = result.final.value(MASS_ON_SHAFTS) if shafts_of(problem) else 0.0
@@ -82,7 +82,7 @@ def best(problem: Problem, mass_limit: float = math.inf) -> FrontPoint:
 
 
 def front(problem: Problem, mass_limits: Sequence[float]) -> list[FrontPoint]:
-    """Least objective under each limit on the mass of the shafts [kg], and last whatever they weigh.
+    """Return the least objective under each limit on the shaft mass [kg], and last without a limit.
 
     A limit that the free optimum keeps changes nothing, so it is not solved for.
     """
@@ -92,7 +92,7 @@ def front(problem: Problem, mass_limits: Sequence[float]) -> list[FrontPoint]:
 
 @dataclass(frozen=True)
 class Worth:
-    """What one set of shafts does, and whether and why it is worth building (W3).
+    """Effect of one set of shafts, and the judgement by W3.
 
     Shares that it takes off the plain engine's force, and off the least of any smaller number of
     shafts; its force over that of the first plain engine with more cylinders at equal power.
@@ -107,7 +107,7 @@ class Worth:
 
 
 class _Engine(NamedTuple):
-    """One engine of an economics dataset: shafts, least force at its optimum, and what no design falls below."""
+    """One engine of an economics dataset: shafts, least force and its lower bound."""
 
     name: str
     standing: str
@@ -123,60 +123,60 @@ def _engines(data: xr.Dataset) -> dict[str, _Engine]:
 
 
 def worths(data: xr.Dataset) -> tuple[Worth, ...]:
-    """Every set of shafts of an economics dataset, judged by W3."""
+    """Judge every set of shafts of an economics dataset by W3."""
     engines = _engines(data)
     return tuple(_worth(engines, one) for one in engines.values() if one.standing == SHAFTS and one.shafts)
 
 
-def _worth(engines: Mapping[str, _Engine], own: _Engine) -> Worth:
+def _worth(engines: Mapping[str, _Engine], engine: _Engine) -> Worth:
     plain, next_one = (next(e for e in engines.values() if e.standing == standing) for standing in (PLAIN, NEXT))
-    fewer = min(e.force for e in engines.values() if e.standing != NEXT and e.shafts < own.shafts)
+    fewer = min(e.force for e in engines.values() if e.standing != NEXT and e.shafts < engine.shafts)
     following = next_one.name
-    further, beside = 1.0 - own.force / fewer, own.force / next_one.force
+    further, ratio = 1.0 - engine.force / fewer, engine.force / next_one.force
     if further < 0.0:
         why = f"fewer shafts do better: {percent(-further)} beside the best of them"
     elif further < NOTICEABLE:
         size = "negligible" if further < NEGLIGIBLE else "slight"
         why = f"{size}: {percent(-further)} beside the best with fewer shafts"
-    elif beside > 1.0 + NEGLIGIBLE:
-        why = f"{following} without shafts run smoother: {percent(1.0 / beside - 1.0)}"
-    elif beside >= 1.0 - NEGLIGIBLE:
-        why = f"{following} without shafts run as smoothly: {percent(1.0 / beside - 1.0)}"
+    elif ratio > 1.0 + NEGLIGIBLE:
+        why = f"{following} without shafts run smoother: {percent(1.0 / ratio - 1.0)}"
+    elif ratio >= 1.0 - NEGLIGIBLE:
+        why = f"{following} without shafts run as smoothly: {percent(1.0 / ratio - 1.0)}"
     else:
-        why = f"{percent(-further)}, and {percent(beside - 1.0)} beside {following} without shafts"
-    worth = further >= NOTICEABLE and beside < 1.0 - NEGLIGIBLE
-    return Worth(own.name, 1.0 - own.force / plain.force, further, beside, worth, why)
+        why = f"{percent(-further)}, and {percent(ratio - 1.0)} beside {following} without shafts"
+    worth = further >= NOTICEABLE and ratio < 1.0 - NEGLIGIBLE
+    return Worth(engine.name, 1.0 - engine.force / plain.force, further, ratio, worth, why)
 
 
 def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
-    """What the source says of each build, confirmed or not, by the name of the build."""
-    found: dict[str, tuple[Verdict, ...]] = {}
+    """Return the verdicts on the source's claims, by build."""
+    by_build: dict[str, tuple[Verdict, ...]] = {}
     engines = _engines(data)
     for name in engines:
         row = data.sel(build=name)
         says, falls, against, where = (row[f"claim{end}"].item() for end in ("", "ed_fall", "ed_against", "ed_where"))
         statement = f"{name}: beside {against}" + (f" ({where})" if where else "")
-        own: list[Verdict] = []
+        judged_: list[Verdict] = []
         fall = 1.0 - engines[name].force / engines[against].force
         if says:
             agrees, why = _judged(engines, engines[name], engines[against], says)
-            own.append(Verdict(statement, says, -100.0 * fall, "% of the force", agrees, why))
+            judged_.append(Verdict(statement, says, -100.0 * fall, "% of the force", agrees, why))
         if not np.isnan(falls):
-            agrees, said = abs(fall - falls) <= PRINTED_FALL, f"{-100.0 * falls:.0f} %"
-            own.append(Verdict(statement, said, -100.0 * fall, "% of the force", agrees, _ALLOWED))
-        if own:
-            found[name] = tuple(own)
-    return found
+            agrees, claim = abs(fall - falls) <= PRINTED_FALL, f"{-100.0 * falls:.0f} %"
+            judged_.append(Verdict(statement, claim, -100.0 * fall, "% of the force", agrees, _ALLOWED))
+        if judged_:
+            by_build[name] = tuple(judged_)
+    return by_build
 
 
-def _judged(engines: Mapping[str, _Engine], own: _Engine, against: _Engine, says: str) -> tuple[bool, str]:
-    """Whether a judgement holds, and by which rule."""
+def _judged(engines: Mapping[str, _Engine], engine: _Engine, against: _Engine, says: str) -> tuple[bool, str]:
+    """Return whether a judgement holds, and by which rule."""
     if says == "negligible":
-        most = 1.0 - own.bound / against.force
+        most = 1.0 - engine.bound / against.force
         return most < NEGLIGIBLE, f"W1: under {100.0 * NEGLIGIBLE:.0f} %; proven, none of these shafts does more"
     if says == "noticeable":
-        return 1.0 - own.force / against.force >= NOTICEABLE, f"W2: {100.0 * NOTICEABLE:.0f} % or more"
+        return 1.0 - engine.force / against.force >= NOTICEABLE, f"W2: {100.0 * NOTICEABLE:.0f} % or more"
     if says == "better":
-        return own.force < against.bound, "its force lies under the other's lower bound"
-    found = _worth(engines, own)
-    return found.worth == (says == "worth building"), f"W3: {found.why}"
+        return engine.force < against.bound, "its force lies under the other's lower bound"
+    judgement = _worth(engines, engine)
+    return judgement.worth == (says == "worth building"), f"W3: {judgement.why}"

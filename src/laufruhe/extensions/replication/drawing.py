@@ -26,9 +26,9 @@ Names = Mapping[str, Any]
 
 
 def drawn(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) -> Picture:
-    """A picture of what the names are worth in each reading of the source."""
+    """Return the picture of a table, evaluated in each reading of the source."""
     wide = Picture("", "", (), "", (table.size[0], table.size[1]), table.columns, table.gap).width
-    whole = sum(1 if panel.once else len(readings) for panel in table.panels)
+    count = sum(1 if panel.once else len(readings) for panel in table.panels)
     panels = [
         row
         for number, panel in enumerate(table.panels, 1)
@@ -41,14 +41,14 @@ def drawn(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) 
         panels,
         credit(data),
         # broken into rows, panels need less height each
-        size=(table.size[0], table.size[1] * (0.85 if len(panels) > whole else 1.0)),
+        size=(table.size[0], table.size[1] * (0.85 if len(panels) > count else 1.0)),
         columns=table.columns,
         gap=table.gap,
     )
 
 
 def _rows(panel: Panel, wide: float) -> list[Panel]:
-    """A panel whose bars have no room for their numbers, broken into rows of fewer groups in one scale."""
+    """Split a panel without room for the numbers on its bars into rows of one scale."""
     solid = [mark for mark in panel.marks if isinstance(mark, Bars) and not mark.hollow]
     others = [mark for mark in panel.marks if not isinstance(mark, Bars | Words)]
     if not solid or panel.x.ticks is None or others:
@@ -74,8 +74,8 @@ def _within(mark: Mark, row: range) -> Iterator[Mark]:
     if isinstance(mark, Words):
         yield from [mark] if row[0] - 0.5 < mark.x < row[-1] + 0.5 else []
     elif isinstance(mark, Bars):
-        kept = list(row)
-        yield replace(mark, places=np.asarray(mark.places)[kept], values=np.asarray(mark.values)[kept])
+        indices = list(row)
+        yield replace(mark, places=np.asarray(mark.places)[indices], values=np.asarray(mark.values)[indices])
 
 
 def _panel(panel: PanelTable, names: Names, reading: str, number: int) -> Panel:
@@ -112,38 +112,37 @@ def _axis(axis: AxisTable, names: Names) -> Axis:
     return Axis(axis.label, ends, ticks, tuple(axis.log), grid=labels is None)  # type: ignore[arg-type]
 
 
-def _each(given: Mapping[str, Sequence[Any]], names: Names) -> Iterator[dict[str, Any]]:
-    """Names with each of the values given for one of them."""
-    for name, values in given.items():
+def _each(values_by_name: Mapping[str, Sequence[Any]], names: Names) -> Iterator[dict[str, Any]]:
+    for name, values in values_by_name.items():
         yield from ({**names, name: value} for value in values)
-    if not given:
+    if not values_by_name:
         yield dict(names)
 
 
 def _curves(curve: CurveTable, names: Names) -> Iterator[Mark]:
-    for k, own in enumerate(_each(curve.each, names)):
+    for k, own_names in enumerate(_each(curve.each, names)):
         colour = curve.colours[k % len(curve.colours)]
-        y = value_of(curve.y, own)
+        y = value_of(curve.y, own_names)
         dims: tuple[str, ...] = getattr(y, "dims", ())
         if curve.x is None and not dims:
             raise ExpressionError(f"'{curve.y}' has no dimension to be drawn over; give x")
-        x = value_of(curve.x, {**own, **{dim: y[dim] for dim in dims}}) if curve.x is not None else y[dims[0]]
+        x = value_of(curve.x, {**own_names, **{dim: y[dim] for dim in dims}}) if curve.x is not None else y[dims[0]]
         xs, ys = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (x, y))
         xs, ys = np.broadcast_arrays(xs, ys)
-        yield Line(xs, ys, colour, filled(curve.label, own), curve.width, curve.dash, curve.marker)
+        yield Line(xs, ys, colour, filled(curve.label, own_names), curve.width, curve.dash, curve.marker)
         if curve.end:
-            yield Words(float(xs[-1]), float(ys[-1]), f" {filled(curve.end, own)}", colour)
+            yield Words(float(xs[-1]), float(ys[-1]), f" {filled(curve.end, own_names)}", colour)
 
 
 def _bars(bars: BarsTable, names: Names, end: float) -> Iterator[Mark]:
-    """Filled bars, the outlines around them, and the numbers of both."""
+    """Yield filled bars, their outlines, and the numbers of both."""
     series = list(_each(bars.each, names))
-    fills = [join(value_of(bars.filled, own)) for own in series]
-    outlines = [join(value_of(bars.outline, own)) for own in series] if bars.outline else fills
+    fills = [join(value_of(bars.filled, own_names)) for own_names in series]
+    outlines = [join(value_of(bars.outline, own_names)) for own_names in series] if bars.outline else fills
     top, width = max(max(values) for values in outlines), GROUP / len(series)
-    for k, (own, low, high) in enumerate(zip(series, fills, outlines, strict=True)):
+    for k, (own_names, low, high) in enumerate(zip(series, fills, outlines, strict=True)):
         places = np.arange(len(low)) + (k - 0.5 * (len(series) - 1)) * width
-        label = filled(bars.labels[k] if bars.labels else bars.label, own)
+        label = filled(bars.labels[k] if bars.labels else bars.label, own_names)
         colour = bars.colours[k % len(bars.colours)]
         yield Bars(places, low, 0.9 * width, colour, label)
         if bars.outline:

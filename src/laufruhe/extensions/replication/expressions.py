@@ -39,13 +39,13 @@ _SPEC = re.compile(r"[+#]{0,2}(\.\d)?[efg]")
 
 
 class ExpressionError(ModelError):
-    """An expression that means nothing here; says which, why, and what would."""
+    """An invalid expression; the message says why, and what would be valid."""
 
 
 def checks_in(
-    told: Any, known: Mapping[str, Sequence[Any]], cases: Collection[str], places: Sequence[str] = (), at: Place = ()
+    entry: Any, known: Mapping[str, Sequence[Any]], cases: Collection[str], places: Sequence[str] = (), at: Place = ()
 ) -> Iterator[tuple[Place, Any, Callable[[str], None]]]:
-    """Every text of a table that has expressions: where it stands, it, and the check of it before any name has a value.
+    """Yield every text with expressions in a table: its place, the text, and a function that checks it.
 
     Parameters
     ----------
@@ -54,19 +54,19 @@ def checks_in(
     places
         Dimensions, which the `x` of a curve knows too.
     """
-    if isinstance(told, Table):
-        own = {**known, **getattr(told, "each", {})}
-        for name, field in type(told).model_fields.items():
-            at_places = dict.fromkeys(places, ()) if isinstance(told, CurveTable) and name == "x" else {}
+    if isinstance(entry, Table):
+        known_here = {**known, **getattr(entry, "each", {})}
+        for name, field in type(entry).model_fields.items():
+            at_places = dict.fromkeys(places, ()) if isinstance(entry, CurveTable) and name == "x" else {}
             where = (*at, field.alias or name)
-            yield from checks_in(getattr(told, name), {**at_places, **own}, cases, places, where)
-    elif isinstance(told, list):
-        for k, one in enumerate(told):
+            yield from checks_in(getattr(entry, name), {**at_places, **known_here}, cases, places, where)
+    elif isinstance(entry, list):
+        for k, one in enumerate(entry):
             yield from checks_in(one, known, cases, places, (*at, k))
-    elif isinstance(told, str):
+    elif isinstance(entry, str):
         key = next(key for key in reversed(at) if isinstance(key, str))
         checked = partial(check, known=known, cases=cases)
-        yield at, told, checked if key in EXPRESSIONS else partial(_check_braces, check=checked)
+        yield at, entry, checked if key in EXPRESSIONS else partial(_check_braces, check=checked)
 
 
 def _check_braces(text: str, check: Callable[[str], None]) -> None:
@@ -76,7 +76,7 @@ def _check_braces(text: str, check: Callable[[str], None]) -> None:
 
 
 def check(text: str, known: Mapping[str, Sequence[Any]], cases: Collection[str]) -> None:
-    """Whether an expression could have a value, before any name has one.
+    """Check an expression before any name has a value.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def check(text: str, known: Mapping[str, Sequence[Any]], cases: Collection[str])
 
 
 def check_among(name: str, known: Collection[str], what: str) -> None:
-    """Whether a name is one of those that there are.
+    """Check that a name exists.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def check_among(name: str, known: Collection[str], what: str) -> None:
 
 
 def value_of(text: Any, names: Mapping[str, Any]) -> Any:
-    """What an expression is worth; what is no text is worth itself.
+    """Evaluate an expression; a value that is no text is returned as it is.
 
     Raises
     ------
@@ -133,13 +133,13 @@ def value_of(text: Any, names: Mapping[str, Any]) -> Any:
 
 @cache
 def _read(text: str) -> tuple[tuple[ast.AST, ...], CodeType]:
-    """All parts of an expression, each of which is allowed, and what Python evaluates."""
+    """Return the allowed nodes of an expression, and its compiled code."""
     if len(text) > MOST_LETTERS:
         raise ExpressionError(f"an expression of {len(text)} letters is too long; split it under define")
     try:
         # Python warns of 1[0], which has no value anyway
         with warnings.catch_warnings(action="ignore"):
-            tree, own = (ast.parse(text.strip(), mode="eval") for _ in range(2))
+            tree, copy = (ast.parse(text.strip(), mode="eval") for _ in range(2))
             nodes = tuple(ast.walk(tree.body))
             for node in nodes:
                 if isinstance(node, ast.Call):
@@ -147,7 +147,7 @@ def _read(text: str) -> tuple[tuple[ast.AST, ...], CodeType]:
                 if not _is_allowed(node):
                     rule = f"'{ast.unparse(node)}' is not allowed here"
                     raise ExpressionError(f"{rule}; use numbers, names and functions alone")
-            return nodes, compile(ast.fix_missing_locations(_Called().visit(own)), "", "eval")
+            return nodes, compile(ast.fix_missing_locations(_Called().visit(copy)), "", "eval")
     except ExpressionError:
         raise
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -164,7 +164,7 @@ def _is_allowed(node: ast.AST) -> bool:
 
 
 class _Called(ast.NodeTransformer):
-    """Functions under names of their own, for a quantity may be called mean; arithmetic as a function."""
+    """Renames functions, which quantities may share a name with, and turns arithmetic into calls."""
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         self.generic_visit(node)
@@ -177,7 +177,6 @@ class _Called(ast.NodeTransformer):
 
 
 def _of_numbers(function: Any) -> Any:
-    """Arithmetic that repeats no text and no list."""
 
     def found(a: Any, b: Any) -> Any:
         if isinstance(a, str | list) or isinstance(b, str | list):
@@ -192,13 +191,13 @@ _CALLED |= {f"{name}()": _of_numbers(function) for name, function in _ARITHMETIC
 
 
 def filled(text: Any, names: Mapping[str, Any]) -> Any:
-    """Text with its `{expressions}` replaced, lists and tables inside and out; one that is all of it keeps its type."""
+    """Return a text, list or table with its `{expressions}` replaced; a single expression keeps its type."""
     fill = filling(text)
     return text if fill is None else fill(names)
 
 
 def filling(text: Any) -> Callable[[Mapping[str, Any]], Any] | None:
-    """What fills a text, a list or a table with names, for many of these; None where there is nothing to fill.
+    """Return a function that fills a text, list or table with names; None without expressions.
 
     What holds no expression is shared by all that is filled.
     """
@@ -208,7 +207,7 @@ def filling(text: Any) -> Callable[[Mapping[str, Any]], Any] | None:
     if isinstance(text, list):
         fills = [filling(value) for value in text]
         pairs = list(zip(text, fills, strict=True))
-        return (lambda names: [own if fill is None else fill(names) for own, fill in pairs]) if any(fills) else None
+        return (lambda names: [entry if fill is None else fill(names) for entry, fill in pairs]) if any(fills) else None
     return partial(_filled, text) if isinstance(text, str) and "{" in text else None
 
 
@@ -226,7 +225,6 @@ def _shown(field: str, spec: str, names: Mapping[str, Any]) -> str:
 
 
 def _parts(text: str) -> Iterator[tuple[str, str, str]]:
-    """Plain text, the expression after it, and how its number is written."""
     try:
         parts = list(Formatter().parse(text))
     except ValueError as error:
@@ -238,7 +236,7 @@ def _parts(text: str) -> Iterator[tuple[str, str, str]]:
 
 
 def number_of(text: Any, names: Mapping[str, Any]) -> float:
-    """What an expression is worth that must be one number.
+    """Evaluate an expression that must be one number.
 
     Raises
     ------
@@ -252,26 +250,26 @@ def number_of(text: Any, names: Mapping[str, Any]) -> float:
         raise ExpressionError(f"'{text}' is no single number; take one of them, for example by at() or max()") from None
 
 
-def numbers_of(given: Mapping[str, Any], names: Mapping[str, Any]) -> dict[str, Any]:
-    """Numbers by name, each an expression over those before it; a table is a grid along a dimension of its name.
+def numbers_of(entries: Mapping[str, Any], names: Mapping[str, Any]) -> dict[str, Any]:
+    """Return numbers by name, each an expression over earlier ones; a table is a grid along its own dimension.
 
     Raises
     ------
     ExpressionError
         As `value_of` does.
     """
-    found = dict(names)
-    for name, text in given.items():
-        found[name] = grid(name, text) if isinstance(text, dict | GridTable) else value_of(text, found)
-    return found
+    numbers = dict(names)
+    for name, text in entries.items():
+        numbers[name] = grid(name, text) if isinstance(text, dict | GridTable) else value_of(text, numbers)
+    return numbers
 
 
-def grid(name: str, given: GridTable | Mapping[str, Any]) -> Any:
-    """Values listed, or so many from one end to the other, labelled by themselves."""
+def grid(name: str, entry: GridTable | Mapping[str, Any]) -> Any:
+    """Return listed or equally spaced values, labelled by themselves."""
     import xarray as xr
 
     try:
-        table = GridTable.model_validate(given)
+        table = GridTable.model_validate(entry)
     except ValidationError:
         raise ExpressionError(f"'{name}' is no grid; give values, or from, to and points") from None
     values = table.values or np.linspace(table.first or 0.0, table.last or 0.0, table.points or 2)

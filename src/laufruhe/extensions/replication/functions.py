@@ -24,14 +24,14 @@ def _reduced(how: str) -> Callable[..., Any]:
     def reduce(values: Any, *dims: str) -> Any:
         if not hasattr(values, "dims"):
             return getattr(np, how)(np.asarray(values, dtype=float)).item()
-        found = getattr(values, how)(list(dims) or None)
-        return found if found.dims else found.item()
+        result = getattr(values, how)(list(dims) or None)
+        return result if result.dims else result.item()
 
     return reduce
 
 
 def at(values: xr.DataArray, **places: Any) -> Any:
-    """What stands at a coordinate, the nearest to a number; at several for a list."""
+    """Return values at coordinates: the nearest to a number, several for a list."""
     for dim, place in places.items():
         exact = isinstance(place, str | list)
         values = values.sel({dim: place}) if exact else values.sel({dim: float(place)}, method="nearest")
@@ -47,46 +47,48 @@ def _arg(how: str) -> Callable[..., Any]:
 
 
 def orders(values: xr.DataArray) -> Any:
-    """Amplitude of every order of crank speed of a signal over the crank angle [deg]."""
+    """Return the amplitude of every order of a signal over the crank angle [deg]."""
     import xarray as xr
 
     angle = values["angle"].values
-    found = np.abs(np.fft.rfft(values.values, axis=values.dims.index("angle"))) * 2.0 / len(angle)
+    amplitudes = np.abs(np.fft.rfft(values.values, axis=values.dims.index("angle"))) * 2.0 / len(angle)
     turns = (angle[1] - angle[0]) * len(angle) / 360.0
-    at_orders = {"order": np.arange(found.shape[values.dims.index("angle")]) / turns}
+    at_orders = {"order": np.arange(amplitudes.shape[values.dims.index("angle")]) / turns}
     dims = ["order" if dim == "angle" else dim for dim in values.dims]
-    return xr.DataArray(found, dims=dims, coords={**at_orders, **{d: values[d] for d in dims if d in values.coords}})
+    return xr.DataArray(
+        amplitudes, dims=dims, coords={**at_orders, **{d: values[d] for d in dims if d in values.coords}}
+    )
 
 
 def couple_star(throws: Sequence[float], order: float = 1.0) -> complex:
-    """Sum of x_k e^{i h theta_k} of throws [deg], x in cylinder spacings about the middle."""
+    """Return the sum of x_k e^{i h theta_k} of throws [deg], x in cylinder spacings about the middle."""
     turns = [cmath.exp(1j * order * math.radians(throw)) for throw in throws]
     return sum((x * turn for x, turn in zip(stations(len(throws), 1.0), turns, strict=True)), 0j)
 
 
 def join(*parts: Any) -> NDArray[np.float64]:
-    """Numbers one after the other."""
+    """Return all numbers as one list."""
     return np.concatenate([np.ravel(np.asarray(part, dtype=float)) for part in parts])
 
 
 def excursion(torques: Any, angle: float) -> float:
-    """Largest less smallest work of a torque about its mean, each held over so much of the angle (T2)."""
-    held = np.ravel(np.asarray(torques, dtype=float))
-    if not held.size:
+    """Return the range of the work of a torque about its mean, each value constant over its share of `angle` (T2)."""
+    steps = np.ravel(np.asarray(torques, dtype=float))
+    if not steps.size:
         raise ValueError("no torques")
-    work = np.cumsum(held - held.mean()) * angle
+    work = np.cumsum(steps - steps.mean()) * angle
     return float(np.ptp(np.append(work, 0.0)))
 
 
 def lever_share(bearings: Sequence[float], place: float, number: int) -> float:
-    """Share of a load at a place that the bearing of this number carries, the shaft cut in its bearings (B4)."""
+    """Return the share of a load that a bearing carries, the shaft cut in its bearings (B4)."""
     if len(set(bearings)) < len(bearings):
         raise ValueError("two bearings in one place")
     return float(lever_shares(bearings, [place])[number - 1, 0])
 
 
 def transmissibility(ratio: Any, loss_factor: Any) -> Any:
-    """Foundation over exciting force of one mass on one spring (E11), of labelled arrays too."""
+    """Return foundation over exciting force of one mass on one spring (E11), also for labelled arrays."""
     import xarray as xr
 
     # without damping there is no end to it at the critical speed

@@ -18,7 +18,7 @@ _CELLS = {CONFIRMED: "yes", NOT_CONFIRMED: "**no**", BEYOND: "–"}
 
 
 def judged(statements: Sequence[StatementTable], readings: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Coordinates of a dataset along its statements and the readings: printed, ours, verdict, why.
+    """Return coordinates of a dataset along statements and readings: printed, ours, verdict, why.
 
     Parameters
     ----------
@@ -27,14 +27,14 @@ def judged(statements: Sequence[StatementTable], readings: Mapping[str, Mapping[
     """
     if not statements:
         return {}
-    found = [[_judged(one, names) for names in readings.values()] for one in statements]
+    verdicts = [[_judged(one, names) for names in readings.values()] for one in statements]
     return {
         "by_reading": list(readings),
         "statement": ("statement", [one.text + (f" ({one.where})" if one.where else "") for one in statements]),
         "printed": ("statement", [UNSTATED if one.printed is None else one.printed for one in statements]),
         "unit": ("statement", [one.unit for one in statements]),
         **{
-            name: (("statement", "by_reading"), [[cell[k] for cell in row] for row in found])
+            name: (("statement", "by_reading"), [[cell[k] for cell in row] for row in verdicts])
             for k, name in enumerate(("ours", "verdict", "why"))
         },
     }
@@ -42,12 +42,12 @@ def judged(statements: Sequence[StatementTable], readings: Mapping[str, Mapping[
 
 def _judged(one: StatementTable, names: Mapping[str, Any]) -> tuple[float, str, str]:
     value = number_of(one.value, names)
-    own = {**names, "value": value}
-    return value, verdict(one, own), filled(one.why, own)
+    known = {**names, "value": value}
+    return value, verdict(one, known), filled(one.why, known)
 
 
 def verdict(statement: StatementTable, names: Mapping[str, Any]) -> str:
-    """Whether a statement holds; `names` has our value as `value`."""
+    """Judge a statement; `names` has our value as `value`."""
     if statement.printed is None:
         return BEYOND
     if statement.holds is not None:
@@ -61,7 +61,7 @@ def verdict(statement: StatementTable, names: Mapping[str, Any]) -> str:
 
 
 def rows(data: xr.Dataset) -> list[Text]:
-    """The statements of a dataset as a table, with ours and the verdict in every reading."""
+    """Return the statements as a table, with our value and the verdict in every reading."""
     if not data.sizes.get("statement"):
         return []
     readings = [str(name) for name in data["by_reading"].values]
@@ -72,8 +72,8 @@ def rows(data: xr.Dataset) -> list[Text]:
 def _row(one: xr.Dataset, readings: Sequence[str]) -> list[str]:
     unit = one["unit"].item()
     cells = [str(one[name].item()) for name in ("statement", "printed")]
-    for ours, said in zip(one["ours"].values.tolist(), one["verdict"].values.tolist(), strict=True):
-        cells += [f"{_shown(ours)} {unit}".strip(), _CELLS[said]]
+    for ours, verdict_ in zip(one["ours"].values.tolist(), one["verdict"].values.tolist(), strict=True):
+        cells += [f"{_shown(ours)} {unit}".strip(), _CELLS[verdict_]]
     whys = one["why"].values.tolist()
     if len(set(whys)) > 1:
         return [*cells, "<br>".join(f"{name}: {why}" for name, why in zip(readings, whys, strict=True))]
@@ -85,14 +85,16 @@ def _shown(value: float) -> str:
 
 
 def counted(datasets: Iterable[xr.Dataset]) -> str:
-    """How many of the statements of all parts are confirmed, in every reading; empty where there are none."""
+    """Return how many statements of all parts are confirmed, in every reading; empty without statements."""
     judged_ones = [data for data in datasets if "verdict" in data.coords]
     readings = dict.fromkeys(str(name) for data in judged_ones for name in data["by_reading"].values)
-    found = []
+    sentences = []
     for name in [name for name in readings if name] or list(readings):
         # a part without readings says the same in all of them
-        own = [data.sel(by_reading=name if name in data["by_reading"] else "") for data in judged_ones]
-        verdicts = [v for data in own for v in data["verdict"].values[data["printed"].values != UNSTATED]]
-        told = f"{name}: " if name else ""
-        found += [f"{told}{verdicts.count(CONFIRMED)} of {len(verdicts)} statements are confirmed."] * bool(verdicts)
-    return " ".join(found)
+        parts = [data.sel(by_reading=name if name in data["by_reading"] else "") for data in judged_ones]
+        verdicts = [v for data in parts for v in data["verdict"].values[data["printed"].values != UNSTATED]]
+        lead = f"{name}: " if name else ""
+        sentences += [f"{lead}{verdicts.count(CONFIRMED)} of {len(verdicts)} statements are confirmed."] * bool(
+            verdicts
+        )
+    return " ".join(sentences)

@@ -58,19 +58,19 @@ class Replication(Part):
 
     @model_validator(mode="after")
     def _means_something(self) -> Replication:
-        """Names, cases, functions and quantities are looked up before anything is computed."""
+        """Check names, cases, functions and quantities before anything is computed."""
         wrong = list[InitErrorDetails]()
-        for at, told, check_it in self._checks():
+        for at, entry, check_it in self._checks():
             try:
-                check_it(told)
+                check_it(entry)
             except ModelError as error:
-                wrong.append(InitErrorDetails(type=f.refusal(str(error)), loc=at, input=told))
+                wrong.append(InitErrorDetails(type=f.refusal(str(error)), loc=at, input=entry))
         if wrong:
             raise ValidationError.from_exception_data("replication", wrong)
         return self
 
     def _checks(self) -> Iterator[tuple[Place, Any, Callable[[Any], None]]]:
-        """What is looked up: where it stands, it, and how."""
+        """Yield place, value and check of everything that is looked up."""
         for reading, numbers in self.readings.items():
             for name in numbers:
                 yield ("readings", reading), name, partial(check_among, known=self.numbers, what="number")
@@ -86,30 +86,29 @@ class Replication(Part):
         yield from checks_in(self.picture_, known, cases, places, ("picture",))
 
     def each_reading(self) -> list[Part]:
-        """One part shows all readings side by side."""
+        """Return this part, which shows all readings side by side."""
         return [self]
 
     def settings(self) -> dict[str, Any]:
-        """What is asked of every case; numbers and problems stand in the scenes."""
+        """Return the settings shared by all cases; numbers and problems belong to the scenes."""
         return {"kind": self.kind, "quantities": {k: str(what) for k, what in self.quantities.items()}}
 
     def size(self) -> int:
-        """Every case at every combination of its swept numbers, in every reading."""
+        """Return the number of cases times swept numbers times readings."""
         one = sum(math.prod(numbers.count for numbers in case.sweep.values()) for case in self.cases)
         return one * len(self._all_readings())
 
     @property
     def ends(self) -> tuple[str, ...]:
-        """Every quantity has dimensions of its own, so no table of one row a point holds them."""
+        """Endings of the files; no CSV, because quantities have dimensions of their own."""
         return ("nc", "png") if self.picture_ else ("nc",)
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """Every case at every combination of its swept numbers, in one reading of the source after the other."""
+        """Return every case at every combination of swept numbers, reading by reading."""
         each = itertools.product(self._all_readings().values(), self.cases)
         return [point for reading, case in each for point in self._points(case, reading, scenes)]
 
     def _all_readings(self) -> Mapping[str, Mapping[str, Any]]:
-        """The readings; one without a name where nothing is in doubt."""
         return self.readings or {"": {}}
 
     def _points(self, case: ReplicaCase, reading: Mapping[str, Any], scenes: Scenes) -> Iterator[Point]:
@@ -121,22 +120,21 @@ class Replication(Part):
             swept = dict(zip(grids, values, strict=True))
             with self._blamed(case.name):
                 names = numbers_of({**self.numbers, **reading, **case.numbers, **swept}, {})
-                own = tables if fill is None else fill(names)
+                filled_tables = tables if fill is None else fill(names)
                 changed = case.model_copy(update={"set": filled(case.set, names), "numbers": swept})
-            yield Point(changed, base=own)
+            yield Point(changed, base=filled_tables)
 
     def _tables(self, name: Any, scenes: Scenes, *seen: Any) -> dict[str, Any]:
-        """Tables of a problem under `problems`, upon those of what it is like; else of a file."""
         if name in seen or not isinstance(name, str):
             raise ExpressionError(f"problem '{name}' is like itself, or is no name; correct a like")
         if name not in self.problems:
             return scenes.file(name)
-        own = {key: value for key, value in self.problems[name].items() if key != "like"}
+        tables = {key: value for key, value in self.problems[name].items() if key != "like"}
         like = self.problems[name].get("like")
-        return own if like is None else joined(self._tables(like, scenes, name, *seen), own)
+        return tables if like is None else joined(self._tables(like, scenes, name, *seen), tables)
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """Every quantity of one scene, at its optimum where something is open."""
+        """Return every quantity of one scene, at its optimum if something is open."""
         problem, case = scenes.problem(point), _case(point)
         result = solve(problem)
         if result.status in (Status.INFEASIBLE, Status.FAILED):
@@ -144,7 +142,7 @@ class Replication(Part):
         return {name: asked(result, what)._asdict() for name, what in self.quantities.items()}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """Quantities along the points, and every statement judged."""
+        """Return quantities along the points, and every statement judged."""
         import xarray as xr
 
         swept, readings = list(dict.fromkeys(name for case in self.cases for name in case.sweep)), self._all_readings()
@@ -164,13 +162,13 @@ class Replication(Part):
             return data.assign_coords(judged(self.statements, self.names(data)))
 
     def names(self, data: xr.Dataset) -> dict[str, dict[str, Any]]:
-        """What expressions know in each reading: numbers, what every case gave, and what is defined of them."""
-        names, found = [str(name) for name in data.data_vars if "point" in data[name].dims], {}
-        for reading, told in self._all_readings().items():
-            own = data.isel(point=np.flatnonzero(data["reading"] == reading))
-            quantities = {name: _by_case(own, name) for name in names}
-            found[reading] = numbers_of(self.define, {**numbers_of({**self.numbers, **told}, {}), **quantities})
-        return found
+        """Return the names of expressions in each reading: numbers, quantities by case, definitions."""
+        names, known = [str(name) for name in data.data_vars if "point" in data[name].dims], {}
+        for reading, numbers in self._all_readings().items():
+            part = data.isel(point=np.flatnonzero(data["reading"] == reading))
+            quantities = {name: _by_case(part, name) for name in names}
+            known[reading] = numbers_of(self.define, {**numbers_of({**self.numbers, **numbers}, {}), **quantities})
+        return known
 
     @staticmethod
     def summary(datasets: Iterable[xr.Dataset]) -> str:
@@ -179,13 +177,13 @@ class Replication(Part):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """What is said, and every statement beside ours."""
-        said = [f"The source: {data.attrs['says']}"] if data.attrs["says"] else []
-        return [*said, *rows(data)]
+        """Return the source's words, and every statement beside our value."""
+        lead = [f"The source: {data.attrs['says']}"] if data.attrs["says"] else []
+        return [*lead, *rows(data)]
 
     @staticmethod
     def picture(data: xr.Dataset) -> Picture:
-        """What the file describes; the statements alone where it describes nothing."""
+        """Return the picture that the file describes."""
         part = Replication.model_validate_json(data.attrs["part"])
         assert part.picture_ is not None
         with part._blamed("picture"):
@@ -193,7 +191,6 @@ class Replication(Part):
 
     @contextmanager
     def _blamed(self, where: str) -> Iterator[None]:
-        """An expression that means nothing is the fault of this part."""
         try:
             yield
         except ExpressionError as error:
@@ -206,42 +203,42 @@ def _case(point: Point) -> ReplicaCase:
 
 
 class _Cases(dict[str, Any]):
-    """What each case gave, by its name."""
+    """Values of a quantity by case."""
 
     def __missing__(self, name: str) -> Any:
         check_among(name, self, "case")
 
 
 def _by_case(data: xr.Dataset, name: str) -> _Cases:
-    """A quantity of every case, along what it swept and the quantity's own dimensions."""
+    """Return a quantity by case, along its swept numbers and its own dimensions."""
     import xarray as xr
 
-    found = _Cases()
+    cases = _Cases()
     swept = [str(c) for c, labels in data.coords.items() if labels.dims == ("point",) and c not in ("case", "reading")]
     for case in dict.fromkeys(data["case"].values.tolist()):
         here = data.isel(point=np.flatnonzero(data["case"].values == case))
         coords = {c: np.array(list(dict.fromkeys(here[c].values.tolist()))) for c in swept if here[c].notnull().all()}
-        own = {str(dim): here[dim].values for dim in here[name].dims[1:]}
-        whole = np.full([len(labels) for labels in (*coords.values(), *own.values())], np.nan)
+        labels_of = {str(dim): here[dim].values for dim in here[name].dims[1:]}
+        values_ = np.full([len(labels) for labels in (*coords.values(), *labels_of.values())], np.nan)
         # by their labels: cases may sweep the same numbers one within the other in any order
         places = [[labels.tolist().index(label) for label in here[c].values.tolist()] for c, labels in coords.items()]
-        whole[tuple(places)] = here[name].values if places else here[name].values[0]
-        values = xr.DataArray(whole, coords={**coords, **own}, dims=[*coords, *own])
-        for dim in own if here[name].attrs.get("padded") else ():
+        values_[tuple(places)] = here[name].values if places else here[name].values[0]
+        values = xr.DataArray(values_, coords={**coords, **labels_of}, dims=[*coords, *labels_of])
+        for dim in labels_of if here[name].attrs.get("padded") else ():
             values = values.dropna(dim, how="all")
-        found[str(case)] = values if values.dims else values.item()
-    return found
+        cases[str(case)] = values if values.dims else values.item()
+    return cases
 
 
-def _along_points(found: Sequence[Mapping[str, Any]], name: str) -> xr.DataArray:
-    """One quantity of all points; those that lack labels others have are padded with no number."""
+def _along_points(records: Sequence[Mapping[str, Any]], name: str) -> xr.DataArray:
+    """Return one quantity of all points, padded with NaN for missing labels."""
     import xarray as xr
 
-    dims = list(found[0]["coords"])
-    coords = {dim: list(dict.fromkeys(label for one in found for label in one["coords"][dim])) for dim in dims}
-    whole = np.full((len(found), *(len(labels) for labels in coords.values())), np.nan)
-    for k, one in enumerate(found):
+    dims = list(records[0]["coords"])
+    coords = {dim: list(dict.fromkeys(label for one in records for label in one["coords"][dim])) for dim in dims}
+    values = np.full((len(records), *(len(labels) for labels in coords.values())), np.nan)
+    for k, one in enumerate(records):
         places = [[coords[dim].index(label) for label in labels] for dim, labels in one["coords"].items()]
-        whole[np.ix_([k], *places)] = np.array(one["values"], dtype=float)
-    padded = int(any(len(one["coords"][dim]) < len(labels) for one in found for dim, labels in coords.items()))
-    return xr.DataArray(whole, coords, ("point", *coords), name, {"padded": padded})
+        values[np.ix_([k], *places)] = np.array(one["values"], dtype=float)
+    padded = int(any(len(one["coords"][dim]) < len(labels) for one in records for dim, labels in coords.items()))
+    return xr.DataArray(values, coords, ("point", *coords), name, {"padded": padded})

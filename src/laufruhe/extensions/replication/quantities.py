@@ -47,14 +47,14 @@ class AskedTable(QuantityTable):
 
 
 class Labelled(NamedTuple):
-    """Numbers along named dimensions, as JSON holds them: nested lists, and the labels of each dimension in turn."""
+    """Numbers along named dimensions as JSON holds them: nested lists, and the labels of each dimension."""
 
     values: Any
     coords: dict[str, list[Any]]
 
 
 def check_asked(what: str | AskedTable) -> None:
-    """Whether there is such a quantity.
+    """Check that a quantity exists.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def check_asked(what: str | AskedTable) -> None:
 
 
 def asked(result: Result, what: str | AskedTable) -> Labelled:
-    """A quantity of the design that a case ends at [SI].
+    """Return a quantity of a case's design [SI].
 
     Raises
     ------
@@ -87,7 +87,6 @@ def asked(result: Result, what: str | AskedTable) -> Labelled:
 
 
 def _signal(result: Result, _: AskedTable) -> Labelled:
-    """Mount forces over the cycle."""
     values = samples_of(result.final, 0)[:, :, 1:]
     turns = result.final.engine.cycle.turns
     angle = (360.0 * turns * np.arange(len(values)) / len(values)).tolist()
@@ -96,7 +95,7 @@ def _signal(result: Result, _: AskedTable) -> Labelled:
 
 
 def _over_cycle(measure: Measure, result: Result, _: AskedTable) -> Labelled:
-    """Any load over the cycle, place by place (C2); what stands alone has no label."""
+    """Return a load over the cycle, place by place (C2); a single place has no label."""
     channel = measure.load
     values = samples_of(result.final, 0, channel)
     degrees = 360.0 * result.final.engine.cycle.turns
@@ -116,7 +115,6 @@ def _by_mount(measure: str, result: Result, _: AskedTable) -> Labelled:
 
 
 def _by_order(part: slice, result: Result, table: AskedTable) -> Labelled:
-    """Largest of a free load over a turn, order by order."""
     orders = table.orders or ORDERS
     wrench = result.final.loads[0].wrench
     return Labelled([float(order_amplitude(wrench.at(order)[part])) for order in orders], {"order": list(orders)})

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any, Concatenate, ParamSpec
 
 from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, SolverError, refused
-from laufruhe.extensions.served_page import told
-from laufruhe.extensions.served_page.asked import CRANK, LATER, STAR, Asked, Edit
+from laufruhe.extensions.served_page import serialise
 from laufruhe.extensions.served_page.claims import (
     Simpler,
     breaks_words,
@@ -23,8 +22,9 @@ from laufruhe.extensions.served_page.claims import (
     settled_claim,
 )
 from laufruhe.extensions.served_page.controls import as_json, as_typed, controls_of, offered_by
-from laufruhe.extensions.served_page.front import Front, partners, places
-from laufruhe.extensions.served_page.held import held_by, ranking_of
+from laufruhe.extensions.served_page.fixed_values import held_by, ranking_of
+from laufruhe.extensions.served_page.page_state import CRANK, LATER, STAR, Edit, PageState
+from laufruhe.extensions.served_page.pareto import ParetoFront, partners, places
 from laufruhe.extensions.served_page.scenes import scene_of
 from laufruhe.files import edits
 from laufruhe.files.complaints import in_file
@@ -47,7 +47,7 @@ P = ParamSpec("P")
 
 @dataclass(frozen=True)
 class Source:
-    """The problem's file as it was last read.
+    """The problem file as last read.
 
     Attributes
     ----------
@@ -66,55 +66,52 @@ _solved: dict[str, Result] = {}
 
 @lru_cache(maxsize=4)
 def _as_filed(text: str, path: Path) -> tuple[tuple[str, ...], dict[str, Kind]]:
-    """Return the names that a page is offered, and the kinds of the open numbers, as the file has them."""
     tables = json.loads(text)
     problem = load_tables(tables, path)
     return tuple(offered_by(tables, problem)), {decision.name: decision.kind for decision in problem.decisions}
 
 
-def _of_file(source: Source) -> tuple[tuple[str, ...], dict[str, Kind]]:
+def _names_and_kinds(source: Source) -> tuple[tuple[str, ...], dict[str, Kind]]:
     return _as_filed(json.dumps(source.tables, default=str), source.path)
 
 
-def _held_kinds(source: Source, asked: Asked) -> set[Kind]:
-    """Return the kinds of open numbers that the page holds as they were decided."""
-    _, kinds = _of_file(source)
-    return {Kind.STAR if edit.name == STAR else kinds[edit.name] for edit in asked.held}
+def _held_kinds(source: Source, state: PageState) -> set[Kind]:
+    _, kinds = _names_and_kinds(source)
+    return {Kind.STAR if edit.name == STAR else kinds[edit.name] for edit in state.held}
 
 
-def _asked_about(source: Source, asked: Asked, with_held: bool) -> tuple[dict[str, Any], Problem]:
-    """Tables and problem of a request, through the same reading as files (`InputError`)."""
+def _requested(source: Source, state: PageState, with_held: bool) -> tuple[dict[str, Any], Problem]:
     with in_file(source.path.name):
-        asked.check(_of_file(source)[0])
-        tables = asked.tables(source.tables, with_held)
+        state.check(_names_and_kinds(source)[0])
+        tables = state.tables(source.tables, with_held)
     return tables, load_tables(tables, Path(source.path))
 
 
-def _said(work: Callable[Concatenate[Source, P], dict[str, Any]]) -> Callable[Concatenate[Source, P], str]:
-    """An answer as JSON, or the line that says why there is none."""
+def _answered(work: Callable[Concatenate[Source, P], dict[str, Any]]) -> Callable[Concatenate[Source, P], str]:
+    """Turn the outcome of `work`, or its error, into JSON."""
 
     @wraps(work)
-    def said(source: Source, /, *args: P.args, **kwargs: P.kwargs) -> str:
+    def answered(source: Source, /, *args: P.args, **kwargs: P.kwargs) -> str:
         try:
-            found = work(source, *args, **kwargs)
+            answer = work(source, *args, **kwargs)
         except InputError as error:
-            found = {"error": str(error)}
+            answer = {"error": str(error)}
         except ModelError as error:
-            found = {
+            answer = {
                 "error": str(InputError(source.path.name, (Complaint.from_error(error, error.where or "problem"),)))
             }
         except (SolverError, LaufruheError) as error:
-            found = {"error": f"{source.path.name}: {error}"}
+            answer = {"error": f"{source.path.name}: {error}"}
         except MemoryError:
-            found = {"error": f"{source.path.name}: needs more memory than there is"}
-        return told.as_text(found)
+            answer = {"error": f"{source.path.name}: needs more memory than there is"}
+        return serialise.as_text(answer)
 
-    return said
+    return answered
 
 
-@_said
+@_answered
 def begin(source: Source) -> dict[str, Any]:
-    """What the page may change, and what the problem is."""
+    """Return the problem and the controls of its page."""
     problem = load_tables(source.tables, source.path)
     ranks = [rank.terms[0].measure.name for rank in problem.ranks]
     return {
@@ -137,71 +134,71 @@ def _opens(source: Source) -> bool:
     return True
 
 
-@_said
-def follow(source: Source, asked: Asked) -> dict[str, Any]:
-    """The optimum of what loads are affine in, all else as it stands, in milliseconds."""
+@_answered
+def follow(source: Source, state: PageState) -> dict[str, Any]:
+    """Return the optimum of the affine decisions, all others fixed, within milliseconds."""
     began, spent = time.perf_counter(), time.process_time()
-    tables, problem = _asked_about(source, asked, with_held=True)
+    tables, problem = _requested(source, state, with_held=True)
     scene = scene_of(problem, tables, source.content)
-    found = scene.follower.at(problem.limits) if scene.follower else None
-    design, simpler = scene.evaluated(found), scene.simpler(_held_kinds(source, asked))
-    limits = scene.standing(problem.limits, design, found)
+    followed = scene.follower.at(problem.limits) if scene.follower else None
+    design, simpler = scene.evaluated(followed), scene.simpler(_held_kinds(source, state))
+    limits = scene.standing(problem.limits, design, followed)
     value = objective_value(scene.problem, design) if scene.problem.objective else None
-    if found is None:
-        claim = given_claim(asked.position, scene.problem, value, limits)
-    elif found.conflict:
-        claim = conflict_claim(asked.position, found.conflict, simpler)
+    if followed is None:
+        claim = given_claim(state.position, scene.problem, value, limits)
+    elif followed.conflict:
+        claim = conflict_claim(state.position, followed.conflict, simpler)
     else:
         assert value is not None
-        claim = preview_claim(asked.position, scene.problem, value, simpler, limits)
-    decided = found is not None and not found.conflict
-    own: dict[str, Any] = {
-        **told.answer(claim, limits, problem, found.conflict if found else ()),
+        claim = preview_claim(state.position, scene.problem, value, simpler, limits)
+    decided = followed is not None and not followed.conflict
+    answer: dict[str, Any] = {
+        **serialise.answer(claim, limits, problem, followed.conflict if followed else ()),
         "key": scene.key,
-        "design": told.design(scene.problem, found.values) if found is not None and decided else None,
+        "design": serialise.design(scene.problem, followed.values) if followed is not None and decided else None,
     }
-    if asked.has not in (scene.key, LATER):
-        own |= scene.drawn(problem.limits, design, found)
+    if state.has not in (scene.key, LATER):
+        answer |= scene.drawn(problem.limits, design, followed)
     took = {"wall": time.perf_counter() - began, "processor": time.process_time() - spent}
-    return {**own, "seconds": took}
+    return {**answer, "seconds": took}
 
 
-@_said
-def measure(source: Source, asked: Asked) -> dict[str, Any]:
-    """The design that is shown by the exact model: objective and limits, those too that do not follow sliders."""
-    tables, whole = _asked_about(source, asked, with_held=True)
-    problem = replace(scene_of(whole, tables, source.content).problem, limits=whole.limits)
-    values = decided(problem, asked.design)
+@_answered
+def measure(source: Source, state: PageState) -> dict[str, Any]:
+    """Evaluate the displayed design by the exact model."""
+    tables, whole_problem = _requested(source, state, with_held=True)
+    problem = replace(scene_of(whole_problem, tables, source.content).problem, limits=whole_problem.limits)
+    values = decided(problem, state.design)
     evaluation = evaluate(problem.fixed_at([values[decision.name] for decision in problem.decisions]))
     limits = {limit.name: limit.value for limit in limit_values(problem, evaluation)}
     return {"objective": objective_value(problem, evaluation) if problem.objective else None, "limits": limits}
 
 
-@_said
-def settle(source: Source, asked: Asked, seconds: float) -> dict[str, Any]:
-    """The whole problem, solved and proven as `laufruhe solve` does."""
+@_answered
+def settle(source: Source, state: PageState, seconds: float) -> dict[str, Any]:
+    """Solve and prove the whole problem as `laufruhe solve` does."""
     began = time.perf_counter()
-    tables, problem = _asked_about(source, asked, with_held=False)
+    tables, problem = _requested(source, state, with_held=False)
     try:
         result = solve(replace(problem, sharply=True), time_limit=seconds)
     except SolverError as error:
         return {"error": f"{source.path.name}: {error}"}
     _solved.clear()
-    _solved[_state(source, asked)] = result
-    return {**_settled(result, tables, asked.position), "seconds": time.perf_counter() - began}
+    _solved[_solution_key(source, state)] = result
+    return {**_settled(result, tables, state.position), "seconds": time.perf_counter() - began}
 
 
-def _state(source: Source, asked: Asked) -> str:
-    return repr((source.content, source.tables, asked.edits))
+def _solution_key(source: Source, state: PageState) -> str:
+    return repr((source.content, source.tables, state.edits))
 
 
-@_said
-def picture(source: Source, asked: Asked, k: int) -> dict[str, Any]:
-    """A picture of what was solved last, as its report has it; nothing where there is none any more."""
+@_answered
+def picture(source: Source, state: PageState, k: int) -> dict[str, Any]:
+    """Return picture k of the last solution; {"done": True} if there is none."""
     from laufruhe import plots
     from laufruhe.plots.style import as_svg
 
-    result = _solved.get(_state(source, asked))
+    result = _solved.get(_solution_key(source, state))
     names = [] if result is None else plots.names(result)
     if result is None or k >= len(names):
         return {"done": True}
@@ -213,55 +210,55 @@ def _settled(result: Result, tables: Mapping[str, Any], position: int) -> dict[s
     has_design = result.status.has_design
     claim = settled_claim(position, result)
     return {
-        **told.answer(claim, result.limits, result.problem, result.conflict),
+        **serialise.answer(claim, result.limits, result.problem, result.conflict),
         "design": {entry.name: entry.value for entry in result.decisions} if has_design else None,
         "ranking": ranking_of(result),
         "holds": held_by(result, tables),
     }
 
 
-def _front(source: Source, asked: Asked, across: str) -> tuple[Front, Simpler]:
-    tables, whole = _asked_about(source, asked, with_held=True)
-    scene = scene_of(whole, tables, source.content)
-    problem = replace(scene.problem, limits=whole.limits)
+def _front(source: Source, state: PageState, across: str) -> tuple[ParetoFront, Simpler]:
+    tables, whole_problem = _requested(source, state, with_held=True)
+    scene = scene_of(whole_problem, tables, source.content)
+    problem = replace(scene.problem, limits=whole_problem.limits)
     edges = [(limit.name, limit.minimum, limit.maximum, limit.outside) for limit in problem.limits]
     key = f"{scene.key} {across} {edges}"
     if _fronts.get("key") != key:
-        own = partners(problem)
-        if across not in own:
+        measures = partners(problem)
+        if across not in measures:
             raise refused("front", across, "is no measure of this problem", "", source.path.name)
         _fronts.clear()
-        _fronts.update(key=key, front=Front(problem, own[across]))
-    found = _fronts["front"]
-    assert isinstance(found, Front)
-    return found, scene.simpler(_held_kinds(source, asked))
+        _fronts.update(key=key, front=ParetoFront(problem, measures[across]))
+    current = _fronts["front"]
+    assert isinstance(current, ParetoFront)
+    return current, scene.simpler(_held_kinds(source, state))
 
 
-@_said
-def front(source: Source, asked: Asked, across: str, k: int) -> dict[str, Any]:
-    """A point of the front against another measure; nothing where there is none any more."""
-    own, simpler = _front(source, asked, across)
-    most = next(islice(places(*own.ends()), k, None), None)
+@_answered
+def front(source: Source, state: PageState, across: str, k: int) -> dict[str, Any]:
+    """Return point k of the front against another measure; {"done": True} after the last."""
+    pareto, simpler = _front(source, state, across)
+    most = next(islice(places(*pareto.ends()), k, None), None)
     if most is None:
         return {"done": True}
-    point = own.at(most)
+    point = pareto.at(most)
     if point.conflict:
         return {"skipped": True}
-    problem, unit = own.problem, own.across.unit
+    problem, unit = pareto.problem, pareto.across.unit
     design = evaluate(problem.fixed_at(point.values))
     (shown_unit, factor), (of_unit, of_factor) = readable(unit), readable(problem.objective_unit or "")
     # a bound of a simpler problem is none of the whole one
     bound = None if simpler else {"at": most, "value": point.bound}
-    place, value = design.value(own.across), objective_value(problem, design)
+    place, value = design.value(pareto.across), objective_value(problem, design)
     text = f"{figure(place, unit)}: {figure(value, problem.objective_unit or '')}"
     least = f"; no design has less than {figure(point.bound, problem.objective_unit or '')}" if bound else ""
-    # limits on numbers are not asked of a front
-    breaks = breaks_words(limit_values(replace(problem, limits=own.others), design))
+    # limits on numbers are not part of a front
+    breaks = breaks_words(limit_values(replace(problem, limits=pareto.others), design))
     return {
         "across": place,
         "value": value,
         "bound": bound,
-        "design": told.design(problem, point.values),
+        "design": serialise.design(problem, point.values),
         "axes": {"across": [shown_unit, factor], "value": [of_unit, of_factor]},
         "name": problem.objective_name,
         "words": "; ".join(part for part in (f"{text}{least}", breaks) if part),
@@ -269,13 +266,13 @@ def front(source: Source, asked: Asked, across: str, k: int) -> dict[str, Any]:
     }
 
 
-@_said
-def save(source: Source, asked: Asked) -> dict[str, Any]:
-    """The whole state as a problem file: what was changed and is held, and the design where what is open starts."""
-    tables, problem = _asked_about(source, asked, with_held=True)
+@_answered
+def save(source: Source, state: PageState) -> dict[str, Any]:
+    """Return the state of the page as a problem file."""
+    tables, problem = _requested(source, state, with_held=True)
     units = {e.name: e.unit for d in problem.decisions for e in decision_values(d, d.start)}
     with in_file(source.path.name):
-        for name, value in asked.design.items():
+        for name, value in state.design.items():
             if name in units:
                 tables = edits.with_value(tables, name, as_typed(value, units[name]))
     load_tables(tables, source.path)

@@ -19,7 +19,7 @@ _FEW = 2
 
 
 class Kind(StrEnum):
-    """How strong a claim is."""
+    """Strength of a claim."""
 
     PROVEN = "proven"
     """The whole problem was solved, and no design is better within the tolerance."""
@@ -36,7 +36,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class Simpler:
-    """Reasons that make the problem behind a slider simpler than the whole one; false where nothing does.
+    """Simplifications behind a moving slider; false without any.
 
     Attributes
     ----------
@@ -55,8 +55,8 @@ class Simpler:
     @property
     def phrase(self) -> str:
         """Words that follow a number, with a blank before them."""
-        still = f" for {listed(self.held)}" if self.held else ""
-        return f"{still} without {listed(self.left_out)}" if self.left_out else still
+        fixed = f" for {listed(self.held)}" if self.held else ""
+        return f"{fixed} without {listed(self.left_out)}" if self.left_out else fixed
 
 
 WHOLE = Simpler()
@@ -64,7 +64,7 @@ WHOLE = Simpler()
 
 @dataclass(frozen=True)
 class Claim:
-    """Words about the design that a page shows.
+    """Words about the displayed design.
 
     Attributes
     ----------
@@ -95,7 +95,7 @@ class Claim:
 
     @property
     def text(self) -> str:
-        """The whole claim as one line."""
+        """Claim as one line."""
         return "; ".join(part for part in (f"{self.lead} {self.words}".strip(), self.breaks) if part)
 
 
@@ -148,8 +148,8 @@ def given_claim(position: int, problem: Problem, value: float | None, limits: It
 
 def conflict_claim(position: int, names: Sequence[str], simpler: Simpler = WHOLE, is_last: bool = False) -> Claim:
     """Return the claim that no design keeps these limits together: found for a simpler problem, or the last word."""
-    told = listed([f"'{name}'" for name in names])
-    why = f"{told} contradict each other" if len(names) > 1 else f"{told} cannot be met within the bounds"
+    names_text = listed([f"'{name}'" for name in names])
+    why = f"{names_text} contradict each other" if len(names) > 1 else f"{names_text} cannot be met within the bounds"
     lead = "No design exists:" if is_last else "No design found:"
     return Claim(Kind.NO_DESIGN, position, lead, f"{why}{simpler.phrase}. Move one of the limits", is_last=is_last)
 

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from laufruhe import units
-from laufruhe.extensions.served_page.asked import CRANK, OBJECTIVE, STAR
+from laufruhe.extensions.served_page.page_state import CRANK, OBJECTIVE, STAR
 from laufruhe.files import edits
 from laufruhe.files.complaints import Refused
 from laufruhe.files.measures import SIDES, limit_name
@@ -56,7 +56,7 @@ class Control:
 
     @property
     def step(self) -> float:
-        """A round one, of which a slider has some two hundred."""
+        """Round step, about 1/200 of the range."""
         return _round_step((self.high - self.low) / _STEPS)
 
 
@@ -66,42 +66,41 @@ def _round_step(rough: float) -> float:
 
 
 def controls_of(tables: Mapping[str, Any], problem: Problem) -> list[Control]:
-    """Of the problem as its file has it."""
+    """Return the controls of a problem as its file defines it."""
     return [*_of_points(tables), *_of_engine(tables), *_of_decisions(tables, problem), *_of_mounts(tables),
             *_of_limits(tables)]  # fmt: skip
 
 
 def offered_by(tables: Mapping[str, Any], problem: Problem) -> list[str]:
-    """Names that edits may have: of controls, of open numbers, and of what is changed as a whole."""
+    """Return the names that edits may have: controls, open numbers, and whole-problem edits."""
     decided = [decision.name for decision in problem.decisions]
     return [STAR, CRANK, OBJECTIVE, *(control.name for control in controls_of(tables, problem)), *decided]
 
 
 def as_json(controls: list[Control]) -> list[dict[str, Any]]:
-    """For the page."""
+    """Return the controls as JSON values."""
     return [{**asdict(control), "step": control.step} for control in controls]
 
 
-def _number(given: Any) -> tuple[float, str] | None:
-    """Of a text with a unit, or a plain number, and the unit; None of what is open, or no number."""
-    if isinstance(given, int | float) and not isinstance(given, bool):
-        return float(given), ""
-    if not isinstance(given, str):
+def _number(entry: Any) -> tuple[float, str] | None:
+    """Return number and unit of a text or a plain number; None for anything else."""
+    if isinstance(entry, int | float) and not isinstance(entry, bool):
+        return float(entry), ""
+    if not isinstance(entry, str):
         return None
-    unit = units.unit_of(given)
+    unit = units.unit_of(entry)
     try:
-        number = float(given.removesuffix(unit).strip() if unit else given)
+        number = float(entry.removesuffix(unit).strip() if unit else entry)
     except ValueError:
         return None
     return (number, unit) if math.isfinite(number) else None
 
 
-def _around(name: str, group: str, label: str, given: Any, low: float = _NARROW, high: float = _WIDE) -> list[Control]:
-    """A slider about a number that is given; none where it is zero or no number."""
-    found = _number(given)
-    if found is None or found[0] <= 0.0:
+def _around(name: str, group: str, label: str, entry: Any, low: float = _NARROW, high: float = _WIDE) -> list[Control]:
+    number_ = _number(entry)
+    if number_ is None or number_[0] <= 0.0:
         return []
-    value, unit = found
+    value, unit = number_
     step = _round_step((high - low) * value / _STEPS)
     ends = [float(f"{round(share * value / step) * step:.10g}") for share in (low, high)]
     return [Control("set", name, group, label, value, ends[0], ends[1], unit)]
@@ -121,15 +120,15 @@ def _of_points(tables: Mapping[str, Any]) -> Iterator[Control]:
 def _of_engine(tables: Mapping[str, Any]) -> Iterator[Control]:
     engine = tables["engine"]
     for key, (label, low, high) in _OF_ENGINE.items():
-        found = _number(engine.get(key))
-        if found is not None and key in _WHOLE_TURN:
-            yield Control("set", f"engine.{key}", "Engine", label, found[0], low, high, found[1] or "deg")
-        elif found is not None:
+        number_ = _number(engine.get(key))
+        if number_ is not None and key in _WHOLE_TURN:
+            yield Control("set", f"engine.{key}", "Engine", label, number_[0], low, high, number_[1] or "deg")
+        elif number_ is not None:
             yield from _around(f"engine.{key}", "Engine", label, engine.get(key), low, high)
 
 
 def _of_decisions(tables: Mapping[str, Any], problem: Problem) -> Iterator[Control]:
-    """Numbers that a method decides, which the page may hold."""
+    """Yield controls of decided numbers, which the page may fix."""
     for decision in problem.decisions:
         try:
             edits.keys_by_name(tables, decision.name)
@@ -144,13 +143,13 @@ def _of_decisions(tables: Mapping[str, Any], problem: Problem) -> Iterator[Contr
 
 
 def typed(unit: str) -> tuple[str, float]:
-    """The unit in which a number is typed, and its factor on SI."""
+    """Return the unit in which a number is typed, and its factor on SI."""
     _, factor = units.readable(unit)
     return units.shown(1.0, unit).partition(" ")[2], factor
 
 
 def as_typed(value: float, unit: str) -> str | float:
-    """A number [SI] as a file has it."""
+    """Return an SI number as a file writes it."""
     name, factor = typed(unit)
     return f"{factor * value!r} {name}" if name else factor * value
 
@@ -160,19 +159,19 @@ def _of_mounts(tables: Mapping[str, Any]) -> Iterator[Control]:
     of = [("mounts", "All mounts", mounts)]
     of += [(f"mounts.places.{k + 1}", m.get("name", str(k + 1)), m) for k, m in enumerate(mounts.get("places", []))]
     for path, name, table in of:
-        for axis, given in zip(_AXES, table.get("stiffness") or [], strict=False):
+        for axis, entry in zip(_AXES, table.get("stiffness") or [], strict=False):
             place = _AXES.index(axis) + 1
-            yield from _around(f"{path}.stiffness.{place}", "Mounts", f"{name}, stiffness {axis}", given)
+            yield from _around(f"{path}.stiffness.{place}", "Mounts", f"{name}, stiffness {axis}", entry)
 
 
 def _of_limits(tables: Mapping[str, Any]) -> Iterator[Control]:
     for k, entry in enumerate(tables.get("constraints", [])):
         name = limit_name(entry) or ""
         for key, words in SIDES.items():
-            own = _around(f"constraints.{k + 1}.{key}", "Limits", f"{name} {words}", entry.get(key), 0.05)
-            yield from (replace(one, limit=name) for one in own)
+            controls = _around(f"constraints.{k + 1}.{key}", "Limits", f"{name} {words}", entry.get(key), 0.05)
+            yield from (replace(one, limit=name) for one in controls)
         for end, given in enumerate(entry.get("outside") or []):
             words = "band ends" if end else "band begins"
             path = f"constraints.{k + 1}.outside.{end + 1}"
-            own = _around(path, "Limits", f"{name}, {words} at", given, 0.5, 1.5)
-            yield from (replace(one, limit=name) for one in own)
+            controls = _around(path, "Limits", f"{name}, {words} at", given, 0.5, 1.5)
+            yield from (replace(one, limit=name) for one in controls)

@@ -20,7 +20,7 @@ _MOST_PARTS = 48
 
 
 def drawing_of(problem: Problem) -> dict[str, Any] | None:
-    """Front view of a problem's engine in millimetres, y to the right and z up (C2); None of very many cylinders."""
+    """Return the front view of an engine in millimetres, y to the right and z up (C2); None for many cylinders."""
     engine = problem.engine
     parts = engine.slider_cranks
     if not parts or len(parts) > _MOST_PARTS:
@@ -42,7 +42,6 @@ def _steps(cycle: float) -> int:
 
 @lru_cache(maxsize=4)
 def _parts(parts: tuple[SliderCrank, ...], cycle: float) -> list[dict[str, Any]]:
-    """Of slider-cranks, at the steps of a cycle [rad]; the same for every speed and load."""
     angles = np.arange(_steps(cycle)) * cycle / _steps(cycle)
     return [_part([Pose.of(part, float(phi)) for phi in angles]) for part in parts]
 
@@ -66,12 +65,12 @@ def _part(poses: list[Pose]) -> dict[str, Any]:
 
 
 def _rotor(problem: Problem, rotor: Rotor) -> dict[str, Any]:
-    """A weight: what it is without decisions [kg m], and what each adds to it (C4)."""
-    bare, by = complex(rotor.unbalance), list[dict[str, Any]]()
+    """Return a weight: its unbalance without decisions [kg m], and the gain of each decision (C4)."""
+    constant, by = complex(rotor.unbalance), list[dict[str, Any]]()
     for decision in problem.decisions:
         for drive in decision.rotor_drives:
             if drive.rotor == rotor.name:
-                bare -= complex(drive.of(decision.start))
+                constant -= complex(drive.of(decision.start))
                 gains = [complex(drive.of(direction)) for direction in decision.set.directions]
                 angle = angle_name(decision) if decision.set.width > 1 else None
                 by.append({"name": decision.name, "angle": angle, "gains": [[g.real, g.imag] for g in gains]})
@@ -80,7 +79,7 @@ def _rotor(problem: Problem, rotor: Rotor) -> dict[str, Any]:
         "x": _mm(rotor.x),
         "at": [_mm(rotor.shaft.y), _mm(rotor.shaft.z)],
         "ratio": float(rotor.shaft.ratio),
-        "unbalance": [bare.real, bare.imag],
+        "unbalance": [constant.real, constant.imag],
         "by": by,
     }
 

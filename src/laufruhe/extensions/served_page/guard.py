@@ -25,7 +25,7 @@ HEADERS = {
 
 
 class Guard:
-    """The token of one run, and what else a request is asked for.
+    """Token of one run, and checks of a request's headers.
 
     The token is in the part of an address that browsers send to nobody. What a browser is started with other users of
     the machine may see, so that holds a ticket, which is good for one exchange.
@@ -39,16 +39,16 @@ class Guard:
 
     @property
     def address(self) -> str:
-        """With the token, as it is printed."""
+        """Address with the token."""
         return f"http://{self.hosts[0]}/#t={self.token}"
 
     @property
     def ticket_address(self) -> str:
-        """With the ticket, as a browser is started with it."""
+        """Address with the one-time ticket, for starting a browser."""
         return f"http://{self.hosts[0]}/#o={self._ticket}"
 
     def refusal(self, method: str, headers: Mapping[str, str]) -> str:
-        """Why a request is not for this server; empty where it is."""
+        """Return the reason to refuse a request; empty for a good one."""
         if headers.get("Host", "") not in self.hosts:
             return "Host is not this server"
         origin = headers.get("Origin")
@@ -60,11 +60,11 @@ class Guard:
         return ""
 
     def knows(self, token: str | None) -> bool:
-        """Whether a request has the token of this run."""
+        """Return True for the token of this run."""
         return hmac.compare_digest((token or "").encode("utf-8", "replace"), self.token.encode())
 
     def exchanged(self, ticket: str) -> str | None:
-        """The token for the ticket, once."""
+        """Return the token for the ticket, once."""
         with self._lock:
             good = bool(self._ticket) and hmac.compare_digest(ticket.encode("utf-8", "replace"), self._ticket.encode())
             if good:

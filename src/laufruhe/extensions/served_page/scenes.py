@@ -12,8 +12,8 @@ from typing import Any
 from laufruhe.errors import ModelError
 from laufruhe.extensions.served_page.claims import Simpler, listed
 from laufruhe.extensions.served_page.drawing import drawing_of
-from laufruhe.extensions.served_page.following import Followed, Follower, can_follow
-from laufruhe.extensions.served_page.front import partners
+from laufruhe.extensions.served_page.follower import Follower, Optimum, can_follow
+from laufruhe.extensions.served_page.pareto import partners
 from laufruhe.files.measures import EDGES
 from laufruhe.live import live_model
 from laufruhe.problem.decision import Kind
@@ -42,7 +42,7 @@ _KEPT = 6
 
 
 class Scene:
-    """A problem but for its limits: what is drawn of it, and what follows a limit that slides.
+    """A problem without the values of its limits: its drawing and its follower.
 
     Where something is open that loads are not affine in, it stays as given.
     """
@@ -61,64 +61,63 @@ class Scene:
                 # an engine on mounts in time has no loads that are affine in anything
                 self.follower = None
 
-    def evaluated(self, found: Followed | None) -> Evaluation:
-        """Return the exact model's answer to the design that follows, or to that given where none does."""
-        if found is None or found.conflict:
+    def evaluated(self, followed: Optimum | None) -> Evaluation:
+        """Return the exact evaluation of the followed design; of the given one if there is none."""
+        if followed is None or followed.conflict:
             return self.given
-        return evaluate(self.problem.fixed_at(found.values))
+        return evaluate(self.problem.fixed_at(followed.values))
 
-    def standing(self, limits: Sequence[Limit], design: Evaluation, found: Followed | None) -> tuple[LimitValue, ...]:
-        """Return how a design stands to limits, with the prices of those that follow [SI]."""
+    def standing(self, limits: Sequence[Limit], design: Evaluation, followed: Optimum | None) -> tuple[LimitValue, ...]:
+        """Return how a design stands to limits, with prices [SI]."""
         if design.resonance:
             return ()
         stands = limit_values(replace(self.problem, limits=tuple(limits)), design)
-        if found is None or found.conflict:
+        if followed is None or followed.conflict:
             return stands
-        pairs = zip(limits, stands, found.prices, strict=True)
-        return tuple(self._priced(limit, stand, price, found.value) for limit, stand, price in pairs)
+        pairs = zip(limits, stands, followed.prices, strict=True)
+        return tuple(self._priced(limit, stand, price, followed.value) for limit, stand, price in pairs)
 
     def _priced(self, limit: Limit, stand: LimitValue, price: float, value: float) -> LimitValue:
-        if limit.measure not in {own.measure for own in self.problem.load_limits}:
+        if limit.measure not in {limit_.measure for limit_ in self.problem.load_limits}:
             return replace(stand, shadow_price=math.nan) if stand.active else stand
         # a price that would not move the objective by its rounding is none
         active = price * abs(limit.maximum) > ROUNDING * value
         return replace(stand, active=active, shadow_price=price if active else 0.0)
 
-    def drawn(self, limits: tuple[Limit, ...], design: Evaluation, found: Followed | None) -> dict[str, Any]:
-        """Return what the page draws from; why there is nothing to slide else."""
+    def drawn(self, limits: tuple[Limit, ...], design: Evaluation, followed: Optimum | None) -> dict[str, Any]:
+        """Return the page's drawing data, or the reason for having no sliders."""
         problem = replace(self.problem, limits=limits)
         result = Result(problem=problem, status=Status.FEASIBLE, initial=self.given, final=design)
-        if found is not None and not found.conflict:
-            pairs = zip(problem.decisions, found.values, strict=True)
+        if followed is not None and not followed.conflict:
+            pairs = zip(problem.decisions, followed.values, strict=True)
             entries = tuple(entry for decision, value in pairs for entry in decision_values(decision, value))
-            result = replace(result, decisions=entries, limits=self.standing(limits, design, found))
+            result = replace(result, decisions=entries, limits=self.standing(limits, design, followed))
         model = live_model(self.whole, result, is_served=True)
         about = {"engine": drawing_of(self.problem), "partners": list(partners(self.problem))}
         return {**about, "unshown": model.why_not} if model.why_not else {**about, "model": model.as_json()}
 
-    def simpler(self, held: Collection[Kind]) -> Simpler:
-        """Return what of the whole problem stands still or is left out while sliders move.
+    def simpler(self, fixed_kinds: Collection[Kind]) -> Simpler:
+        """Return what is fixed or left out while sliders move.
 
         Parameters
         ----------
         held
             Kinds of open numbers that the page holds as they were decided.
         """
-        whole = self.whole
-        still = {*held, *(decision.kind for decision in whole.decisions if not decision.is_affine)}
-        if whole.phasing is not None:
-            still.add(Kind.STAR)
+        problem = self.whole
+        kinds = {*fixed_kinds, *(decision.kind for decision in problem.decisions if not decision.is_affine)}
+        if problem.phasing is not None:
+            kinds.add(Kind.STAR)
         unread = [limit.name for limit in self.problem.limits if not self._reads(limit)]
         left_out = [
-            *(extra.words for extra in whole.extras),
-            *(["later objectives"] if whole.ranks else []),
+            *(extra.words for extra in problem.extras),
+            *(["later objectives"] if problem.ranks else []),
             *([f"the limit{'s' if len(unread) > 1 else ''} on {listed(unread)}"] if unread else []),
         ]
-        phrases = dict.fromkeys(STILL.get(kind, f"the {kind.words}") for kind in sorted(still))
+        phrases = dict.fromkeys(STILL.get(kind, f"the {kind.words}") for kind in sorted(kinds))
         return Simpler(tuple(phrases), tuple(left_out))
 
     def _reads(self, limit: Limit) -> bool:
-        """Return True for a limit that stands still, or follows sliders."""
         moved = depends(limit.measure.channel, kinds_of(self.problem), self.problem)
         return limit in self.problem.load_limits or not moved
 
@@ -127,7 +126,7 @@ _scenes: dict[str, Scene] = {}
 
 
 def scene_of(problem: Problem, tables: Mapping[str, Any], content: str) -> Scene:
-    """Return the scene of a problem, kept for the next request."""
+    """Return the scene of a problem from a small cache."""
     key = key_of(tables, content)
     if key not in _scenes:
         while len(_scenes) >= _KEPT:
@@ -137,7 +136,7 @@ def scene_of(problem: Problem, tables: Mapping[str, Any], content: str) -> Scene
 
 
 def key_of(tables: Mapping[str, Any], content: str) -> str:
-    """Return a hash of all but where limits stand.
+    """Return a hash of the problem without the values of its limits.
 
     Parameters
     ----------

@@ -16,11 +16,11 @@ from typing import Any, ParamSpec
 
 from laufruhe.errors import Complaint, SolverError, printed, refused
 from laufruhe.extensions.served_page import answers
-from laufruhe.extensions.served_page.asked import Asked
-from laufruhe.extensions.served_page.desk import Desk, Superseded
-from laufruhe.extensions.served_page.front import POINTS
+from laufruhe.extensions.served_page.file_watcher import FileWatcher
+from laufruhe.extensions.served_page.latest_worker import LatestWorker, Superseded
+from laufruhe.extensions.served_page.page_state import PageState
+from laufruhe.extensions.served_page.pareto import POINTS
 from laufruhe.extensions.served_page.transport import Answer, Server
-from laufruhe.extensions.served_page.watched import Watched
 from laufruhe.files.complaints import Refused
 from laufruhe.live import page_assets
 from laufruhe.present.pictures import PICTURES
@@ -36,7 +36,7 @@ _HASTE, _PATIENCE = 5.0, 1.0
 
 
 class Page:
-    """A server with the processes that work for it.
+    """A server with its worker processes.
 
     Parameters
     ----------
@@ -49,10 +49,10 @@ class Page:
     """
 
     def __init__(self, path: Path, port: int | None, seconds: float) -> None:
-        self.watched = Watched(path)
+        self.watched = FileWatcher(path)
         self.server = _listening(port, _files())
-        self._follow, self._measure = Desk(_HASTE), Desk(_HASTE)
-        self._settle, self._front = Desk(_PATIENCE), Desk(_PATIENCE)
+        self._follow, self._measure = LatestWorker(_HASTE), LatestWorker(_HASTE)
+        self._settle, self._front = LatestWorker(_PATIENCE), LatestWorker(_PATIENCE)
         self.server.handles = {
             "/begin": self._begun,
             "/follow": self._asked(self._follow, FOLLOWED, answers.follow),
@@ -66,11 +66,11 @@ class Page:
 
     @property
     def address(self) -> str:
-        """As it is printed."""
+        """Address as printed."""
         return self.server.guard.address
 
     def serve(self, ends_after: float | None, when_ready: Callable[[], object]) -> None:
-        """Answer until an interrupt, or so many seconds."""
+        """Answer requests until an interrupt, or for some seconds."""
         self.watched.start()
         timer = None
         if ends_after is not None:
@@ -88,7 +88,7 @@ class Page:
                 timer.cancel()
 
     def close(self) -> None:
-        """End what works for it, and the server."""
+        """End the worker processes and the server."""
         self.watched.close()
         for desk in (self._follow, self._measure, self._settle, self._front):
             desk.close()
@@ -96,43 +96,42 @@ class Page:
 
     def _warmed(self) -> None:
         with suppress(Exception):
-            self._follow.ask(FOLLOWED, answers.follow, self.watched.source, Asked())
+            self._follow.ask(FOLLOWED, answers.follow, self.watched.source, PageState())
 
     def _begun(self, _: Any) -> Answer:
-        found = json.loads(answers.begin(self.watched.source))
-        return Answer(json.dumps({**found, **self._state()}))
+        answer = json.loads(answers.begin(self.watched.source))
+        return Answer(json.dumps({**answer, **self._state()}))
 
     def _state(self) -> dict[str, Any]:
         return {"version": self.watched.version, "complaint": self.watched.complaint}
 
-    def _asked(self, desk: Desk, seconds: float, work: Callable[..., str], *more: Any) -> Callable[[Any], Answer]:
-        return _read(lambda asked: _worked(partial(desk.ask, seconds, work, self.watched.source, asked, *more)))
+    def _asked(
+        self, desk: LatestWorker, seconds: float, work: Callable[..., str], *more: Any
+    ) -> Callable[[Any], Answer]:
+        return _read(lambda state: _worked(partial(desk.ask, seconds, work, self.watched.source, state, *more)))
 
-    def _lines(self, desk: Desk, most: int, work: Callable[..., str], asked: Asked, *more: Any) -> Answer:
-        """Answers with their numbers, one after the other."""
+    def _lines(self, desk: LatestWorker, most: int, work: Callable[..., str], state: PageState, *more: Any) -> Answer:
         source = self.watched.source
-        return Answer(lines=_each(lambda k: partial(desk.ask, FOLLOWED, work, source, asked, *more, k), most))
+        return Answer(lines=_each(lambda k: partial(desk.ask, FOLLOWED, work, source, state, *more, k), most))
 
     def _fronted(self, body: Any) -> Answer:
         across = body.pop("across", None) if isinstance(body, dict) else None
         if not isinstance(across, str) or len(across) > 200:
             return _wrong(Complaint("across", "", "is no measure", "load the page again"))
-        return _read(lambda asked: self._lines(self._front, POINTS, answers.front, asked, across))(body)
+        return _read(lambda state: self._lines(self._front, POINTS, answers.front, state, across))(body)
 
     def _events(self) -> Iterator[str]:
-        """What the page is told unasked: that the file has changed, and that somebody is there."""
         version = 0
         while not self.watched.is_closed:
             version = self.watched.later(version, HEARTBEAT)
             yield json.dumps(self._state())
 
 
-def _read(answer: Callable[[Asked], Answer]) -> Callable[[Any], Answer]:
-    """What answers a request that can be read; another is refused."""
+def _read(answer: Callable[[PageState], Answer]) -> Callable[[Any], Answer]:
 
     def answered(body: Any) -> Answer:
         try:
-            return answer(Asked.of(body))
+            return answer(PageState.from_json(body))
         except Refused as refused:
             return _wrong(refused.complaint)
 
@@ -140,7 +139,6 @@ def _read(answer: Callable[[Asked], Answer]) -> Callable[[Any], Answer]:
 
 
 def _each(work: Callable[[int], Callable[[], str]], most: int) -> Iterator[str]:
-    """Answers one after the other, until one is the last."""
     for k in range(most):
         text = _worked(work(k)).text
         yield text
@@ -171,14 +169,15 @@ def _wrong(complaint: Complaint) -> Answer:
 
 
 def _files() -> dict[str, str]:
-    """Everything that is handed out: the page's own files, and those of a live report."""
     folder = files("laufruhe.extensions.served_page") / "static"
-    own = {f.name: f.read_text(encoding="utf-8") for f in folder.iterdir() if f.name.endswith((".html", ".js", ".css"))}
-    return {**own, **page_assets()}
+    texts = {
+        f.name: f.read_text(encoding="utf-8") for f in folder.iterdir() if f.name.endswith((".html", ".js", ".css"))
+    }
+    return {**texts, **page_assets()}
 
 
 def _listening(port: int | None, texts: dict[str, str]) -> Server:
-    """At the port; without one at the usual, or where that is taken at any."""
+    """Return a server at the port; by default at the usual port, or at a free one."""
     try:
         return Server(USUAL_PORT if port is None else port, texts)
     except OSError as error:

@@ -26,7 +26,7 @@ _JSON = "application/json"
 
 @dataclass(frozen=True)
 class Answer:
-    """What a request gets: text, or lines that come as they are made."""
+    """Response to a request: text, or lines sent as they are made."""
 
     text: str = ""
     lines: Iterator[str] | None = None
@@ -37,7 +37,7 @@ Handle = Callable[[Any], Answer]
 
 
 class Server(ThreadingHTTPServer):
-    """Threads for the requests of one page; nobody beyond this machine reaches it.
+    """Threaded server of one page, reachable from this machine only.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ class Server(ThreadingHTTPServer):
         self._lock = threading.Lock()
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Start a thread for a connection. Without room the slowest sender gives way; if all are answered, refuse."""
+        """Start a thread for a connection. Without room the slowest sender is evicted; if all are answered, refuse."""
         has_room = self._room.acquire(blocking=False)
         if not has_room and self._evict():
             has_room = self._room.acquire(timeout=EVICTION)
@@ -74,7 +74,6 @@ class Server(ThreadingHTTPServer):
         super().process_request(request, client_address)
 
     def _evict(self) -> bool:
-        """Close the connection that has been sending its request for the longest time."""
         with self._lock:
             slowest = next(iter(self._readers), None)
             if slowest is None:
@@ -90,7 +89,7 @@ class Server(ThreadingHTTPServer):
             self._readers.pop(request, None)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
-        """One connection."""
+        """Handle one connection."""
         try:
             super().process_request_thread(request, client_address)
         finally:
@@ -98,10 +97,10 @@ class Server(ThreadingHTTPServer):
             self._room.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Who has gone away is no error; nothing of a request is ever written to a log."""
+        """Ignore clients that have gone away; log nothing."""
 
     def server_bind(self) -> None:
-        """Bind, and look up no name."""
+        """Bind without looking up a name."""
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         self.socket.bind(self.server_address)
         self.server_address = self.socket.getsockname()
@@ -109,7 +108,7 @@ class Server(ThreadingHTTPServer):
 
 
 class _Incoming(io.RawIOBase):
-    """A request's bytes, limited in number and in the time that all of them together take."""
+    """Bytes of a request, limited in number and total time."""
 
     def __init__(self, connection: socket.socket) -> None:
         self._connection = connection
@@ -121,7 +120,7 @@ class _Incoming(io.RawIOBase):
         return True
 
     def readinto(self, buffer: Any) -> int:
-        """Return the number of bytes received; `TimeoutError` where time or room is over."""
+        """Return the number of bytes received; `TimeoutError` beyond the limits."""
         left = self._until - time.monotonic()
         if left <= 0.0 or self._room <= 0:
             raise TimeoutError
@@ -132,7 +131,7 @@ class _Incoming(io.RawIOBase):
 
 
 class Request(BaseHTTPRequestHandler):
-    """One connection of a page, which carries one request."""
+    """One connection, which carries one request."""
 
     protocol_version = "HTTP/1.1"
     server_version = "laufruhe"
@@ -142,16 +141,16 @@ class Request(BaseHTTPRequestHandler):
     server: Server
 
     def setup(self) -> None:
-        """Read by a deadline."""
+        """Prepare reading with a deadline."""
         super().setup()
         self.rfile.close()
         self.rfile = io.BufferedReader(_Incoming(self.connection))
 
     def log_message(self, format: str, *args: object) -> None:
-        """Nothing: a log may be read by others."""
+        """Log nothing: others may read a log."""
 
     def do_GET(self) -> None:
-        """The page and its files, which hold nothing of the problem."""
+        """Send the page and its files, which hold nothing of the problem."""
         self.server.has_read(self.connection)
         path = "/page.html" if self.path == "/" else self.path
         refusal = self.server.guard.refusal("GET", self._headers())
@@ -164,7 +163,7 @@ class Request(BaseHTTPRequestHandler):
             self._send(HTTPStatus.OK, self.server.files[path], f"{kind}; charset=utf-8")
 
     def do_POST(self) -> None:
-        """What computes, for whoever has the token; a ticket is exchanged for it."""
+        """Compute for a client with the token; exchange a ticket for it."""
         guard = self.server.guard
         refusal = guard.refusal("POST", self._headers())
         if refusal:
@@ -181,23 +180,23 @@ class Request(BaseHTTPRequestHandler):
 
     def _headers(self) -> Mapping[str, str]:
         # two of one name are as good as a wrong one
-        found = {name: self.headers.get_all(name, []) for name in ("Host", "Origin", "Sec-Fetch-Site")}
-        return {name: given[0] if len(given) == 1 else "?" for name, given in found.items() if given}
+        headers = {name: self.headers.get_all(name, []) for name in ("Host", "Origin", "Sec-Fetch-Site")}
+        return {name: values[0] if len(values) == 1 else "?" for name, values in headers.items() if values}
 
     def _body(self) -> Any:
-        """What was sent, as JSON; None where it was refused."""
-        told = self.headers.get("Content-Length", "")
-        if self.headers.get("Transfer-Encoding") is not None or not told.isdecimal() or len(told) > 9:
+        """Return the request's JSON; None after refusing it."""
+        length = self.headers.get("Content-Length", "")
+        if self.headers.get("Transfer-Encoding") is not None or not length.isdecimal() or len(length) > 9:
             return self._refused(HTTPStatus.LENGTH_REQUIRED, "tell the length of the request")
-        if int(told) > MOST_BYTES:
+        if int(length) > MOST_BYTES:
             return self._refused(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"at most {MOST_BYTES} bytes are read")
         if self.headers.get_content_type() != _JSON:
             return self._refused(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send JSON")
         try:
-            found = json.loads(self.rfile.read(int(told)), parse_constant=_no_number)
+            body = json.loads(self.rfile.read(int(length)), parse_constant=_no_number)
         except (ValueError, RecursionError):
             return self._refused(HTTPStatus.BAD_REQUEST, "is no JSON")
-        return found if found is not None else self._refused(HTTPStatus.BAD_REQUEST, "is nothing")
+        return body if body is not None else self._refused(HTTPStatus.BAD_REQUEST, "is nothing")
 
     def _exchanged(self, body: Any) -> Answer:
         ticket = body.get("ticket") if isinstance(body, dict) else None
@@ -243,7 +242,7 @@ class Request(BaseHTTPRequestHandler):
         self._send(status, json.dumps({"error": why}).encode(), _JSON)
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:  # noqa: ARG002
-        """What http.server itself refuses, in the same words and under the same headers."""
+        """Report errors of http.server as JSON under the same headers."""
         self._refused(HTTPStatus(code), message or HTTPStatus(code).phrase)
 
 

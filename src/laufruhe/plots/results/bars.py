@@ -26,23 +26,23 @@ applies = has_mount_forces
 
 @styled()
 def figure(result: Result) -> Figure:
-    """One group of bars for each mount and one for all; rows for operating points, and for many mounts."""
+    """Draw a group of bars per mount and one for all mounts; a row per operating point, and for many mounts."""
     several = range(len(result.problem.points))
-    shown = list(several) if len(several) <= MOST_POINTS else [hardest_point(result)]
+    points = list(several) if len(several) <= MOST_POINTS else [hardest_point(result)]
     names = [*result.initial.mount_names, "all mounts"]
     parts, side = rows_of(len(names), MOST_GROUPS)
-    rows = [(k, part) for k in shown for part in parts]
+    rows = [(k, part) for k in points for part in parts]
     high = 3.2 if len(rows) == 1 else 2.1
-    drawn = page(len(rows), 1, (max(GROUP * (side + 0.3), 4.2), high), lead=0.12 if len(shown) > 1 else 0.0)
+    drawn = page(len(rows), 1, (max(GROUP * (side + 0.3), 4.2), high), lead=0.12 if len(points) > 1 else 0.0)
     series = series_of(result, loads=True)
-    values = {k: [_measures(one.design, k) for one in series] for k in shown}
+    values = {k: [_measures(one.design, k) for one in series] for k in points}
     top = thin(float(table.max(initial=0.0)) for tables in values.values() for table in tables)
     for axes, (k, part) in zip(drawn.panels, rows, strict=True):
         _groups(axes, values[k], series, part, top)
         _frame(axes, names, part, side, top)
         if len(several) > 1 and part is parts[0]:
             axes.set_title(f"at {result.problem.points[k].name}", loc="left", size=10)
-    at = f" at {result.problem.points[shown[0]].name}" if len(shown) == 1 else ""
+    at = f" at {result.problem.points[points[0]].name}" if len(points) == 1 else ""
     lines = f"Magnitude of each mount's force{at}: mean over the working cycle, and its largest value."
     legend = [Patch(facecolor=one.colour, edgecolor=one.colour, label=one.name) for one in series]
     legend.append(Patch(facecolor=FAINT, edgecolor=FAINT, label="full: mean"))
@@ -51,7 +51,6 @@ def figure(result: Result) -> Figure:
 
 
 def _measures(design: Evaluation, k: int) -> Array:
-    """Mean and maximum of every mount and of all, shape (2, mounts + 1) [N]."""
     each = measured(design, k)
     mean, most = np.array([m.mean for m in each]), np.array([m.max for m in each])
     return np.array([[*mean, mean.mean()], [*most, most.max()]])

@@ -28,7 +28,7 @@ applies = has_bearings
 
 @styled()
 def figure(result: Result) -> Figure:
-    """A column a bearing, all to one scale: above as the block feels it, below as the crankshaft does."""
+    """Draw a column per bearing, to one scale: above the force on the block, below on the crankshaft."""
     first = load_designs(result)[0]
     # the operating point with the largest force on a bearing
     k = int(np.argmax([np.abs(bearing_paths(first, j)).max() for j in range(len(first.loads))]))
@@ -71,8 +71,8 @@ def _draw(axes: Axes, paths: Sequence[Plane], series: Sequence[Series], size: fl
     for direction in (axes.xaxis, axes.yaxis):
         round_ticks(direction, 4, symmetric=True)
     for path, one in zip(paths, series, strict=True):
-        whole = np.append(path, path[0])
-        axes.plot(whole.imag, whole.real, color=one.colour, linewidth=1.5, solid_joinstyle="round")
+        closed = np.append(path, path[0])
+        axes.plot(closed.imag, closed.real, color=one.colour, linewidth=1.5, solid_joinstyle="round")
         axes.plot(path[:1].imag, path[:1].real, "o", color=one.colour, markersize=4.0)
     _wear(axes, paths[-1], size)
 

@@ -25,7 +25,7 @@ applies = is_elastic
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Where an order meets a natural frequency, speed is critical."""
+    """Draw orders and natural frequencies; critical speeds are their intersections."""
     facts, top = facts_of(result.final), fastest(result)
     drawn = page(1, 1, (6.2, 4.2))
     axes = drawn.panels[0]
@@ -42,13 +42,12 @@ def figure(result: Result) -> Figure:
     mark_points(axes, result)
     critical = entry_of_dots("critical speed", color=AFTER, markersize=4.5)
     which = "of the design as decided" if changed(result) else "as given"
-    lines = f"Natural frequencies {which}, and the orders that load it most.{at_which_stiffness(facts)}"
+    lines = f"Natural frequencies {which}, and the orders that excite each most.{at_which_stiffness(facts)}"
     legend = [*order_entries(facts, AFTER), critical, *legend, *_with_fluid(axes, facts)]
     return headed(drawn, result, "Critical speeds", lines, legend)
 
 
 def _with_fluid(axes: Axes, facts: MountingFacts) -> list[Artist]:
-    """Natural frequencies of block and fluid together, which may stand elsewhere; of these the legend."""
     look: Any = {"color": BEFORE, "linewidth": 1.0, "linestyle": ":"}
     for frequency in facts.with_fluid:
         axes.axhline(frequency, zorder=1.5, **look)
@@ -56,7 +55,7 @@ def _with_fluid(axes: Axes, facts: MountingFacts) -> list[Artist]:
 
 
 def _modes(axes: Axes, facts: MountingFacts) -> None:
-    """Natural frequencies with their names, and the speeds at which the excited ones are critical."""
+    """Draw named natural frequencies, and the critical speeds of the excited ones."""
     names = []
     for j, (name, frequency) in enumerate(zip(facts.modes.names, facts.modes.frequencies, strict=True)):
         excited = j in facts.excited
@@ -69,7 +68,6 @@ def _modes(axes: Axes, facts: MountingFacts) -> None:
 
 
 def _marked(axes: Axes, edges: list[float], bands: list[tuple[float, float]]) -> list[Artist]:
-    """Bands that are to hold no natural frequency, and ends that none may pass; of these the legend."""
     for band in bands:
         axes.axhspan(*band, color=LIMIT, alpha=0.13, linewidth=0)
     for edge in edges:

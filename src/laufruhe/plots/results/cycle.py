@@ -40,7 +40,7 @@ _LEGEND: Any = {"facecolor": "white", "edgecolor": "none", "framealpha": 0.85}
 
 @dataclass(frozen=True)
 class Row:
-    """What one panel shows: curves by their names, each of every design, shape (designs, angles), and its ends.
+    """Content of one panel: curves by name, shape (designs, angles), and the ends of its axis.
 
     What is too small to be drawn is told.
     """
@@ -53,67 +53,66 @@ class Row:
 
     @property
     def words(self) -> str:
-        """What the axis is called: vertical force, where that is the only component."""
+        """Label of the axis."""
         only = next(iter(self.curves)) if len(self.curves) == 1 else ""
         return f"{only} {self.label.split()[-1]}" if only else self.label
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """A column an operating point; a row each for shaking force, roll moment, rocking couple, and every mount."""
-    shown, mounts, series = _points(result), _mounts(result), series_of(result, loads=True)
-    wide = {1: ALONE, 2: BESIDE}.get(len(shown), NARROW)
+    """Draw a column per operating point; rows for shaking force, roll moment, rocking couple and every mount."""
+    points, mounts, series = _points(result), _mounts(result), series_of(result, loads=True)
+    wide = {1: ALONE, 2: BESIDE}.get(len(points), NARROW)
     degrees = np.linspace(0.0, math.degrees(result.final.engine.cycle.angle), STEPS + 1)
-    columns = [list(_rows(series, k, mounts)) for k in shown]
+    columns = [list(_rows(series, k, mounts)) for k in points]
     every = list(zip(*columns, strict=True))
     rows = [row for row in every if any(each.curves for each in row)]
     balanced = [row for row in every if not any(each.curves for each in row)]
-    drawn = page(len(rows), len(shown), (wide, HIGH), gap=GAP, lead=0.1, across=ACROSS)
+    drawn = page(len(rows), len(points), (wide, HIGH), gap=GAP, lead=0.1, across=ACROSS)
     for j, row in enumerate(rows):
-        panels = drawn.panels[j * len(shown) : (j + 1) * len(shown)]
+        panels = drawn.panels[j * len(points) : (j + 1) * len(points)]
         _beside(panels, row, degrees, [one.colour for one in series])
         for axes in panels:
             axes.tick_params(labelbottom=j == len(rows) - 1, length=2)
-    for column, k in enumerate(shown):
-        panels = drawn.panels[column :: len(shown)]
+    for column, k in enumerate(points):
+        panels = drawn.panels[column :: len(points)]
         _mark_firings(panels, result.final.engine, wide)
         panels[-1].set_xlabel("crank angle [°]")
-        if len(shown) > 1:
+        if len(points) > 1:
             name = fitted(result.problem.points[k].name, wide, 10)
             panels[0].annotate(name, (0, 1), (0, 20), "axes fraction", "offset points", size=10)
-    aligned(drawn.panels[:: len(shown)])
+    aligned(drawn.panels[:: len(points)])
     at = "" if len(result.problem.points) > 1 else f" at {result.problem.points[0].name}"
     what = "Loads on the block and forces on the mounts" if mounts else "Loads on the block"
     largest = [max(row, key=lambda each: each.ends[1]) for row in balanced]
-    none = f" Not shown: {', '.join(f'{row.label} ({row.left_out})' for row in largest)}." if balanced else ""
+    none = "".join(f" {row.label.capitalize()}: {row.left_out}." for row in largest)
     firings, mark = firing_words(result)
     lines = f"{what}{at}; above, the {firings} by cylinder.{none}"
     firing = entry(mark, color=FAINT, linewidth=0.8, linestyle=STYLES[2])
     legend = [*(one.entry() for one in series), firing]
     return headed(
-        drawn, result, "Forces and moments over one working cycle", lines, legend, _left_out(result, shown, mounts)
+        drawn, result, "Forces and moments over one working cycle", lines, legend, _left_out(result, points, mounts)
     )
 
 
 def _beside(panels: Sequence[Axes], row: Sequence[Row], degrees: Array, colours: Sequence[str]) -> None:
-    """One quantity at every operating point, in one scale."""
+    """Draw one quantity at every operating point, to one scale."""
     ends = (min(each.ends[0] for each in row), max(each.ends[1] for each in row))
     factor, unit = in_thousands(max(map(abs, ends)), row[0].unit)
-    told = max(row, key=lambda each: len(each.curves))
+    richest = max(row, key=lambda each: len(each.curves))
     for axes, each in zip(panels, row, strict=True):
         _draw(axes, replace(each, ends=ends), degrees, colours, factor)
         axes.tick_params(labelleft=axes is panels[0])
-        if each is told and len(told.curves) > 1:
+        if each is richest and len(richest.curves) > 1:
             axes.legend(loc="upper right", ncols=3, borderaxespad=0.0, borderpad=0.1, **_LEGEND)
             axes.set_ylim(top=axes.get_ylim()[1] + 0.3 * (axes.get_ylim()[1] - axes.get_ylim()[0]))
     for axes in panels:
         axes.set_ylim(top=max(other.get_ylim()[1] for other in panels))
     first = panels[0]
-    first.set_ylabel(f"{fitted(told.words, HIGH + 0.1)}\n[{unit}]", va="center")
+    first.set_ylabel(f"{fitted(richest.words, HIGH + 0.1)}\n[{unit}]", va="center")
 
 
 def _points(result: Result) -> list[int]:
-    """All operating points; of many the slowest, the fastest, and the one with the largest loads or one between."""
     points = result.problem.points
     if len(points) <= MOST_POINTS:
         return list(range(len(points)))
@@ -123,7 +122,6 @@ def _points(result: Result) -> list[int]:
 
 
 def _mounts(result: Result) -> list[int]:
-    """Mounts in their order; of many those with the largest forces."""
     forces = result.final.loads[hardest_point(result)].mount_forces
     if forces is None:
         return []
@@ -138,7 +136,7 @@ def _left_out(result: Result, shown: Sequence[int], mounts: Sequence[int]) -> st
 
 
 def _rows(series: Sequence[Series], k: int, mounts: Sequence[int]) -> Iterator[Row]:
-    """Shaking force and moments about the origin (C2, C7), and the magnitude of every mount's force."""
+    """Yield shaking force and moments about the origin (C2, C7), and the magnitude of every mount's force."""
     loads = [one.design.loads[k] for one in series]
     base = series[0].design.engine.cycle.base_order
     x, y, z, roll, pitch, yaw = np.moveaxis(np.stack([_closed(load.wrench, base) for load in loads]), -1, 0)
@@ -155,7 +153,6 @@ def _rows(series: Sequence[Series], k: int, mounts: Sequence[int]) -> Iterator[R
 
 
 def _closed(signal: Spectrum, base: Fraction) -> Array:
-    """At every step of a cycle and at its end, where it is as at the beginning."""
     samples = over(base, [signal])[0].sample(STEPS)
     return np.concatenate([samples, samples[:1]])
 
@@ -166,9 +163,9 @@ def _row(label: str, unit: str, curves: Mapping[str, Array], most: float) -> Row
     if words := left_out(top, most, unit):
         return Row(label, unit, {}, (0.0, top), words)
     least = SHARE * top
-    felt = {name: curve for name, curve in curves.items() if size[name] > least}
-    ends = [float(end) for curve in felt.values() for end in (curve.min(), curve.max())]
-    return Row(label, unit, felt, (min(ends, default=0.0), max(ends, default=0.0)))
+    visible = {name: curve for name, curve in curves.items() if size[name] > least}
+    ends = [float(end) for curve in visible.values() for end in (curve.min(), curve.max())]
+    return Row(label, unit, visible, (min(ends, default=0.0), max(ends, default=0.0)))
 
 
 def _draw(axes: Axes, row: Row, degrees: Array, colours: Sequence[str], factor: float) -> None:
@@ -187,10 +184,10 @@ def _draw(axes: Axes, row: Row, degrees: Array, colours: Sequence[str], factor: 
 
 
 def _mark_firings(panels: Sequence[Axes], engine: Engine, wide: float) -> None:
-    """A line at every firing; above the first panel the cylinders, where there is room for their numbers."""
-    whole, firings = math.degrees(engine.cycle.angle), dict[float, list[int]]()
+    """Draw a line per firing, and cylinder numbers above the first panel if there is room."""
+    cycle, firings = math.degrees(engine.cycle.angle), dict[float, list[int]]()
     for number, part in enumerate(engine.cylinders, 1):
-        firings.setdefault(round(math.degrees(part.firing_angle), 6) % whole, []).append(number)
+        firings.setdefault(round(math.degrees(part.firing_angle), 6) % cycle, []).append(number)
     for axes in panels:
         for angle in firings:
             axes.axvline(angle, color=FAINT, linewidth=0.8, linestyle=STYLES[2], zorder=0.6)

@@ -14,13 +14,13 @@ from laufruhe.solvers.result import Result
 
 
 def applies(result: Result) -> bool:
-    """Every engine has a shape."""
+    """Return True for an engine with slider-cranks."""
     return bool(result.final.engine.slider_cranks)
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """End and side view of the design at a crank angle of zero."""
+    """Draw end and side view at a crank angle of zero."""
     scene = Scene.of(result)
     drawn = views(scene)
     draw_views(drawn, scene)

@@ -24,18 +24,18 @@ applies = has_ranking
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Firing orders as bars over one working cycle, a segment from each firing to the next."""
-    shown = _shown(ranking_of(result))
-    count = len(shown[0][1].order)
-    cycle = math.degrees(sum(shown[0][1].intervals))
-    uneven = any(max(o.intervals) - min(o.intervals) > 1e-6 for _, o in shown)
+    """Draw firing orders as bars over one working cycle, a segment between two firings."""
+    orders = _selected(ranking_of(result))
+    count = len(orders[0][1].order)
+    cycle = math.degrees(sum(orders[0][1].intervals))
+    uneven = any(max(o.intervals) - min(o.intervals) > 1e-6 for _, o in orders)
     wide = min(max(6.0, count * (0.5 if uneven else 0.4)), WIDEST - 1.4)
-    drawn = page(1, 1, (wide, 0.1 + (0.52 if uneven else 0.42) * len(shown)))
+    drawn = page(1, 1, (wide, 0.1 + (0.52 if uneven else 0.42) * len(orders)))
     axes = drawn.panels[0]
-    for row, (k, order) in enumerate(shown):
+    for row, (k, order) in enumerate(orders):
         _bar(axes, row, order, uneven, BEST if k == 0 else NEXT)
-    axes.set_yticks([-row for row in range(len(shown))], [f"star {k + 1}" for k, _ in shown])
-    axes.set(xlim=(0.0, cycle), ylim=(0.5 - len(shown), 0.5), xlabel="crank angle [°]")
+    axes.set_yticks([-row for row in range(len(orders))], [f"star {k + 1}" for k, _ in orders])
+    axes.set(xlim=(0.0, cycle), ylim=(0.5 - len(orders), 0.5), xlabel="crank angle [°]")
     axes.set_xticks(np.linspace(0.0, cycle, 9 if cycle > 400 else 5))
     axes.grid(axis="y", visible=False)
     legend = [Patch(color=BEST[0], label="best star"), Patch(color=NEXT[0], label="next in the ranking")]
@@ -43,17 +43,16 @@ def figure(result: Result) -> Figure:
     fires, stands = ("Firing orders", "Cylinder that fires"), ("Orders of dead centres", "Piston at the head end")
     title, who = fires if has_firing(result) else stands
     lines = f"{who}, and the crank angle to the next{intervals}"
-    return headed(drawn, result, title, lines, legend[: 1 + any(k for k, _ in shown)])
+    return headed(drawn, result, title, lines, legend[: 1 + any(k for k, _ in orders)])
 
 
-def _shown(phasing: PhasingResult) -> list[tuple[int, RankedOrder]]:
-    """Several orders of the best star, one of each other, with the rank of the star."""
-    own = [(0, order) for order in phasing.ranking[0].firing_orders][: SHOWN // 2 + 1]
+def _selected(phasing: PhasingResult) -> list[tuple[int, RankedOrder]]:
+    best = [(0, order) for order in phasing.ranking[0].firing_orders][: SHOWN // 2 + 1]
     others = [
         (k, order) for k, star in enumerate(phasing.ranking) for order in star.firing_orders
         if k and order == star.firing_orders[0]
     ]  # fmt: skip
-    return (own + others)[:SHOWN]
+    return (best + others)[:SHOWN]
 
 
 def _bar(axes: Axes, row: int, order: RankedOrder, uneven: bool, shades: tuple[str, str]) -> None:
@@ -64,11 +63,11 @@ def _bar(axes: Axes, row: int, order: RankedOrder, uneven: bool, shades: tuple[s
         shade = shades[k % 2]
         axes.barh(-row, width, 0.78, left=start, color=shade, edgecolor="white", linewidth=1.0)
         words: Any = {"ha": "center", "va": "center", "color": ink_on(shade), "size": SMALL}
-        told = f"{width:.1f}" if uneven else ""
-        if width_of(told) > letters - 0.04:
-            told = f"{width:.0f}"
-        up = 0.19 if told else 0.0
+        text = f"{width:.1f}" if uneven else ""
+        if width_of(text) > letters - 0.04:
+            text = f"{width:.0f}"
+        up = 0.19 if text else 0.0
         axes.text(start + 0.5 * width, up - row, f"{cylinder}", weight="bold", **words)
-        if told:
-            axes.text(start + 0.5 * width, -up - row, told, **words)
+        if text:
+            axes.text(start + 0.5 * width, -up - row, text, **words)
         start += width

@@ -23,19 +23,19 @@ BAR, KILO = 1e-5, 1e-3
 
 
 def applies(result: Result) -> bool:
-    """Whether chambers on both sides of pistons are told."""
+    """Return True if a load has chambers."""
     return bool(points_with_chambers(result))
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Of every cylinder that a page holds its diagrams on the left, and the force on its rod on the right."""
+    """Draw the indicator diagrams of a cylinder on the left and the force on its rod on the right."""
     point, gas = points_with_chambers(result)[0]
-    shown = [part for part in result.final.engine.slider_cranks if gas.of(part)][:MOST_ROWS]
+    parts = [part for part in result.final.engine.slider_cranks if gas.of(part)][:MOST_ROWS]
     # names of chambers stand above their diagram, two a row
-    lead = 0.12 + 0.17 * max(-(-len(gas.of(part)) // 2) for part in shown)
-    drawn = page(len(shown), 2, (WIDE, HIGH), gap=0.3, lead=lead, across=0.75)
-    for k, part in enumerate(shown):
+    lead = 0.12 + 0.17 * max(-(-len(gas.of(part)) // 2) for part in parts)
+    drawn = page(len(parts), 2, (WIDE, HIGH), gap=0.3, lead=lead, across=0.75)
+    for k, part in enumerate(parts):
         left, right = drawn.panels[2 * k], drawn.panels[2 * k + 1]
         _diagrams(left, gas, part, point)
         _force(right, gas, part, point)
@@ -43,11 +43,11 @@ def figure(result: Result) -> Figure:
             axes.set(
                 xlim=(0.0, 1.0), ylabel=f"{part.name}\npressure [bar]" if axes is left else "force on the rod [kN]"
             )
-            axes.set_xlabel("part of the stroke from the head end" if part is shown[-1] else "")
-    told = "Left: absolute pressure in every chamber. Right: force towards the crank, on the way out and back."
+            axes.set_xlabel("part of the stroke from the head end" if part is parts[-1] else "")
+    lines = "Left: absolute pressure in every chamber. Right: force towards the crank, on the way out and back."
     legend = [entry("force of the chambers", color=INK, linewidth=1.4)]
     legend += [entry("what accelerates the rod", color=FAINT, linestyle=(0, (4, 1.6)))]
-    return headed(drawn, result, f"Indicator diagrams at {point.name}", told, legend)
+    return headed(drawn, result, f"Indicator diagrams at {point.name}", lines, legend)
 
 
 def _diagrams(axes: Axes, gas: Chambers, part: SliderCrank, point: OperatingPoint) -> None:
@@ -60,7 +60,6 @@ def _diagrams(axes: Axes, gas: Chambers, part: SliderCrank, point: OperatingPoin
 
 
 def _force(axes: Axes, gas: Chambers, part: SliderCrank, point: OperatingPoint) -> None:
-    """On the way out from the head end and on the way back, beside what the reciprocating mass takes of it."""
     top, bottom = dead_centres(part)
     for begin, end in ((top, bottom), (bottom, top + math.tau)):
         drawn = indicator_of(gas, part, point, np.linspace(begin, end, STEPS // 2 + 1)[1:-1])

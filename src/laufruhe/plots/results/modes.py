@@ -20,7 +20,7 @@ applies = is_elastic
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Kinetic-energy share of every motion in every mode."""
+    """Draw the kinetic-energy share of every motion in every mode."""
     series = series_of(result)
     drawn = page(1, len(series), (3.5, 3.0), gap=1.0)
     for axes, one in zip(drawn.panels, series, strict=True):

@@ -40,7 +40,7 @@ applies = has_mount_forces
 
 @dataclass(frozen=True)
 class Frame:
-    """Ends of all panels, which share them.
+    """Axis limits that all panels share.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class Frame:
 
     @classmethod
     def of(cls, paths: Sequence[Array], count: int) -> Frame:
-        """That the paths of so many mounts fill."""
+        """Return the frame of the paths of the first `count` mounts."""
         most = {c: max(float(np.abs(path[:, :count, c]).max(initial=0.0)) for path in paths) for c in NAMES}
         small, large = sorted(NAMES, key=lambda c: most[c])
         share = most[small] / thin([most[large]])
@@ -72,7 +72,7 @@ class Frame:
 
 @styled()
 def figure(result: Result) -> Figure:
-    """One panel for each mount, all to one scale; forces of one direction over the crank angle."""
+    """Draw one panel per mount, to one scale; forces of one direction over the crank angle."""
     k, series = hardest_point(result), series_of(result, loads=True)
     paths, steady = _moving([_closed(samples_of(one.design, k)) for one in series])
     mounts = result.problem.engine.mounts[:MOST_PANELS]
@@ -93,23 +93,21 @@ def figure(result: Result) -> Figure:
         _frame(axes, frame, factor, cycle.turns)
         _name(axes, mount, result.final.engine.mounts[m])
     _label(drawn, columns, frame, unit)
-    lines = f"Force on each mount at {point_name(result, k)}, seen from the front.{_told(frame)}{steady}"
+    lines = f"Force on each mount at {point_name(result, k)}, seen from the front.{_explanation(frame)}{steady}"
     title = "Mount forces over one working cycle"
     return headed(drawn, result, title, lines, _legend(series, frame, first.name), _left_out(paths, frame))
 
 
 def _closed(samples: Array) -> Array:
-    """A turn of the path that ends where it began, in no more points than a picture shows."""
     count = len(samples)
     step = next((n for n in range(count // POINTS, 1, -1) if count % n == 0), 1)
     return np.concatenate([samples[::step], samples[:1]])
 
 
 def _moving(paths: list[Array]) -> tuple[list[Array], str]:
-    """Paths without their steady part where that is most of them, as the mean torque is on soft mounts; and words."""
     moving = [path - path[:-1].mean(axis=0) for path in paths]
-    whole, rest = (max(float(np.abs(path[..., 1:]).max(initial=0.0)) for path in each) for each in (paths, moving))
-    return (paths, "") if rest > STEADY * whole else (moving, " The steady part is left out.")
+    largest, varying = (max(float(np.abs(path[..., 1:]).max(initial=0.0)) for path in each) for each in (paths, moving))
+    return (paths, "") if varying > STEADY * largest else (moving, " The steady part is left out.")
 
 
 def _path(axes: Axes, path: Array, one: Series, quarters: int, fired: int, width: float) -> None:
@@ -136,7 +134,6 @@ def _frame(axes: Axes, frame: Frame, factor: float, turns: int) -> None:
 
 
 def _name(axes: Axes, mount: Mount, moved: Mount) -> None:
-    """Name and place of a mount above its panel."""
     is_moved = mount.position != moved.position
     place = ", ".join(trimmed(1e3 * value).replace("-", "−") for value in moved.position)
     over: Any = {"xycoords": "axes fraction", "textcoords": "offset points"}
@@ -159,8 +156,7 @@ def _label(drawn: Page, columns: int, frame: Frame, unit: str) -> None:
         axes.set(ylabel="" if k % columns else up.replace(", ", ",\n"))
 
 
-def _told(frame: Frame) -> str:
-    """Why there is no path."""
+def _explanation(frame: Frame) -> str:
     if frame.along is None:
         return ""
     other = NAMES[LATERAL if frame.along == VERTICAL else VERTICAL]

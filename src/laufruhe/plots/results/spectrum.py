@@ -29,18 +29,18 @@ applies = has_loads
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Mount forces by order; of an engine without mounts, the shaking force and its couples."""
+    """Draw mount forces by order; without mounts the shaking force and its couples."""
     k, series = hardest_point(result), series_of(result, loads=True)
     with_mounts = bool(result.problem.engine.mounts)
     panels = _panels(len(result.problem.engine.mounts))
     base = float(main_load(series[0].design.loads[k]).base)
-    amplitudes = [_seen([measure(one.design.loads[k]) for one in series], base) for _, _, measure in panels]
+    amplitudes = [_visible([measure(one.design.loads[k]) for one in series], base) for _, _, measure in panels]
     last = base * max(len(values[0]) - 1 for values in amplitudes)
     tops = [max(float(each.max(initial=0.0)) for each in values) for values in amplitudes]
     drawn = page(len(panels), 1, (6.8, 3.2 if len(panels) == 1 else 1.5), gap=0.25)
     for axes, (label, unit, _), values, top in zip(drawn.panels, panels, amplitudes, tops, strict=True):
-        words, (factor, shown) = left_out(top, max(tops), unit), in_thousands(top, unit)
-        _frame(axes, f"{label} [{shown}]", factor * top, last)
+        words, (factor, symbol) = left_out(top, max(tops), unit), in_thousands(top, unit)
+        _frame(axes, f"{label} [{symbol}]", factor * top, last)
         if words:
             empty(axes, words)
         else:
@@ -69,8 +69,7 @@ def _panels(mounts: int) -> list[Panel]:
     ]
 
 
-def _seen(series: list[Array], base: float) -> list[Array]:
-    """Amplitudes up to the last order that can be seen beside the largest, all of one length."""
+def _visible(series: list[Array], base: float) -> list[Array]:
     length = max(len(values) for values in series)
     table = np.stack([padded(values, length) for values in series])
     seen = np.flatnonzero(table.max(axis=0) > SHARE * float(table.max(initial=0.0)))
@@ -81,8 +80,8 @@ def _seen(series: list[Array], base: float) -> list[Array]:
 def _bars(axes: Axes, series: list[Array], base: float, colours: list[str]) -> None:
     table = np.stack(series)
     drawn = np.flatnonzero(table.max(axis=0) > NOTHING * float(table.max(initial=0.0)))
-    apart = float(np.diff(drawn).min(initial=2)) * base
-    width = 0.8 * min(1.0, apart) / len(series)
+    step = float(np.diff(drawn).min(initial=2)) * base
+    width = 0.8 * min(1.0, step) / len(series)
     for k, (values, colour) in enumerate(zip(series, colours, strict=True)):
         places = drawn * base + (k - 0.5 * (len(series) - 1)) * width
         axes.bar(places, values[drawn], width, color=colour, linewidth=0)

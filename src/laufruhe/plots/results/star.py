@@ -25,7 +25,7 @@ applies = has_ranking
 
 @styled()
 def figure(result: Result) -> Figure:
-    """The best stars: end view from the front, side view with every throw at its height."""
+    """Draw the best stars: end view from the front, side view with every throw at its height."""
     phasing = ranking_of(result)
     stars = phasing.ranking[:SHOWN]
     side = min(max(4.0, 0.5 * len(phasing.places)), 4.7)
@@ -52,11 +52,11 @@ def _title(result: Result, star: RankedStar, k: int) -> str:
 
 
 def _balance(star: RankedStar) -> str:
-    shown = ", ".join(
+    text = ", ".join(
         f"{h}: {number(force, 2, 1.0)} / {number(couple, 2, 1.0)}"
         for h, force, couple in zip(star.orders, star.forces, star.couples, strict=True)
     )
-    return f"free force / couple of order {shown}"
+    return f"free force / couple of order {text}"
 
 
 def _end_view(axes: Axes, star: RankedStar, colour: str) -> None:
@@ -75,7 +75,7 @@ def _end_view(axes: Axes, star: RankedStar, colour: str) -> None:
 
 
 def _together(throws: Sequence[float]) -> list[tuple[float, list[int]]]:
-    """Throws that stand on one angle, to a degree."""
+    """Group throws at equal angles, to a degree."""
     out: list[tuple[float, list[int]]] = []
     for k, angle in enumerate(throws):
         same = (members for other, members in out if abs(math.remainder(angle - other, math.tau)) < SAME)
@@ -88,7 +88,7 @@ def _together(throws: Sequence[float]) -> list[tuple[float, list[int]]]:
 
 
 def _side_view(axes: Axes, star: RankedStar, places: Sequence[float], colour: str) -> None:
-    """Main journals on the axis, webs and pins at the height z = cos theta; a pin that points away is open."""
+    """Draw journals on the axis, webs and pins at the height z = cos theta; a pin that points away is open."""
     axes.axis("off")
     count = len(places)
     x = np.arange(count, dtype=float)
@@ -106,5 +106,5 @@ def _side_view(axes: Axes, star: RankedStar, places: Sequence[float], colour: st
         axes.plot(x[k], height, "o", markersize=6.5, markerfacecolor=face, markeredgecolor=colour, zorder=3)
         if depth < -1e-6:
             axes.plot(x[k], height, "x", markersize=3.6, color=colour, zorder=4)
-        beside = 1.0 if height >= -1e-9 else -1.0
-        axes.text(x[k], height + 0.28 * beside, str(k + 1), ha="center", va="center", size=SMALL, color=INK)
+        sign = 1.0 if height >= -1e-9 else -1.0
+        axes.text(x[k], height + 0.28 * sign, str(k + 1), ha="center", va="center", size=SMALL, color=INK)

@@ -32,27 +32,27 @@ _MEAN: Any = {"color": FAINT, "linewidth": 1.0, "linestyle": (0, (4, 1.6)), "zor
 
 
 def applies(result: Result) -> bool:
-    """Whether torque or flywheel are asked for."""
+    """Return True if the result shows crankshaft torque and has loads."""
     return asks_torque(result) and has_loads(result)
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Torque part by part, its work about the mean, the crank speed, and what orders the torque is made of."""
+    """Draw torque part by part, its work about the mean, the crank speed, and its orders."""
     engine, fidelity = result.final.engine, result.problem.fidelity
     facts = [torque_facts(engine, point, fidelity) for point in result.problem.points]
     points = result.problem.points
     fired = [j for j, point in enumerate(points) if fidelity.gas_of(point) is not None]
     k = max(fired or range(len(facts)), key=lambda j: facts[j].excursion)
     parts = torque_parts(engine, points[k], fidelity)
-    whole = max(float(np.abs(part.sample(STEPS)).max()) for part in parts.values()) or 1.0
-    felt = {name: part for name, part in parts.items() if np.abs(part.sample(STEPS)).max() > FELT * whole}
+    largest = max(float(np.abs(part.sample(STEPS)).max()) for part in parts.values()) or 1.0
+    visible = {name: part for name, part in parts.items() if np.abs(part.sample(STEPS)).max() > FELT * largest}
     degrees = np.linspace(0.0, math.degrees(engine.cycle.angle), STEPS + 1)
     has_speed, turning = facts[k].irregularity is not None, list[Series]()
     drawn = page(3 + has_speed, 1, (WIDE, HIGH), gap=0.3, lead=0.0)
     _lower(drawn.panels[-1], 0.5)
-    unit = in_thousands(whole, "N m")
-    _torque(drawn.panels[0], felt, degrees, facts[k].mean, unit)
+    unit = in_thousands(largest, "N m")
+    _torque(drawn.panels[0], visible, degrees, facts[k].mean, unit)
     _work(drawn.panels[1], parts["all"], degrees, facts[k])
     if has_speed:
         turning = _speed(drawn.panels[2], result, k, degrees)
@@ -62,18 +62,17 @@ def figure(result: Result) -> Figure:
         axes.tick_params(labelbottom=axes is drawn.panels[-2], length=2)
         round_ticks(axes.yaxis, 4)
     drawn.panels[-2].set_xlabel("crank angle [°]")
-    _orders(drawn.panels[-1], felt, unit)
+    _orders(drawn.panels[-1], visible, unit)
     radii = {part.crank_radius for part in engine.slider_cranks}
     radius = f"; over {1e3 * min(radii):.4g} mm, the tangential force" if len(radii) == 1 else ""
     lines = f"Torque on the crankshaft at {points[k].name}{radius}."
-    legend = [entry(name, color=COLOURS[name], linewidth=2.6 - 1.2 * (name == "all")) for name in felt]
-    legend.append(entry(f"mean, {number(facts[k].mean, scale=whole)} N m", **_MEAN))
+    legend = [entry(name, color=COLOURS[name], linewidth=2.6 - 1.2 * (name == "all")) for name in visible]
+    legend.append(entry(f"mean, {number(facts[k].mean, scale=largest)} N m", **_MEAN))
     legend += [entry(f"speed {one.name}", color=one.colour, linewidth=1.8) for one in turning]
     return headed(drawn, result, "Torque over one working cycle", lines, legend)
 
 
 def _lower(axes: Axes, inches: float) -> None:
-    """Another axis than that of the panels above needs room for their label."""
     box, high = axes.get_position(), axes.figure.bbox.height / axes.figure.dpi
     axes.set_position((box.x0, box.y0 - inches / high, box.width, box.height))
 
@@ -102,9 +101,9 @@ def _work(axes: Axes, torque: Spectrum, degrees: Array, facts: TorqueFacts) -> N
 
 
 def _speed(axes: Axes, result: Result, k: int, degrees: Array) -> list[Series]:
-    """Of the design as given, where that keeps turning, and as decided; which of them are drawn."""
+    """Draw the speed of every design that keeps turning, and return the drawn series."""
     point, fidelity = result.problem.points[k], result.problem.fidelity
-    told, shown = "", []
+    text, drawn = "", []
     for one in series_of(result):
         inertia = turning_inertia(one.design.engine, fidelity)
         swing = swing_of(one.design.engine, point, fidelity)
@@ -114,17 +113,17 @@ def _speed(axes: Axes, result: Result, k: int, degrees: Array) -> list[Series]:
         speeds = swing.speeds(inertia)[: len(swing.work)]
         angles = degrees[-1] * np.arange(len(speeds)) / len(speeds)
         axes.plot(angles, RPM * speeds, color=one.colour, linewidth=1.8)
-        shown.append(one)
-        told = f"degree of irregularity {number(degree, 3)}" + (f" (1/{1.0 / degree:.4g})" if degree > 0.0 else "")
+        drawn.append(one)
+        text = f"degree of irregularity {number(degree, 3)}" + (f" (1/{1.0 / degree:.4g})" if degree > 0.0 else "")
     axes.axhline(RPM * point.speed, **_MEAN)
     axes.set_ylabel("speed [rpm]")
     axes.margins(y=0.25)
-    axes.text(0.99, 0.94, told, ha="right", va="top", size=SMALL, transform=axes.transAxes, color=INK)
-    return shown
+    axes.text(0.99, 0.94, text, ha="right", va="top", size=SMALL, transform=axes.transAxes, color=INK)
+    return drawn
 
 
 def _orders(axes: Axes, parts: Mapping[str, Spectrum], unit: Unit) -> None:
-    """Amplitudes side by side, the strongest orders of all."""
+    """Draw amplitudes of the strongest orders side by side."""
     factor, total = unit[0], parts.get("all", next(iter(parts.values())))
     orders, sizes = total.orders[1:], np.abs(total.coefficients[1:])
     top = float(sizes.max(initial=0.0))

@@ -18,13 +18,13 @@ _BOUND: Any = {"color": BEFORE, "linestyle": (0, (4, 2))}
 
 
 def applies(result: Result) -> bool:
-    """Where freedom was traded against balance."""
+    """Return True for a trade between even firing and balance."""
     return has_ranking(result) and len(ranking_of(result).trade) > 1
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """What uneven firing buys, and what no design with that freedom goes under."""
+    """Draw the objective over the allowed deviation from even firing, with its lower bound."""
     trade = ranking_of(result).trade
     drawn = page(1, 1, (6.4, HIGH))
     axes = drawn.panels[0]
@@ -34,10 +34,10 @@ def figure(result: Result) -> Figure:
     y = [p.value for p in points]
     axes.plot(x, y, color=AFTER, linewidth=1.6, zorder=2)
     axes.plot(x, y, "o", color=AFTER, markersize=5, zorder=3)
-    shown = [number(value, 3, max(y)) for value in y]
+    texts = [number(value, 3, max(y)) for value in y]
     for k, place in enumerate(zip(x, y, strict=True)):
-        if k == 0 or shown[k] != shown[k - 1]:
-            axes.annotate(shown[k], place, xytext=(5, 6), textcoords="offset points", size=SMALL, color=FAINT)
+        if k == 0 or texts[k] != texts[k - 1]:
+            axes.annotate(texts[k], place, xytext=(5, 6), textcoords="offset points", size=SMALL, color=FAINT)
     # what holds with more freedom holds with less: a step reaches back to the point before
     freedom = [math.degrees(p.allowed) for p in trade]
     axes.plot(freedom, [p.lower_bound for p in trade], linewidth=1.2, drawstyle="steps-pre", zorder=1, **_BOUND)

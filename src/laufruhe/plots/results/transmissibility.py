@@ -26,7 +26,7 @@ LEAST = 1e-4
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Foundation over exciting force by order and speed, with limits and operating points."""
+    """Draw transmissibility by order and speed, with limits and operating points."""
     facts, series = facts_of(result.final), series_of(result, loads=True)
     point, top = result.problem.points[hardest_point(result)], fastest(result)
     speeds = speeds_of(result)
@@ -51,12 +51,12 @@ def figure(result: Result) -> Figure:
         ylabel="transmissibility",
     )
     mark_points(axes, result)
-    lines = f"Force on the mounts over that on mounts that give no way; loads of {point.name}."
+    lines = f"Ratio to the force on rigid mounts; loads of {point.name}."
     return headed(drawn, result, "Transmissibility over speed", lines, legend)
 
 
 def _limits(axes: Axes, result: Result, top: float) -> list[Artist]:
-    """Limits of the problem, over the speeds that they hold at [rpm]."""
+    """Draw the limits over the speeds that they hold at [rpm]."""
     limits = limits_on(result, channels.TRANSMISSIBILITY)
     most = [(limit.maximum, limit.measure.points) for limit in limits]
     for maximum, named in most:

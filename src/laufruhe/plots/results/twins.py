@@ -28,14 +28,14 @@ applies = is_twin
 
 @styled()
 def figure(result: Result) -> Figure:
-    """Firings over the cycle; force and couple of each order, its two circles and the path that they draw together."""
+    """Draw firings over the cycle, and force and couple of each order as two circles and the path of their sum."""
     engine, k = result.final.engine, hardest_point(result)
     drawn = page(2, 3, (SIZE, SIZE), gap=0.7, lead=0.3, across=0.72)
     _firings(drawn.panels[0], result)
-    parts, given = parts_of(result, engine, k), parts_of(result, result.initial.engine, k)
-    most = max(_sizes(each, kind) for each in (parts, given) for kind in KINDS)
-    parts, given = _seen(parts, most), _seen(given, most)
-    largest = {kind: max(_sizes(parts, kind), _sizes(given, kind)) for kind in KINDS}
+    parts, initial = parts_of(result, engine, k), parts_of(result, result.initial.engine, k)
+    most = max(_sizes(each, kind) for each in (parts, initial) for kind in KINDS)
+    parts, initial = _visible(parts, most), _visible(initial, most)
+    largest = {kind: max(_sizes(parts, kind), _sizes(initial, kind)) for kind in KINDS}
     _bars(drawn.panels[3], parts, largest)
     for row, kind in enumerate(KINDS):
         for column, (order, name) in enumerate(ORDERS.items()):
@@ -59,11 +59,12 @@ def _crank(engine: Engine) -> str:
 
 
 def _sizes(parts: Parts, kind: str) -> float:
-    """Largest of a force or couple in any order."""
-    return max(abs(forward) + abs(backward) for (own, _), (forward, backward) in parts.items() if own == kind)
+    return max(
+        abs(forward) + abs(backward) for (part_kind, _), (forward, backward) in parts.items() if part_kind == kind
+    )
 
 
-def _seen(parts: Parts, most: float) -> Parts:
+def _visible(parts: Parts, most: float) -> Parts:
     return {
         key: (ahead * (abs(ahead) > UNSEEN * most), back * (abs(back) > UNSEEN * most))
         for key, (ahead, back) in parts.items()
@@ -71,17 +72,17 @@ def _seen(parts: Parts, most: float) -> Parts:
 
 
 def _firings(axes: Axes, result: Result) -> None:
-    """Cylinders where they fire over the cycle, and the angles between."""
+    """Draw the firings of a cycle, and the angles between them."""
     engine = result.final.engine
-    whole = math.degrees(engine.cycle.angle)
-    fired = sorted((math.degrees(part.firing_angle) % whole, part.name.split()[-1]) for part in engine.cylinders)
-    for (angle, name), (following, _) in zip(fired, [*fired[1:], (fired[0][0] + whole, "")], strict=True):
+    cycle = math.degrees(engine.cycle.angle)
+    fired = sorted((math.degrees(part.firing_angle) % cycle, part.name.split()[-1]) for part in engine.cylinders)
+    for (angle, name), (following, _) in zip(fired, [*fired[1:], (fired[0][0] + cycle, "")], strict=True):
         axes.plot([angle, angle], [0.0, 1.0], color=INK, linewidth=5.0, solid_capstyle="butt")
         axes.text(angle, 1.1, name, ha="center", size=SMALL)
         middle = 0.5 * (angle + following)
-        axes.text(middle % whole, 0.5, f"{following - angle:.3g}°", ha="center", va="center", size=SMALL, color=FAINT)
-    axes.set(xlim=(-0.06 * whole, 1.06 * whole), ylim=(0.0, 1.6), xlabel="crank angle [°]", yticks=[])
-    axes.set_xticks(np.linspace(0.0, whole, 5))
+        axes.text(middle % cycle, 0.5, f"{following - angle:.3g}°", ha="center", va="center", size=SMALL, color=FAINT)
+    axes.set(xlim=(-0.06 * cycle, 1.06 * cycle), ylim=(0.0, 1.6), xlabel="crank angle [°]", yticks=[])
+    axes.set_xticks(np.linspace(0.0, cycle, 5))
     axes.set_title(firing_words(result)[0], loc="left", size=9)
 
 
@@ -105,15 +106,15 @@ def _circles(axes: Axes, forward: complex, backward: complex, largest: float, un
 
 
 def _bars(axes: Axes, parts: Parts, largest: Mapping[str, float]) -> None:
-    """Sizes of both parts, of forces and of couples, each over the largest of its kind."""
+    """Draw forward and backward parts, forces and couples each relative to the largest of its kind."""
     names = []
     for row, ((kind, order), pair) in enumerate(parts.items()):
         most, (factor, unit) = largest[kind] or 1.0, in_thousands(largest[kind], KINDS[kind][1])
-        for j, (own, colour) in enumerate(zip(pair, (FORWARD, BACKWARD), strict=True)):
+        for j, (part, colour) in enumerate(zip(pair, (FORWARD, BACKWARD), strict=True)):
             at = -row - 0.36 * j
-            axes.barh(at, abs(own) / most, 0.32, color=colour)
-            size = number(factor * abs(own), 3, scale=factor * most)
-            axes.text(abs(own) / most + 0.03, at, f"{size} {unit}", va="center", size=SMALL)
+            axes.barh(at, abs(part) / most, 0.32, color=colour)
+            size = number(factor * abs(part), 3, scale=factor * most)
+            axes.text(abs(part) / most + 0.03, at, f"{size} {unit}", va="center", size=SMALL)
         names.append(f"{ORDERS[order]}\n{kind}")
     axes.set_yticks([-row - 0.18 for row in range(len(parts))], names)
     axes.set(xlim=(0.0, 1.75), xticks=[])

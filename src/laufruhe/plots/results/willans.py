@@ -16,13 +16,13 @@ BAR, MOST = 1e-5, 4
 
 
 def applies(result: Result) -> bool:
-    """Where readings stand behind a load."""
+    """Return True if a load is based on friction readings."""
     return bool(result.problem.friction)
 
 
 @styled()
 def figure(result: Result) -> Figure:
-    """A panel for each operating point."""
+    """Draw a panel per operating point."""
     tests = result.problem.friction[:MOST]
     drawn = page(len(tests), 1, (6.4, 2.3), gap=0.75)
     for axes, test in zip(drawn.panels, tests, strict=True):
@@ -31,15 +31,15 @@ def figure(result: Result) -> Figure:
         entry_of_dots("measured", color=INK), entry("least squares", color=SKY),
         entry("friction, and its deviations", color=AFTER),
     ]  # fmt: skip
-    shown = "; ".join(
+    text = "; ".join(
         f"at {test.at} {BAR * test.friction.mean:.3g} bar, deviation {BAR * test.friction.deviation:.2g}"
         for test in tests
     )
-    return headed(drawn, result, "Friction by measurement", f"Friction mean pressure {shown}.", legend)
+    return headed(drawn, result, "Friction by measurement", f"Friction mean pressure {text}.", legend)
 
 
 def _fuelled(axes: Axes, test: FrictionTest) -> None:
-    """Fuel over brake mean pressure: the line meets no fuel at the friction."""
+    """Draw fuel over brake mean pressure: the line reaches zero fuel at the friction."""
     (intercept, slope), friction = test.line, test.friction
     x, y = BAR * np.array(test.x), np.array(test.y)
     ends = np.array([-friction.mean, max(*test.x, test.asked)])
@@ -54,7 +54,6 @@ def _fuelled(axes: Axes, test: FrictionTest) -> None:
 
 
 def _motored(axes: Axes, test: FrictionTest) -> None:
-    """Drag over speed, and what it is at the speed asked."""
     (intercept, slope), friction = test.line, test.friction
     ends = np.array([min(*test.x, test.asked), max(*test.x, test.asked)])
     axes.plot(RPM * ends, BAR * (intercept + slope * ends), color=SKY, linewidth=1.6)

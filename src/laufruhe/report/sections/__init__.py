@@ -26,7 +26,7 @@ SECTIONS = (
 
 
 def tables_of(result: Result) -> list[Table]:
-    """Every table that this result fills, in the order of a report."""
-    own = [section.tables(result) for section in SECTIONS]
+    """Return the tables of a result, in the order of a report."""
+    core = [section.tables(result) for section in SECTIONS]
     added = [section.tables(result) for section in EXTENSION_SECTIONS.values() if section.applies(result)]
-    return [grid for grids in (*own, *added) for grid in grids if grid.rows]
+    return [grid for grids in (*core, *added) for grid in grids if grid.rows]

@@ -15,7 +15,7 @@ HEAD = ("open", "as given", "decided", "bounds", "at bound", "shadow price")
 
 
 def tables(result: Result) -> list[Table]:
-    """A row a decision."""
+    """Return a row per decision."""
     pairs = pairwise([None, *result.decisions])
     rows = tuple(_row(before, d, objective_unit(result)) for before, d in pairs if d is not None)
     return [Table(HEAD, rows, title="Decisions", note=_free(result))]
@@ -25,8 +25,8 @@ def _free(result: Result) -> str:
     if not result.free:
         return ""
     ends = (f"{d.name} from {with_unit(d.low, d.unit)} to {with_unit(d.high, d.unit)}" for d in result.free)
-    share, found = f"{trimmed(100.0 * result.problem.tolerance, 1)} %", ", ".join(ends)
-    return f"The optimum is not unique. As good within {share}, with other decisions to match, at least: {found}."
+    share, ranges = f"{trimmed(100.0 * result.problem.tolerance, 1)} %", ", ".join(ends)
+    return f"The optimum is not unique. Equally good within {share}, other decisions adapted: {ranges}."
 
 
 def _row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str, ...]:
@@ -35,10 +35,10 @@ def _row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str
     bounds = f"{trimmed(d.lower * factor)} to {trimmed(d.upper * factor)} {name}".rstrip()
     # the angle of a size that is none means nothing
     size = before if d.name.endswith(".angle") else None
-    given = DASH if size and not size.initial else with_unit(d.initial, d.unit)
+    initial = DASH if size and not size.initial else with_unit(d.initial, d.unit)
     if size and size.is_nothing:
-        return d.name, given, DASH, bounds, DASH, DASH
+        return d.name, initial, DASH, bounds, DASH, DASH
     upper = abs(d.value - d.upper) <= abs(d.value - d.lower)
     mark = DASH if not d.at_bound else "upper" if upper else "lower"
     decided = figure(d.value, d.unit, scale=most) + in_grams(d.value, d.unit, most)
-    return d.name, given, decided, bounds, mark, prices_of(d, unit)
+    return d.name, initial, decided, bounds, mark, prices_of(d, unit)

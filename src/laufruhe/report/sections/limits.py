@@ -9,15 +9,15 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import LimitValue
 from laufruhe.units import readable
 
-PRICES = "Shadow price: by how much the objective falls for each unit by which the limit is relaxed."
-BOTH = "Of two, the second is what it rises by for each unit by which the limit is tightened."
+PRICES = "Shadow price: decrease of the objective per unit by which the limit is relaxed."
+BOTH = "Second price: increase of the objective per unit by which the limit is tightened."
 
 TOLD = 1e-5
 """Relative error of a value from which a reader is told."""
 
 
 def tables(result: Result) -> list[Table]:
-    """A row a limit."""
+    """Return a row per limit."""
     limits = limits_of(result)
     decided = result.certificate is not None
     rows = tuple(_row(limit, objective_unit(result), decided) for limit in limits)

@@ -15,15 +15,15 @@ HEAD = ("load case", "mount", "travel x [mm]", "y [mm]", "z [mm]", "force [N]", 
 
 
 def tables(result: Result) -> list[Table]:
-    """Of the design as decided."""
+    """Return travel and force of every mount under each load case."""
     if not is_elastic(result) or not result.final.engine.load_cases:
         return []
     mounting, rows = mounting_in(result.final.engine), []
     for case in result.final.engine.load_cases:
-        found = settled(mounting, case)
-        for mount, travel, force in zip(mounting.mounts, found.travel, found.force, strict=True):
+        state = settled(mounting, case)
+        for mount, travel, force in zip(mounting.mounts, state.travel, state.force, strict=True):
             moved = (number(1e3 * along) for along in travel)
-            met = "yes" if mount.name in found.on_stops else DASH
+            met = "yes" if mount.name in state.on_stops else DASH
             rows.append((case.name, mount.name, *moved, number(float(np.linalg.norm(force))), met))
     note = "From where the engine stands without these loads."
     return [Table(HEAD, tuple(rows), title="Load cases", left=2, note=note, file="load-cases")]

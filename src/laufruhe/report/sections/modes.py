@@ -14,7 +14,7 @@ from laufruhe.solvers.result import Result
 
 
 def tables(result: Result) -> list[Table]:
-    """Modes before and after, and the mounts as they are now; none for rigid mounts."""
+    """Return the modes before and after, and the final mounts; nothing for rigid mounts."""
     if not is_elastic(result):
         return []
     found = [facts_of(design) for design in result.designs.values()]
@@ -32,8 +32,8 @@ def _modes(facts: MountingFacts, title: str) -> Table:
         shares = [f"{round(100.0 * share, 1) + 0.0:.1f}" for share in facts.modes.energy[:, j]]
         reached = number(critical) if critical else DASH
         rows.append((name, number(frequency), "yes" if driven else "no", reached, *shares))
-    still = 6 - len(facts.excited)
-    rest = f"{still} of 6 modes are not excited and not computed" if still else "every mode is excited"
+    unexcited = 6 - len(facts.excited)
+    rest = f"{unexcited} of 6 modes are not excited and not computed" if unexcited else "every mode is excited"
     head = ("mode", "Hz", "excited", f"order {order:g} at rpm" if order else "critical rpm", *MOTIONS)
     return Table(head, tuple(rows), title=title, note=f"Kinetic energy in %; {rest}.{_of_fluid(facts)}")
 
@@ -60,8 +60,8 @@ def _mounts(result: Result, facts: MountingFacts) -> Table:
         f"The centre of gravity sags {figure(facts.sag, 'm')}; the mean torque moves a mount by at most "
         f"{figure(facts.torque_travel, 'm', scale=facts.sag)}. "
         "Travel: the largest at the slowest operating point. "
-        f"Torque-roll axis ({axis}), coupling {facts.torque_roll_coupling:.3f}, "
-        f"nearest to a mode at {facts.torque_roll_frequency:.3g} Hz."
+        f"Turning about the torque-roll axis ({axis}) is {100.0 * facts.torque_roll_coupling:.3g} % from being a mode; "
+        f"best fit at {facts.torque_roll_frequency:.3g} Hz."
     )
     head = ("mount", "place [mm]", "stiffness along own axes [N/mm]", "loss factor", "sag [mm]",
             f"travel at {points[slowest].name} [mm]")  # fmt: skip

@@ -15,21 +15,21 @@ ONE, TWO = ("mean", "max", "rms"), ("mean before", "mean after", "change", "max 
 
 
 def tables(result: Result) -> list[Table]:
-    """A row a place, at every operating point."""
+    """Return a row per place, at every operating point."""
     return [_table(result, places) for places in places_of(result)]
 
 
 def _table(result: Result, places: Places) -> Table:
     points, designs = result.problem.points, load_designs(result)
     names = places.channel.places(result.problem.engine)
-    found = [
+    measures = [
         ((point.name, name) if len(points) > 1 else (name,), each)
         for k, point in enumerate(points)
         for name, *each in zip(names, *(measured(design, k, places.channel) for design in designs), strict=True)
     ]
     unit, factor = readable(places.channel.unit)
-    scale = factor * max((each[0].max for _, each in found), default=0.0)
-    rows = tuple((*lead, *_cells([one.times(factor) for one in each], scale)) for lead, each in found)
+    scale = factor * max((each[0].max for _, each in measures), default=0.0)
+    rows = tuple((*lead, *_cells([one.times(factor) for one in each], scale)) for lead, each in measures)
     at, first = ("", ("at", places.place)) if len(points) > 1 else (f" at {points[0].name}", (places.place,))
     note = f"The design as given has none: {result.initial.resonance}." if result.initial.resonance else ""
     if places.channel.adds_up:

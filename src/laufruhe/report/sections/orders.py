@@ -25,7 +25,7 @@ SHARE = 0.005
 
 
 def tables(result: Result) -> list[Table]:
-    """Orders that make at least a small share of the largest, of the hardest operating point."""
+    """Return the orders above a small share of the largest, at the hardest operating point."""
     if not has_loads(result):
         return []
     k, designs = hardest_point(result), load_designs(result)
@@ -37,18 +37,17 @@ def tables(result: Result) -> list[Table]:
     scale = np.repeat(table.max(axis=0).reshape(-1, len(designs)).max(axis=1), len(designs))
     weight = (table / np.where(scale > 0.0, scale, 1.0)).max(axis=1)
     present = np.flatnonzero(weight > SHARE)
-    kept = sorted(sorted(present, key=lambda j: -weight[j])[:SHOWN])
+    largest = sorted(sorted(present, key=lambda j: -weight[j])[:SHOWN])
     base = float(result.initial.loads[k].wrench.base)
-    cells = ([aligned(value, top) for value, top in zip(table[j], scale, strict=True)] for j in kept)
-    rows = tuple((f"{j * base:g}", *row) for j, row in zip(kept, cells, strict=True))
+    cells = ([aligned(value, top) for value, top in zip(table[j], scale, strict=True)] for j in largest)
+    rows = tuple((f"{j * base:g}", *row) for j, row in zip(largest, cells, strict=True))
     names = ("mount force", "shaking force", "roll moment", "rocking couple")[0 if has_mounts(result) else 1 :]
     head = ("order", *(f"{name}{side}" for name in names for side in (("",), (" before", " after"))[len(designs) - 1]))
-    many = f"the largest {SHOWN} of {len(present)} orders" if len(present) > len(kept) else "orders"
+    many = f"the largest {SHOWN} of {len(present)} orders" if len(present) > len(largest) else "orders"
     note = f"Amplitudes; {many} of at least {100.0 * SHARE:g} % of the largest. result.json has every order."
     return [Table(head, rows, title=f"Orders at {result.problem.points[k].name} [N, N m]", note=note)]
 
 
 def _columns(loads: PointLoads) -> list[Array]:
-    """Amplitudes by order: mount force if there is one, shaking force, roll moment, rocking couple."""
     shaking = [shaking_orders(loads.wrench)[0], *moment_orders(loads.wrench)]
     return shaking if loads.mount_forces is None else [mount_orders(loads.mount_forces).mean(axis=1), *shaking]

@@ -10,22 +10,22 @@ from laufruhe.units import readable
 
 HEAD = ("objective", "as given", "least", "proven not under", "proof", "in the design", "price")
 ORDER = (
-    "Each is least among the designs that are best by those before it, up to the share that it leaves them. "
-    "Price: by how much the last objective falls for each unit by which this one may be exceeded."
+    "Each is minimised over the designs that are optimal, within their tolerance, by the objectives before it. "
+    "Price: decrease of the last objective per unit by which this one may be exceeded."
 )
 EQUAL = (
-    "Where a decision has two ends, designs with either are equal by the objectives so far: equal optima, "
-    "of which the next objective chooses."
+    "A decision with two ends may take either: these designs are equal by the objectives so far, "
+    "and the next objective selects one."
 )
 
 
 def tables(result: Result) -> list[Table]:
-    """A row an objective; and a row a decision with its ends after each of them."""
+    """Return a row per objective; and a row per decision with its range after each objective."""
     ranks = result.ranks
     if not ranks:
         return []
     rows = tuple(_row(k, rank, ranks[-1]) for k, rank in enumerate(ranks, 1))
-    names = [found.name for found in ranks[0].designs] if any(rank.equal for rank in ranks) else []
+    names = [entry.name for entry in ranks[0].designs] if any(rank.equal for rank in ranks) else []
     ends = tuple((name, *(_ends(rank, name) for rank in ranks)) for name in names)
     head = ("decision", *(f"best by {k}" if k == 1 else f"by 1 to {k}" for k in range(1, len(ranks) + 1)))
     return [
@@ -36,19 +36,19 @@ def tables(result: Result) -> list[Table]:
 
 def _row(number: int, rank: RankValue, last: RankValue) -> tuple[str, ...]:
     scale = rank.initial
-    told = (figure(value, rank.unit, scale=scale) for value in (rank.initial, rank.least, rank.lower_bound))
+    values = (figure(value, rank.unit, scale=scale) for value in (rank.initial, rank.least, rank.lower_bound))
     price = DASH if rank is last else price_of(rank.price, last.unit, rank.unit)
-    return f"{number} {rank.name}", *told, str(rank.proof), figure(rank.final, rank.unit, scale=scale), price
+    return f"{number} {rank.name}", *values, str(rank.proof), figure(rank.final, rank.unit, scale=scale), price
 
 
 def _ends(rank: RankValue, name: str) -> str:
-    found = next((each for each in rank.designs if each.name == name), None)
-    if found is None:
+    entry = next((each for each in rank.designs if each.name == name), None)
+    if entry is None:
         return DASH
-    unit, factor = readable(found.unit)
-    is_open = any(found is each for each in rank.equal)
+    unit, factor = readable(entry.unit)
+    is_open = any(entry is each for each in rank.equal)
     # a rounding beside the largest decision is nothing
     least = 1e-3 * max(abs(each.high) for each in rank.designs)
-    shown = (found.low, found.high) if is_open else (0.5 * (found.low + found.high),)
-    ends = (trimmed(0.0 if abs(value) <= least else factor * value, 3) for value in shown)
+    values = (entry.low, entry.high) if is_open else (0.5 * (entry.low + entry.high),)
+    ends = (trimmed(0.0 if abs(value) <= least else factor * value, 3) for value in values)
     return f"{' to '.join(ends)} {unit}".rstrip()

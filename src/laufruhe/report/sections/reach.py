@@ -10,18 +10,18 @@ from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionValue, Nearest, Reached, meaningful
 
-NOTE = "None of these designs is an answer: each breaks the limit that it is named by."
+NOTE = "Each column breaks the limit in its heading; none is an answer."
 
 
 def tables(result: Result) -> list[Table]:
-    """A row a decision, a column a design: those of each limit, and the one that breaks limits least."""
+    """Return the designs nearest to each limit, a row per decision."""
     designs: list[tuple[str, Reached | Nearest]] = [
-        (f"nearest to '{found.name}'", found) for found in result.reached if found.decisions
+        (f"nearest to '{design.name}'", design) for design in result.reached if design.decisions
     ]
     designs += [("nearest to all limits", result.nearest)] if result.nearest is not None else []
-    known = [{decision.name: decision for decision in meaningful(found.decisions)} for _, found in designs]
+    known = [{decision.name: decision for decision in meaningful(design.decisions)} for _, design in designs]
     names = dict.fromkeys(name for each in known for name in each)
-    first = ("value reached", *(figure(found.value, found.unit) for _, found in designs))
+    first = ("value reached", *(figure(design.value, design.unit) for _, design in designs))
     rows = tuple((name, *(_value(each.get(name)) for each in known)) for name in names)
     head = ("", *(title for title, _ in designs))
     return [Table(head, (first, *rows) if names else (), title="What the limits can reach", note=NOTE, file="reach")]
@@ -34,33 +34,35 @@ def _value(decision: DecisionValue | None) -> str:
 
 
 def sentences(result: Result) -> list[str]:
-    """Of each limit, and of the nearest design."""
-    held = "With the other limits held, " if len(result.problem.limits) > 1 else ""
-    told = [_sentence(found, held) for found in result.reached]
-    return told if result.nearest is None else [*told, _nearest(result.nearest)]
+    """Return a sentence per limit, and one about the nearest design."""
+    lead = "With the other limits held, " if len(result.problem.limits) > 1 else ""
+    texts = [_sentence(limit, lead) for limit in result.reached]
+    return texts if result.nearest is None else [*texts, _nearest(result.nearest)]
 
 
-def _sentence(found: Reached, held: str) -> str:
-    if found.why and math.isfinite(found.value):
-        stands, asked = figure(found.value, found.unit), f"{found.side} {with_unit(found.limit, found.unit)}"
-        return f"'{found.name}' stays at {stands}: {found.why}; {asked} is asked."
-    if found.why:
-        return f"What '{found.name}' can reach is not told: {found.why}."
-    least, beyond = ("least", "lower") if found.side == "at most" else ("largest", "higher")
-    value, bound = figure(found.value, found.unit), figure(found.bound, found.unit)
-    proof = Proof.GLOBAL if value == bound else found.proof
+def _sentence(limit: Reached, lead: str) -> str:
+    if limit.why and math.isfinite(limit.value):
+        stands, required = figure(limit.value, limit.unit), f"{limit.side} {with_unit(limit.limit, limit.unit)}"
+        return f"'{limit.name}' stays at {stands}: {limit.why}; {required} is asked."
+    if limit.why:
+        return f"What '{limit.name}' can reach is not told: {limit.why}."
+    least, beyond = ("least", "lower") if limit.side == "at most" else ("largest", "higher")
+    value, bound = figure(limit.value, limit.unit), figure(limit.bound, limit.unit)
+    proof = Proof.GLOBAL if value == bound else limit.proof
     words = {
-        Proof.GLOBAL: f"the {least} that '{found.name}' can reach is {value}, which is proven",
-        Proof.WITHIN_GAP: f"the {least} found of '{found.name}' is {value}, and none {beyond} than {bound} is proven",
+        Proof.GLOBAL: f"the {least} that '{limit.name}' can reach is {value}, which is proven",
+        Proof.WITHIN_GAP: f"the {least} found of '{limit.name}' is {value}, and none {beyond} than {bound} is proven",
     }
-    known = f"; no design is {beyond} than {bound}" if found.bound > 0.0 else ", and nothing is proven of it"
-    said = words.get(proof, f"the {least} found of '{found.name}' is {value}, a local optimum{known}")
-    ended = " Its search ended for want of time; give more by a time limit." if found.ended else ""
-    text = f"{held}{said}; {found.side} {with_unit(found.limit, found.unit)} is asked.{ended}"
+    known = f"; no design is {beyond} than {bound}" if limit.bound > 0.0 else ", and nothing is proven of it"
+    said = words.get(proof, f"the {least} found of '{limit.name}' is {value}, a local optimum{known}")
+    ended = " Its search ended for want of time; give more by a time limit." if limit.ended else ""
+    text = f"{lead}{said}; {limit.side} {with_unit(limit.limit, limit.unit)} is asked.{ended}"
     return text[:1].upper() + text[1:]
 
 
-def _nearest(found: Nearest) -> str:
-    value, asked = figure(found.value, found.unit), with_unit(found.limit, found.unit)
-    share = f", {trimmed(100.0 * found.excess, 3)} % beyond" if found.limit else ""
-    return f"The nearest design found breaks '{found.name}' most: {value} where {found.side} {asked} is asked{share}."
+def _nearest(design: Nearest) -> str:
+    value, required = figure(design.value, design.unit), with_unit(design.limit, design.unit)
+    share = f", {trimmed(100.0 * design.excess, 3)} % beyond" if design.limit else ""
+    return (
+        f"The nearest design found breaks '{design.name}' most: {value} where {design.side} {required} is asked{share}."
+    )

@@ -18,7 +18,7 @@ ORDERS_SHOWN = 6
 
 
 def tables(result: Result) -> list[Table]:
-    """Stars, firing orders, and the trade against even firing where there is one."""
+    """Return stars, firing orders, and the trade against even firing if there is one."""
     if result.phasing is None:
         return []
     phasing = ranking_of(result)
@@ -55,8 +55,8 @@ def _stars(result: Result, phasing: PhasingResult) -> Table:
 def _angles(star: RankedStar, decided: Container[str]) -> str:
     text = " ".join(_degrees(angle, 5) for angle in star.throws)
     named = (("bank", "bank angle", star.bank_angle), ("split", "split pin angle", star.split_pin))
-    told = [f"{word} {_degrees(value)}" for word, name, value in named if value is not None and name in decided]
-    extra = ", ".join(filter(None, [name_of_crank(star.throws), *told]))
+    angles = [f"{word} {_degrees(value)}" for word, name, value in named if value is not None and name in decided]
+    extra = ", ".join(filter(None, [name_of_crank(star.throws), *angles]))
     return text + (f" ({extra})" if extra else "")
 
 
@@ -75,7 +75,7 @@ def _orders(phasing: PhasingResult) -> Table:
     head = ("star", "firing order", "neighbours", "longest gap [deg]", "roll content", "orders")
     note = (
         "Neighbours: firings in succession on one throw or on throws side by side. Longest gap: in which one bank does "
-        "not fire. Roll content: what is left of the largest torque order below the firing order. Orders: how many "
+        "not fire. Roll content: largest torque order below the firing order. Orders: how many "
         "belong to the star."
     )
     return Table(head, rows, title="Firing orders", left=2, note=note)

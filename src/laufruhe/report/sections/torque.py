@@ -9,14 +9,14 @@ from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
 
 NOTE = (
-    "Of gas, pistons and rods, friction left out. Stored: largest less smallest work of the torque about its mean. "
+    "Of gas, pistons and rods, friction left out. Stored: energy that the flywheel must store. "
     "Irregularity: largest less smallest speed over the mean."
 )
 HEAD = ("at", "mean [N m]", "power [kW]", "least [N m]", "largest [N m]", "stored [J]", "irregularity")
 
 
 def tables(result: Result) -> list[Table]:
-    """A row an operating point, where a flywheel is told or the inside of the crankcase is asked for."""
+    """Return a row per operating point, if the problem asks for torque or has a flywheel."""
     engine, problem = result.final.engine, result.problem
     if not asks_torque(result):
         return []

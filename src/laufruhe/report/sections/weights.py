@@ -15,7 +15,7 @@ from laufruhe.solvers.result import Result
 GRAMS = 1e3
 GRAM_MILLIMETRES = 1e6
 NEXT_TO_NOTHING = 1e-9
-_ANGLES = "Angles are those at phi = 0, from upright towards the left (C4)."
+_ANGLES = "Angles at a crank angle of 0, clockwise from the top, seen from the front (C4)."
 _FACTOR = (
     "Share of the reciprocating mass of a throw that its counterweights balance, beyond the rotating mass; "
     "a counterweight counts for the nearest throw."
@@ -23,7 +23,7 @@ _FACTOR = (
 
 
 def tables(result: Result) -> list[Table]:
-    """A row a weight, and a row a throw that has counterweights."""
+    """Return a row per weight, and a row per throw with counterweights."""
     return [_weights(result), _factors(result)]
 
 
@@ -34,13 +34,13 @@ def _weights(result: Result) -> Table:
     two = changed(result)
     rows = []
     for rotor in made:
-        given = before.get(rotor.name, rotor)
-        if max(abs(rotor.unbalance), abs(given.unbalance)) <= NEXT_TO_NOTHING * scale:
+        initial = before.get(rotor.name, rotor)
+        if max(abs(rotor.unbalance), abs(initial.unbalance)) <= NEXT_TO_NOTHING * scale:
             continue
         mass, radius = DASH, DASH
         if rotor.radius is not None:
             mass, radius = number(GRAMS * rotor.mass, scale=GRAMS * scale / rotor.radius), trimmed(1e3 * rotor.radius)
-        lead = _in_grams(given, scale) if two else ()
+        lead = _in_grams(initial, scale) if two else ()
         rows.append((rotor.name, trimmed(1e3 * rotor.x), *lead, *_in_grams(rotor, scale),
                      number(abs(rotor.unbalance), scale=scale), mass, radius))  # fmt: skip
     sides = (" before", " after") if two else ("",)
@@ -50,7 +50,6 @@ def _weights(result: Result) -> Table:
 
 
 def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
-    """Size and angle."""
     size = abs(rotor.unbalance)
     if size <= NEXT_TO_NOTHING * scale:
         return "0", DASH
@@ -62,10 +61,10 @@ def _factors(result: Result) -> Table:
     designs = [result.initial, result.final] if changed(result) else [result.final]
     names = dict.fromkeys(one.cylinders for design in designs for one in balance_factors(design.engine))
     # a weight that one of the designs has is in the other a weight of nothing
-    found = [{one.cylinders: one.factor for one in balance_factors(design.engine, True)} for design in designs]
+    factors = [{one.cylinders: one.factor for one in balance_factors(design.engine, True)} for design in designs]
     rows = [
-        (", ".join(cylinders), *(f"{100.0 * each[cylinders]:.1f} %" if cylinders in each else DASH for each in found))
+        (", ".join(cylinders), *(f"{100.0 * each[cylinders]:.1f} %" if cylinders in each else DASH for each in factors))
         for cylinders in names
     ]
-    head = ("throw of", *(("as given", "as decided") if len(found) > 1 else ("balance factor",)))
+    head = ("throw of", *(("as given", "as decided") if len(factors) > 1 else ("balance factor",)))
     return Table(head, tuple(rows), title="Balance factors", note=_FACTOR, file="balance-factors")

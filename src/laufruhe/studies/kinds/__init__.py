@@ -12,7 +12,6 @@ from laufruhe.studies.part import Part
 
 
 def _found() -> Mapping[str, type[Part]]:
-    """Every subclass of `Part` in these modules that has a kind, by its name."""
     modules = [import_module(f"{__name__}.{module.name}") for module in iter_modules(__path__)]
     classes = [one for module in modules for one in vars(module).values() if isinstance(one, type)]
     kinds = [one for one in classes if issubclass(one, Part) and "kind" in one.model_fields]

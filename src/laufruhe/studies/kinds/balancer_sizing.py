@@ -24,7 +24,7 @@ MOST_GROUPS = 6
 
 
 def shaft_groups(problem: Problem) -> list[tuple[str, ...]]:
-    """Shafts that are built together, because one decision drives their unbalances."""
+    """Return groups of shafts that one decision drives, so that they are built together."""
     shaft_of = {rotor.name: rotor.shaft.name for rotor in problem.engine.rotors}
     groups = [{shaft} for shaft in shafts_of(problem)]
     for decision in problem.decisions:
@@ -42,7 +42,7 @@ class BalancerSizing(SweptPart):
     kind: Literal["balancer sizing"]
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """For every scene all sets of its groups of shafts, the plain engine first."""
+        """Return, for every scene, all sets of its groups of shafts, the plain engine first."""
         points = []
         problems = self.checked(scenes)
         self.check_moved_by_loads(problems, scenes, "shaft")
@@ -64,22 +64,22 @@ class BalancerSizing(SweptPart):
         return points
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """The proven optimum of one set of shafts."""
+        """Return the record of one set of shafts at its proven optimum."""
         return solved(_counting(scenes.problem(point)))
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """As of every sweep, with the shafts of every point."""
+        """Return the dataset of a sweep with the shafts of every point."""
         sets = [" + ".join(point.shafts or ()) or "none" for point in points]
         return super().dataset(points, records).assign_coords(shafts=("point", sets))
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """A row a point, with its shafts."""
+        """Return a row per point, with its shafts."""
         return by_point(data, "shafts")
 
     @staticmethod
     def picture(data: xr.Dataset) -> Picture:
-        """Bars of every set of shafts, the plain engine drawn once; lines where something is swept."""
+        """Return bars of every set of shafts, the plain engine drawn once; lines where something is swept."""
         words = "Every set of shafts at its own optimum."
         if swept_names(data):
             return over_sweep(data, ["shafts"], words)
@@ -97,15 +97,15 @@ class BalancerSizing(SweptPart):
 
 
 def _counting(problem: Problem) -> Problem:
-    """Terms and limits that still count something; the mass of a shaft left out is none."""
+    """Return the problem without terms and limits on the masses of shafts that are left out."""
 
     def counted(quantity: Measure) -> Measure | None:
         if not quantity.is_mass:
             return quantity
         names = {rotor.name for rotor in problem.engine.rotors}
-        kept = None if quantity.rotors is None else tuple(name for name in quantity.rotors if name in names)
-        fewer = replace(quantity, rotors=kept)
-        return fewer if counted_rotors(fewer, problem.engine.rotors) else None
+        remaining = None if quantity.rotors is None else tuple(name for name in quantity.rotors if name in names)
+        narrowed = replace(quantity, rotors=remaining)
+        return narrowed if counted_rotors(narrowed, problem.engine.rotors) else None
 
     terms = [(term, counted(term.measure)) for term in problem.objective]
     limits = [(limit, counted(limit.measure)) for limit in problem.limits]
@@ -118,7 +118,6 @@ def _counting(problem: Problem) -> Problem:
 
 
 def _wrapped(shafts: str) -> str:
-    """Names of shafts, two a line."""
     names = shafts.split(" + ")
     lines = [" + ".join(names[k : k + 2]) for k in range(0, len(names), 2)]
     return "no shafts" if shafts == "none" else "\n".join(lines)

@@ -33,7 +33,7 @@ class CounterweightFraction(SweptPart):
     kind: Literal["counterweight fraction"]
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """Every fraction swept, and last for each speed the fraction left open."""
+        """Return every swept fraction and then, for each speed, the open fraction."""
         problems = self.checked(scenes)
         self.check_moved_by_loads(problems, scenes, "counterweight")
         fraction = self._swept_fraction()
@@ -55,14 +55,14 @@ class CounterweightFraction(SweptPart):
         return next((axis for axis in self.axes() if axis.quantity.endswith(FACTORS)), None)
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """As of every sweep, with the rows marked whose fraction was left open."""
+        """Return the dataset of a sweep; `optimum` marks the rows with an open fraction."""
         fraction = self._swept_fraction()
         if fraction is None:
             return super().dataset(points, records)
         path, number = fraction.quantity, fraction.by_value()
         optimum = np.array([isinstance(point.changes[path], dict) for point in points])
         values = [
-            _decided(record, path) if best else number[point.changes[path]]
+            _decided_fraction(record, path) if best else number[point.changes[path]]
             for point, record, best in zip(points, records, optimum, strict=True)
         ]
         others = [axis for axis in self.axes() if axis.quantity != path]
@@ -75,7 +75,7 @@ class CounterweightFraction(SweptPart):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """The metric over the fraction, the proven optimum of every line marked; or the best fraction over speed."""
+        """Draw the metric over the fraction with every proven optimum, or the best fraction over speed."""
         data = readable_metric(data)
         if "optimum" not in data.coords:
             return _best_fraction(data)
@@ -97,14 +97,12 @@ class CounterweightFraction(SweptPart):
 
 
 def _left_open(point: Point, fraction: Axis, scenes: Scenes) -> dict[str, Any]:
-    """The file's own bounds where it leaves the fraction open, else the ends of the sweep."""
-    given = at(scenes.tables(point), fraction.quantity)
+    entry = at(scenes.tables(point), fraction.quantity)
     numbers = fraction.numbers or ()
-    return given if isinstance(given, dict) else {"between": [min(numbers), max(numbers)]}
+    return entry if isinstance(entry, dict) else {"between": [min(numbers), max(numbers)]}
 
 
-def _decided(record: Mapping[str, Any], quantity: str) -> float:
-    """The fraction decided for the counterweight of this path, which may count it instead of naming it."""
+def _decided_fraction(record: Mapping[str, Any], quantity: str) -> float:
     decided = {name: value for name, value in record["decided"].items() if name.endswith(FACTORS)}
     only = next(iter(decided.values())) if len(decided) == 1 else math.nan
     return float(decided.get(quantity.split(".", 1)[-1], only))

@@ -43,7 +43,7 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class FreeLoad:
-    """What the pistons of an engine leave of one order, largest over a turn, over one cylinder's [1].
+    """Free load of one order that the pistons leave, its largest value over a turn relative to one cylinder's [1].
 
     Couples over force times the spacing; against is what turns against the crank, which no crank weight takes.
     """
@@ -55,7 +55,7 @@ class FreeLoad:
 
 
 def free_load(engine: Engine, order: int, spacing: float) -> FreeLoad:
-    """Free force and couple of the reciprocating masses in an order, about the middle of the engine.
+    """Return free force and couple of the reciprocating masses in one order, about the middle of the engine.
 
     Order of crank speed; the spacing is the unit of length of the couples [m]. `ModelError` where cylinders differ in
     mechanism: there is no one cylinder to compare with.
@@ -74,11 +74,11 @@ def free_load(engine: Engine, order: int, spacing: float) -> FreeLoad:
     return FreeLoad(float(order_amplitude(force)), float(order_amplitude(couple)), force_against, couple_against)
 
 
-def printed_agree(data: xr.Dataset) -> tuple[int, int]:
-    """How many printed values agree to half of their last digit, and of how many."""
+def count_agreeing(data: xr.Dataset) -> tuple[int, int]:
+    """Return how many printed values agree to half of their last digit, and the number of printed values."""
     half = 0.5 * 10.0 ** -int(data.attrs["digits"]) * (1.0 + 1e-9)
-    apart = np.array([abs(data[what].values - data[f"{what}_printed"].values) for what in WHAT])
-    return int((apart <= half).sum()), int(np.isfinite(apart).sum())
+    differences = np.array([abs(data[what].values - data[f"{what}_printed"].values) for what in WHAT])
+    return int((differences <= half).sum()), int(np.isfinite(differences).sum())
 
 
 class LiteratureTable(Table):
@@ -105,25 +105,25 @@ class FreeForces(Part):
     digits: Annotated[int, Field(ge=0, le=12)] = f.optional("Digits after the decimal point.", 4)
 
     def settings(self) -> dict[str, Any]:
-        """The unit of length alone: what is printed elsewhere changes nothing."""
+        """Return the unit of length only; printed values change nothing."""
         return {"kind": self.kind, "spacing": self.spacing}
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """Every layout."""
+        """Return one point per layout."""
         points = [Point(case) for case in self.cases]
         for point in points:
             scenes.problem(point)
         return points
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """Free loads of one layout, and its shortest and longest firing interval [rad]."""
+        """Return free loads of one layout, and its shortest and longest firing interval [rad]."""
         engine = scenes.problem(point).engine
         loads = [asdict(free_load(engine, order, self.spacing)) for order in ORDERS]
         intervals = engine.firing_intervals
         return {"loads": loads, "intervals": [min(intervals), max(intervals)], "cylinders": len(engine.cylinders)}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:  # noqa: ARG002
-        """Layouts side by side; NaN where the literature has nothing."""
+        """Return layouts side by side; NaN where the literature has no value."""
         along = ("case", "order")
         table = {
             name: variable(along, [[load[name] for load in record["loads"]] for record in records], words)
@@ -131,7 +131,7 @@ class FreeForces(Part):
         }
         known = [case.literature.model_dump(exclude_none=True) for case in self.cases]
         for what in WHAT:
-            values = [[own.get(f"{what}_{order}", math.nan) for order in ORDERS] for own in known]
+            values = [[values_of.get(f"{what}_{order}", math.nan) for order in ORDERS] for values_of in known]
             table[f"{what}_printed"] = variable(along, values, f"free {what} in the literature")
         for k, (name, which) in enumerate((("least", "shortest"), ("largest", "longest"))):
             ends = np.degrees([record["intervals"][k] for record in records])
@@ -142,7 +142,7 @@ class FreeForces(Part):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Free forces and couples by layout, printed values behind them where there are some."""
+        """Return free forces and couples by layout, printed values in brackets."""
         columns = [(what, int(order)) for order in data["order"].values for what in WHAT]
         head = ["layout", "firing intervals [deg]", *(f"{what} {order}" for what, order in columns)]
         head += ["crank weights leave of force 1", "of couple 1"]
@@ -152,17 +152,17 @@ class FreeForces(Part):
             least, most = float(row["least_interval"]), float(row["largest_interval"])
             even = most - least < 1e-6
             cells = [str(name), f"{most:.4g}" if even else f"{least:.4g} to {most:.4g}"]
-            cells += [_beside(row.sel(order=order), what) for what, order in columns]
+            cells += [_print_beside(row.sel(order=order), what) for what, order in columns]
             first = row.sel(order=1)
             rows.append([*cells, *(_plain(float(first[f"{what}_against"])) for what in WHAT)])
-        agreed, of = printed_agree(data)
+        agreed, of = count_agreeing(data)
         words = f"{agreed} of {of} printed values agree to half of the last of {data.attrs['digits']} digits."
         legend = "Forces over one cylinder's of the same order, couples over that times the spacing; printed values "
         return [legend + "in brackets.", marked_table(head, rows), words]
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """Bars of what is free, the part that crank weights cannot take beside it, printed values as dots."""
+        """Draw bars of the free loads and of the part that crank weights cannot take, printed values as dots."""
         count = data.sizes["case"]
         columns = [(what, order) for order in data["order"].values for what in WHAT]
         panels = [_column(data, what, order, first=k == 0) for k, (what, order) in enumerate(columns)]
@@ -176,7 +176,7 @@ class FreeForces(Part):
         return p.Picture(data.attrs["title"], words, panels, p.credit(data), size, 4, 0.3, legend=legend)
 
 
-def _beside(row: xr.Dataset, what: str) -> str:
+def _print_beside(row: xr.Dataset, what: str) -> str:
     ours, printed = float(row[what]), float(row[f"{what}_printed"])
     return _plain(ours) if printed != printed else f"{_plain(ours)} ({printed:g})"
 

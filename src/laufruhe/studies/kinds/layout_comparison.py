@@ -45,8 +45,8 @@ class LayoutComparison(SweptPart):
     )
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """Every case at every combination, if sizes are alike."""
-        found = super().points(scenes)
+        """Return every case at every combination, after checking that sizes are equal."""
+        points = super().points(scenes)
         power = self.cases[0].equal_power_to
         odd = next((case for case in self.cases if case.equal_power_to != power), None)
         if odd is not None:
@@ -59,24 +59,26 @@ class LayoutComparison(SweptPart):
             first, *others = (measures[name] for measures in told)
             if isinstance(first, InputError) and all(isinstance(other, InputError) for other in others):
                 raise first
-        return found
+        return points
 
     def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[str, Measure | InputError]:
-        """What each engine is ranked by beside the metric, or why it has no such quantity."""
-        scene, found = Scene(problem.engine, problem.points), dict[str, Measure | InputError]()
+        """Return further quantities by name, or the error of an engine that lacks one."""
+        scene, measures = Scene(problem.engine, problem.points), dict[str, Measure | InputError]()
         for name in self.further:
             # an engine without weights has none to add up, and is no worse for it
             is_mass = name in MEASURES and MEASURES[name][0].is_mass
             try:
                 with scenes.named(case):
-                    own = Measure(*MEASURES[name]) if is_mass else scene.measure(name, QuantityTable(), "study.further")
-                    found[name] = own
+                    measure = (
+                        Measure(*MEASURES[name]) if is_mass else scene.measure(name, QuantityTable(), "study.further")
+                    )
+                    measures[name] = measure
             except InputError as error:
-                found[name] = error
-        return found
+                measures[name] = error
+        return measures
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """The proven optimum of one scene, and the same design in every further quantity."""
+        """Return the record of the proven optimum, with every further quantity of that design."""
         problem = scenes.problem(point)
         further = {n: partial(_value, m) for n, m in self._measures(problem, point.case, scenes).items()}
         if self.flywheel_for is not None:
@@ -84,7 +86,7 @@ class LayoutComparison(SweptPart):
         return solved(problem, further)
 
     def _check_cylinders(self, scenes: Scenes) -> None:
-        """Layouts are compared from one cylinder: else size would pass for layout."""
+        """Refuse layouts of different cylinders, where a difference in size would pass for one of layout."""
         sizes = []
         for case in self.cases:
             as_drawn = Point(case.model_copy(update={"equal_power_to": None}), self.combinations()[0], self.metric)
@@ -100,34 +102,34 @@ class LayoutComparison(SweptPart):
                 raise scenes.refused(case, "engine", rule, "compare layouts of one cylinder")
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """As of every sweep, with the size that engines are compared at."""
+        """Return the dataset of a sweep with the size of comparison and the further quantities."""
         power = self.cases[0].equal_power_to
         at = EQUAL if power is None else f"the power of {power} cylinders"
-        found = super().dataset(points, records).assign_attrs(at=at)
+        data = super().dataset(points, records).assign_attrs(at=at)
         names = list(dict.fromkeys(name for record in records for name in record["further"]))
         if not names:
-            return found
+            return data
         values = np.array([[record["further"][name] for name in names] for record in records], dtype=float)
         why = [[record["why_none"][name] for name in names] for record in records]
-        told = {"long_name": "further quantity of the design decided, in quantity_unit"}
+        about = {"long_name": "further quantity of the design decided, in quantity_unit"}
         wheel = f"flywheel for 1/{number(1.0 / self.flywheel_for)}" if self.flywheel_for else ""
         units = ["kg m^2" if name == _LEAST_FLYWHEEL else MEASURES[name][0].unit for name in names]
         both = ("point", "quantity")
-        return found.assign(
-            further=(both, values, told), why_none=(both, why, {"long_name": "why a design has no such quantity"})
+        return data.assign(
+            further=(both, values, about), why_none=(both, why, {"long_name": "why a design has no such quantity"})
         ).assign_coords(
             quantity=[wheel if name == _LEAST_FLYWHEEL else name for name in names], quantity_unit=("quantity", units)
         )
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """A row a point; then all of them ranked by the metric, with their places by every further quantity."""
-        found = by_point(data)
-        return [*found, *_ranking(data)] if "further" in data else found
+        """Return a row per point; then the ranking by the metric, with the place by every further quantity."""
+        tables = by_point(data)
+        return [*tables, *_ranking(data)] if "further" in data else tables
 
     @staticmethod
     def picture(data: xr.Dataset) -> Picture:
-        """Bars of every engine as given and at its optimum; lines where something is swept."""
+        """Draw bars of every engine as given and at its optimum; lines where something is swept."""
         at, alike = data.attrs["at"], data.attrs["at"] == EQUAL
         if swept_names(data):
             decided = (data["proof"].values != "as given").any()
@@ -144,12 +146,11 @@ def _value(measure: Measure | InputError, design: Evaluation) -> float:
 
 
 def _least_flywheel(degree: float, design: Evaluation) -> float:
-    """Least inertia beside pistons and rods that keeps a degree of irregularity at every operating point [kg m2]."""
     return max(swing_of(design.engine, at.point, design.fidelity).least_inertia(degree) for at in design.loads)
 
 
 def _ranking(data: xr.Dataset) -> list[Text]:
-    """Best first; places among those that tell a quantity, those that differ by nothing on one place."""
+    """Rank best first; values that differ by rounding only share a place."""
     best, points = data["objective"].values, data.sizes["point"]
     columns = [(data.attrs["metric"], data["objective"].attrs["units"], best, [""] * points)]
     for k, name in enumerate(data["quantity"].values.tolist()):
@@ -172,10 +173,9 @@ def _ranking(data: xr.Dataset) -> list[Text]:
 
 
 def _places(values: np.ndarray) -> list[int]:
-    """From 1, of each value; 0 of what is not told. What five figures do not tell apart shares a place."""
-    told = values[np.isfinite(values)]
-    near = _SAME * float(np.abs(told).max(initial=0.0))
+    finite = values[np.isfinite(values)]
+    near = _SAME * float(np.abs(finite).max(initial=0.0))
     return [
-        1 + int((told < value - max(near, _FIGURES * abs(value))).sum()) if math.isfinite(value) else 0
+        1 + int((finite < value - max(near, _FIGURES * abs(value))).sum()) if math.isfinite(value) else 0
         for value in values
     ]

@@ -32,7 +32,7 @@ class RandomDesigns(Sampled):
     own_chunk: ClassVar[int] = 10_000
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """Of every case the proven optimum, and the pieces of its draws."""
+        """Return, for every case, the proven optimum and the pieces of its draws."""
         for case in self.cases:
             with scenes.blamed(Point(case), "decisions"):
                 problem = scenes.problem(Point(case))
@@ -47,18 +47,18 @@ class RandomDesigns(Sampled):
         return [Point(case, span=span) for case in self.cases for span in (None, *self.spans())]
 
     def columns(self, scenes: Scenes) -> dict[str, Column]:
-        """Objective, limits and every open number."""
+        """Return columns for objective, limits and every open number."""
         columns: dict[str, Column] = {}
         for case in self.cases:
             problem = scenes.problem(Point(case))
             columns["objective"] = Column(problem.objective_unit or "", problem.objective_name)
             columns[WITHIN] = Column("1", "1 where a design keeps all limits")
-            told = [one for d in problem.unbalances for one in decision_values(d, d.start)]
-            columns |= {one.name: Column(one.unit, one.name) for one in told}
+            entries = [entry for d in problem.unbalances for entry in decision_values(d, d.start)]
+            columns |= {entry.name: Column(entry.unit, entry.name) for entry in entries}
         return columns
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """The proven optimum, or the values of a piece."""
+        """Return the record of the proven optimum, or the values of a piece."""
         if point.span is None:
             return solved(scenes.problem(point))
         problem, designs, names = self._prepared(point, scenes)
@@ -69,22 +69,22 @@ class RandomDesigns(Sampled):
             sizes[:, k] = decision.lower + (decision.upper - decision.lower) * sizes[:, k]
             angles[:, k] = low + (high - low) * angles[:, k]
         values = sizes * np.exp(1j * angles)
-        found = np.full((len(u), len(names)), math.nan)
-        found[:, names.index("objective")] = designs.objective(values)
-        found[:, names.index(WITHIN)] = designs.within(values)
+        rows = np.full((len(u), len(names)), math.nan)
+        rows[:, names.index("objective")] = designs.objective(values)
+        rows[:, names.index(WITHIN)] = designs.within(values)
         for k, decision in enumerate(problem.unbalances):
-            for told, drawn in zip(decision_values(decision, decision.start), (sizes, angles), strict=False):
-                found[:, names.index(told.name)] = drawn[:, k]
-        return {VALUES: found}
+            for entry, numbers in zip(decision_values(decision, decision.start), (sizes, angles), strict=False):
+                rows[:, names.index(entry.name)] = numbers[:, k]
+        return {VALUES: rows}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """All draws, and of every case what is proven."""
+        """Return all draws, with the proven optimum of every case."""
         best = [records[k] for k, point in enumerate(points) if point.span is None]
         data = self.gathered(points, records)
         about = data["objective"].attrs
         for name, words in (("objective", "optimum"), ("lower_bound", "lower bound")):
-            told = variable("case", [one[name] for one in best], f"{about['long_name']}, {words}", about["units"])
-            data[words.replace(" ", "_")] = told
+            column = variable("case", [one[name] for one in best], f"{about['long_name']}, {words}", about["units"])
+            data[words.replace(" ", "_")] = column
         return data.assign_coords(proof=("case", [one["proof"] for one in best]))
 
     def _prepared(self, point: Point, scenes: Scenes) -> tuple[Problem, Designs, list[str]]:
@@ -97,7 +97,7 @@ class RandomDesigns(Sampled):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Of every case what random designs reach, beside what is proven."""
+        """Compare the random designs of every case with the proven optimum."""
         objective, unit = in_unit(data["objective"])
         best, bound = (in_unit(data[name].assign_attrs(units=data["objective"].attrs["units"]))[0]
                        for name in ("optimum", "lower_bound"))  # fmt: skip
@@ -105,27 +105,27 @@ class RandomDesigns(Sampled):
         head += [f"optimum [{unit}]", "lower bound", "proof", "designs below the bound"]
         rows = []
         for k, name in enumerate(data["case"].values):
-            kept = _kept(data, objective, k)
-            _, middle, most = listed(kept)
-            cells = [str(name), f"{objective.shape[1]:,}", f"{100.0 * len(kept) / objective.shape[1]:.3g} %"]
+            feasible = _feasible(data, objective, k)
+            _, middle, most = listed(feasible)
+            cells = [str(name), f"{objective.shape[1]:,}", f"{100.0 * len(feasible) / objective.shape[1]:.3g} %"]
             cells += [
-                number(float(kept.min(initial=math.inf)) if len(kept) else math.nan),
+                number(float(feasible.min(initial=math.inf)) if len(feasible) else math.nan),
                 number(middle),
                 number(most),
             ]
             cells += [number(float(best[k])), number(float(bound[k])), str(data["proof"].values[k])]
-            rows.append([*cells, str(int((kept < bound[k] * (1.0 - 1e-9)).sum()))])
+            rows.append([*cells, str(int((feasible < bound[k] * (1.0 - 1e-9)).sum()))])
         return [marked_table(head, rows)]
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """How many random designs stay below, and the optimum."""
+        """Draw the share of random designs below each value, and the optimum."""
         objective, unit = in_unit(data["objective"])
         best = in_unit(data["optimum"])[0]
         marks: list[p.Mark] = []
         for k, name in enumerate(data["case"].values):
             colour = p.colour(k, data.sizes["case"])
-            marks.append(share_below(_kept(data, objective, k), colour, str(name)))
+            marks.append(share_below(_feasible(data, objective, k), colour, str(name)))
             marks.append(p.Line([best[k]] * 2, [0.0, 100.0], colour, dash=p.DASHES[0], width=1.2))
         marks.append(p.Line(colour="ink", dash=p.DASHES[0], width=1.2, label="optimum"))
         x = p.Axis(f"{data['objective'].attrs['long_name']} [{unit}]")
@@ -134,5 +134,5 @@ class RandomDesigns(Sampled):
         return p.Picture(data.attrs["title"], words, [panel], p.credit(data, f"Seed {data.attrs['seed']}. "))
 
 
-def _kept(data: xr.Dataset, objective: Array, k: int) -> Array:
+def _feasible(data: xr.Dataset, objective: Array, k: int) -> Array:
     return np.asarray(objective[k][data[WITHIN].values[k] > 0.0])

@@ -41,15 +41,15 @@ class RandomScenes(Sampled):
     own_chunk: ClassVar[int] = 1000
 
     def swept_or_drawn(self) -> list[tuple[str, Callable[[], object]]]:
-        """Of everything that is drawn."""
+        """Return the readers of the drawn quantities."""
         return [(f"vary[{k + 1}]", partial(span_of, table)) for k, table in enumerate(self.vary)]
 
     def drawn(self) -> list[Span]:
-        """What is drawn, and between which ends."""
+        """Return the drawn quantities with their ranges."""
         return [span_of(table) for table in self.vary]
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """The pieces of every case, if its scene can be made at both ends of everything."""
+        """Return the pieces of every case, after building its scene at both ends of every range."""
         for case in self.cases:
             for span in self.drawn():
                 for end in (span.low, span.high):
@@ -58,20 +58,20 @@ class RandomScenes(Sampled):
         return [Point(case, span=span) for case in self.cases for span in self.spans()]
 
     def columns(self, scenes: Scenes) -> dict[str, Column]:
-        """What was drawn, what became of it, and what was decided."""
+        """Return columns for drawn numbers, outcomes and decisions."""
         spans = self.drawn()
-        found = {span.quantity: Column(span.unit, span.quantity) for span in spans}
+        columns = {span.quantity: Column(span.unit, span.quantity) for span in spans}
         for case in self.cases:
             problem = scenes.problem(Point(case, {span.quantity: span.value(span.low) for span in spans}))
             name, unit = problem.objective_name, problem.objective_unit or ""
-            found |= {key: Column(unit, f"{name} {words}") for key, words in _WORDS.items()}
-            found |= {key: Column("1", key) for key in _CODES}
-            told = [one for d in problem.decisions for one in decision_values(d, d.start)]
-            found |= {one.name: Column(one.unit, f"decided: {one.name}") for one in told}
-        return found
+            columns |= {key: Column(unit, f"{name} {words}") for key, words in _WORDS.items()}
+            columns |= {key: Column("1", key) for key in _CODES}
+            entries = [entry for d in problem.decisions for entry in decision_values(d, d.start)]
+            columns |= {entry.name: Column(entry.unit, f"decided: {entry.name}") for entry in entries}
+        return columns
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """A row a draw: each scene read, decided and judged by itself."""
+        """Return a row per draw: its scene read and decided."""
         assert point.span is not None
         spans, names = self.drawn(), list(self.columns(scenes))
         shares = self.random(point.span, len(spans))
@@ -80,18 +80,18 @@ class RandomScenes(Sampled):
         for numbers in drawn:
             changes = {span.quantity: span.value(x) for span, x in zip(spans, numbers, strict=True)}
             try:
-                found = solved(scenes.problem(replace(point, changes=changes, span=None)))
+                record = solved(scenes.problem(replace(point, changes=changes, span=None)))
             except (InputError, ModelError):
                 # among so many some engine cannot be built: it is counted, and no reason to stop
-                found = IMPOSSIBLE
+                record = IMPOSSIBLE
             row = dict(zip((span.quantity for span in spans), map(float, numbers), strict=True))
-            row |= {key: float(codes.index(found[key])) for key, codes in _CODES.items()}
-            row |= {key: found.get(key, math.nan) for key in SIZES} | found.get("decided", {})
+            row |= {key: float(codes.index(record[key])) for key, codes in _CODES.items()}
+            row |= {key: record.get(key, math.nan) for key in SIZES} | record.get("decided", {})
             rows.append([row.get(name, math.nan) for name in names])
         return {VALUES: np.array(rows)}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """All draws, status and proof as small numbers with their meanings."""
+        """Return all draws, status and proof as flag values with their meanings."""
         data = self.gathered(points, records)
         for name, codes in _CODES.items():
             meanings = " ".join(code.replace(" ", "_") for code in codes)
@@ -101,36 +101,36 @@ class RandomScenes(Sampled):
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Of every case what became of its scenes, and what deciding gained."""
+        """Count the outcomes of every case, and compare its scenes as given and as decided."""
         unit = in_unit(data["objective"])[1]
         head = ["case", "scenes", "proven optimum", "proven within gap or local", "infeasible", "failed", "impossible"]
         head += [f"as given: 5 % below [{unit}]", "median", "95 % below", f"decided: 5 % below [{unit}]", "median"]
         head += ["95 % below", "largest gap of the proven"]
         rows = []
         for name in data["case"].values:
-            own = data.sel(case=name)
-            status, proof = own["status"].values, own["proof"].values
-            found = np.isin(status, (0, 1))
-            best = found & np.isin(proof, (0, 4))
-            given, decided = (in_unit(own[key])[0] for key in SIZES[:2])
-            cells = [str(name), f"{len(status):,}", f"{int(best.sum()):,}", f"{int((found & ~best).sum()):,}"]
+            part = data.sel(case=name)
+            status, proof = part["status"].values, part["proof"].values
+            solved_ = np.isin(status, (0, 1))
+            best = solved_ & np.isin(proof, (0, 4))
+            initial, decided = (in_unit(part[key])[0] for key in SIZES[:2])
+            cells = [str(name), f"{len(status):,}", f"{int(best.sum()):,}", f"{int((solved_ & ~best).sum()):,}"]
             cells += [f"{int((status == code).sum()):,}" for code in (2, 3, 4)]
-            cells += [number(x) for values in (given, decided) for x in listed(values)]
-            proven = own.isel(draw=np.flatnonzero(status == 0))
+            cells += [number(x) for values in (initial, decided) for x in listed(values)]
+            proven = part.isel(draw=np.flatnonzero(status == 0))
             gap = (proven["objective"] - proven["lower_bound"]) / np.maximum(proven["objective"], 1e-300)
             rows.append([*cells, f"{float(gap.max()):.1e}" if gap.notnull().any() else "–"])
         return [marked_table(head, rows)]
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """How many scenes stay below, as given and as decided."""
+        """Draw the share of scenes below each value, as given and as decided."""
         marks: list[p.Mark] = []
         for k, name in enumerate(data["case"].values):
-            own, colour = data.sel(case=name), p.colour(k, data.sizes["case"])
-            marks.append(share_below(in_unit(own["objective_given"])[0], colour, f"{name}, as given", p.DASHES[0]))
-            marks.append(share_below(in_unit(own["objective"])[0], colour, f"{name}, as decided"))
+            part, colour = data.sel(case=name), p.colour(k, data.sizes["case"])
+            marks.append(share_below(in_unit(part["objective_given"])[0], colour, f"{name}, as given", p.DASHES[0]))
+            marks.append(share_below(in_unit(part["objective"])[0], colour, f"{name}, as decided"))
         words = str(data["objective"].attrs["long_name"]).removesuffix(" as decided")
         x = p.Axis(f"{words} [{in_unit(data['objective'])[1]}]")
         panel = p.Panel(marks, x, p.Axis("scenes below [%]", (0.0, 100.0)))
-        told = f"{data.sizes['draw']:,} random scenes a case, each decided by itself."
-        return p.Picture(data.attrs["title"], told, [panel], p.credit(data, f"Seed {data.attrs['seed']}. "))
+        words_above = f"{data.sizes['draw']:,} random scenes a case, each decided by itself."
+        return p.Picture(data.attrs["title"], words_above, [panel], p.credit(data, f"Seed {data.attrs['seed']}. "))

@@ -54,7 +54,7 @@ class SpeedsTable(f.Table):
         return self
 
     def with_point(self, point: OperatingPoint) -> Array:
-        """Ascending [rad/s], that of an operating point between them too."""
+        """Return ascending speeds [rad/s], including that of an operating point within the range."""
         count = self.points or int((self.last - self.first) / (self.step or 1.0) + 1e-9) + 1
         steps = self.first + (self.step or (self.last - self.first) / (count - 1)) * np.arange(count)
         steps = steps[~np.isclose(steps, point.speed, rtol=1e-9)]
@@ -81,7 +81,7 @@ class SpeedMap(Part):
     by_order: bool = f.optional("Whether the amplitude of every order of the first measure is shown too.", False)
 
     def points(self, scenes: Scenes) -> list[Point]:
-        """A case each: what is decided does not hang on the speeds."""
+        """Return one point per case, because decisions do not depend on the speeds of the map."""
         for case in self.cases:
             problem = scenes.problem(Point(case))
             self._load(problem, case, scenes)
@@ -103,32 +103,32 @@ class SpeedMap(Part):
         return problem.points[0 if wanted is None else names.index(wanted)]
 
     def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[Measure, float]:
-        """What is mapped, at whatever speed, and the part's own limits."""
-        scene, asked = Scene(problem.engine, problem.points), dict.fromkeys(problem.measures, math.inf)
+        """Return the mapped measures, at any speed, with the limits of this part."""
+        scene, limits = Scene(problem.engine, problem.points), dict.fromkeys(problem.measures, math.inf)
         with scenes.named(case):
             if self.measures:
-                asked = {}
+                limits = {}
             for k, table in enumerate(self.measures, 1):
                 measure = scene.measure(table.quantity, table, f"measures[{k}].quantity")
                 where = f"measures[{k}].limit"
-                asked[measure] = math.inf if table.limit is None else measured(table.limit, measure.unit, where)
+                limits[measure] = math.inf if table.limit is None else measured(table.limit, measure.unit, where)
         narrowed = {"operating_points", "orders"}
-        return {replace(m, points=None): limit for m, limit in asked.items() if narrowed <= set(m.channel.keys)}
+        return {replace(m, points=None): limit for m, limit in limits.items() if narrowed <= set(m.channel.keys)}
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
-        """Values, limits and orders of every design at every speed."""
+        """Return values, limits and orders of every design at every speed."""
         problem = scenes.problem(point)
-        load, asked = self._load(problem, point.case, scenes), self._measures(problem, point.case, scenes)
-        measures = list(asked)
+        load, limits = self._load(problem, point.case, scenes), self._measures(problem, point.case, scenes)
+        measures = list(limits)
         speeds = self.speeds.with_point(load)
         designs = {
-            name: {**_mapped(problem, load, speeds, engine, measures, self.by_order), "proof": proof}
+            name: {**_speed_curves(problem, load, speeds, engine, measures, self.by_order), "proof": proof}
             for name, engine, proof in self._engines(problem)
         }
         return {
             "speeds": speeds.tolist(),
             "measures": [[measure.name, measure.unit] for measure in measures],
-            "limits": [_limits(problem, measure, load, speeds, own) for measure, own in asked.items()],
+            "limits": [_limits(problem, measure, load, speeds, limit) for measure, limit in limits.items()],
             "designs": designs,
         }
 
@@ -138,32 +138,32 @@ class SpeedMap(Part):
             yield "as given", problem.engine, AS_GIVEN
         if "as decided" in self.designs and is_open:
             result, status, proof = decided(problem)
-            found = status in ("optimal", "feasible")
-            yield "as decided", result.final.engine if found else None, proof if found else status
+            has_design = status in ("optimal", "feasible")
+            yield "as decided", result.final.engine if has_design else None, proof if has_design else status
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
-        """A point for every case, design and speed, in that order; NaN on a resonance that nothing damps."""
+        """Return a point for every case, design and speed, in that order; NaN on an undamped resonance."""
         units = {name: unit for record in records for name, unit in record["measures"]}
-        each = [
-            _one(point.case.name, design, own, record)
+        parts = [
+            _design_dataset(point.case.name, design, attributes, record)
             for point, record in zip(points, records, strict=True)
-            for design, own in record["designs"].items()
+            for design, attributes in record["designs"].items()
         ]
-        found = xr.concat(each, "point", join="outer").reindex(measure=list(units))
-        found = found.drop_dims([name for name in ("order", "mode") if not found.sizes[name]])
+        data = xr.concat(parts, "point", join="outer").reindex(measure=list(units))
+        data = data.drop_dims([name for name in ("order", "mode") if not data.sizes[name]])
         words = {"value": "of every measure, in measure_unit", "limit": "that it is to keep under, in measure_unit"}
         for name, text in words.items():
-            found[name].attrs["long_name"] = text
-        if "amplitude" in found:
-            own = {"long_name": "largest amplitude of every order of crank speed", "of": next(iter(units))}
-            found["amplitude"].attrs.update(own | {"units": next(iter(units.values()))})
-        if "frequency" in found:
-            found["frequency"].attrs.update(units="Hz", long_name="natural frequencies on the mounts")
-        return found.assign_coords(measure_unit=("measure", list(units.values()))).assign_attrs(self.about())
+            data[name].attrs["long_name"] = text
+        if "amplitude" in data:
+            attributes = {"long_name": "largest amplitude of every order of crank speed", "of": next(iter(units))}
+            data["amplitude"].attrs.update(attributes | {"units": next(iter(units.values()))})
+        if "frequency" in data:
+            data["frequency"].attrs.update(units="Hz", long_name="natural frequencies on the mounts")
+        return data.assign_coords(measure_unit=("measure", list(units.values()))).assign_attrs(self.about())
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
-        """Every line of the map: where it is largest, and where over its limit."""
+        """Return a row per measure: its extremes, and the speeds over its limit."""
         data = _readable(data)
         head = ["case", "design", "measure", "least", "largest", f"at [{RPM}]", "limit", f"over it, from to [{RPM}]"]
         rows = []
@@ -171,7 +171,7 @@ class SpeedMap(Part):
             for name, unit in zip(data["measure"].values, data["measure_unit"].values, strict=True):
                 here = one.sel(measure=name)
                 proof, label = str(one["proof"].values[0]), f"{name} [{unit}]" if unit else str(name)
-                cells = _told(*(here[what].values for what in ("speed", "value", "limit")))
+                cells = _row_of(*(here[what].values for what in ("speed", "value", "limit")))
                 # what one case does not ask for is no line of it
                 if cells is not None or proof in ("infeasible", FAILED):
                     rows.append([case, design, label, *(cells or [NOTHING] * 5), proof])
@@ -179,7 +179,7 @@ class SpeedMap(Part):
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:
-        """A panel a measure, designs as given dashed; then a panel a design of its orders."""
+        """Draw a panel per measure, designs as given dashed; then a panel per design of its orders."""
         data = _readable(data)
         designs = list(_designs(data))
         panels = [_panel(data, designs, k) for k in range(data.sizes["measure"])]
@@ -192,8 +192,7 @@ class SpeedMap(Part):
         return p.Picture(data.attrs["title"], words, panels, p.credit(data), size, gap=0.8, legend=legend)
 
 
-def _told(speeds: Array, values: Array, limits: Array) -> list[str] | None:
-    """Least, largest and where, limit and where over it; None where there is nothing."""
+def _row_of(speeds: Array, values: Array, limits: Array) -> list[str] | None:
     if np.isnan(values).all():
         return None
     most, known = int(np.nanargmax(values)), limits[np.isfinite(limits)]
@@ -203,7 +202,7 @@ def _told(speeds: Array, values: Array, limits: Array) -> list[str] | None:
     return [*cells, number(known[0]), where] if len(known) else [*cells, NOTHING, NOTHING]
 
 
-def _mapped(
+def _speed_curves(
     problem: Problem,
     load: OperatingPoint,
     speeds: Array,
@@ -211,7 +210,7 @@ def _mapped(
     measures: Sequence[Measure],
     by_order: bool,
 ) -> Record:
-    """Values (measures, speeds) of one design, amplitudes (orders, speeds), and natural frequencies [Hz]."""
+    """Return values (measures, speeds), amplitudes (orders, speeds) and natural frequencies [Hz] of one design."""
     values = np.full((len(measures), len(speeds)), math.nan)
     if engine is None:
         return {"values": values.tolist(), "orders": [], "sizes": [], "modes": []}
@@ -219,59 +218,57 @@ def _mapped(
     channel = measures[0].channel
     for k, speed in enumerate(speeds):
         try:
-            found = evaluate(replace(problem, points=(replace(load, speed=float(speed)),)), engine)
+            evaluation = evaluate(replace(problem, points=(replace(load, speed=float(speed)),)), engine)
         except ResonanceError:
             continue
-        values[:, k] = [found.value(measure) for measure in measures]
+        values[:, k] = [evaluation.value(measure) for measure in measures]
         if by_order and isinstance(channel, LoadChannel):
-            signal = selected(measures[0], channel.signal(found.loads[0]), found.engine)
+            signal = selected(measures[0], channel.signal(evaluation.loads[0]), evaluation.engine)
             amplitudes = order_amplitude(signal.coefficients).max(axis=1)
             for order, size in zip(signal.orders, amplitudes, strict=True):
                 sizes.setdefault(float(order), np.zeros(len(speeds)))[k] = size
     largest = sorted((order for order in sizes if order), key=lambda order: -sizes[order].max())[:MOST_ORDERS]
-    shown = sorted(order for order in largest if sizes[order].max() > PRESENT * sizes[largest[0]].max())
+    present = sorted(order for order in largest if sizes[order].max() > PRESENT * sizes[largest[0]].max())
     modes = mounting_in(engine).modes.frequencies.tolist() if engine.block is not None else []
-    return {"values": values.tolist(), "orders": shown, "sizes": [sizes[h].tolist() for h in shown], "modes": modes}
+    return {"values": values.tolist(), "orders": present, "sizes": [sizes[h].tolist() for h in present], "modes": modes}
 
 
 def _limits(problem: Problem, measure: Measure, load: OperatingPoint, speeds: Array, own: float) -> list[float]:
-    """The lowest limit on a measure at every speed; one of single operating points at theirs alone."""
-    found = np.full(len(speeds), own)
+    lowest = np.full(len(speeds), own)
     for limit in problem.limits:
         if replace(limit.measure, points=None) == measure and limit.measure.counts_point(load):
             there = (speeds == load.speed) | (limit.measure.points is None)
-            found[there] = np.minimum(found[there], limit.maximum)
-    return [float(value) if math.isfinite(value) else math.nan for value in found]
+            lowest[there] = np.minimum(lowest[there], limit.maximum)
+    return [float(value) if math.isfinite(value) else math.nan for value in lowest]
 
 
-def _one(case: str, design: str, own: Mapping[str, Any], record: Mapping[str, Any]) -> xr.Dataset:
-    """One design of one case at every speed."""
+def _design_dataset(case: str, design: str, values: Mapping[str, Any], record: Mapping[str, Any]) -> xr.Dataset:
     speeds = [float(f"{PER_RAD * speed:.12g}") for speed in record["speeds"]]
     count, names = len(speeds), [name for name, _ in record["measures"]]
     return xr.Dataset(
         {
-            "value": (("point", "measure"), np.transpose(own["values"])),
+            "value": (("point", "measure"), np.transpose(values["values"])),
             "limit": (("point", "measure"), np.transpose(record["limits"])),
-            "amplitude": (("point", "order"), np.reshape(own["sizes"], (-1, count)).T),
-            "frequency": (("point", "mode"), np.tile(own["modes"], (count, 1))),
+            "amplitude": (("point", "order"), np.reshape(values["sizes"], (-1, count)).T),
+            "frequency": (("point", "mode"), np.tile(values["modes"], (count, 1))),
         },
         {
             **{name: ("point", [value] * count) for name, value in
-               {"case": case, "design": design, "proof": own["proof"]}.items()},
+               {"case": case, "design": design, "proof": values["proof"]}.items()},
             "speed": variable("point", speeds, "crank speed", RPM),
             "measure": names,
-            "order": own["orders"],
-            "mode": np.arange(1, len(own["modes"]) + 1),
+            "order": values["orders"],
+            "mode": np.arange(1, len(values["modes"]) + 1),
         },
     )  # fmt: skip
 
 
 def _readable(data: xr.Dataset) -> xr.Dataset:
     units, factors = zip(*(readable(str(unit)) for unit in data["measure_unit"].values), strict=True)
-    found = data.assign(value=data["value"] * np.array(factors), limit=data["limit"] * np.array(factors))
+    converted = data.assign(value=data["value"] * np.array(factors), limit=data["limit"] * np.array(factors))
     if "amplitude" in data:
-        found["amplitude"] = (data["amplitude"] * factors[0]).assign_attrs(data["amplitude"].attrs)
-    return found.assign_coords(measure_unit=("measure", list(units)))
+        converted["amplitude"] = (data["amplitude"] * factors[0]).assign_attrs(data["amplitude"].attrs)
+    return converted.assign_coords(measure_unit=("measure", list(units)))
 
 
 def _designs(data: xr.Dataset) -> Iterator[tuple[str, str, xr.Dataset]]:
@@ -281,17 +278,16 @@ def _designs(data: xr.Dataset) -> Iterator[tuple[str, str, xr.Dataset]]:
 
 
 def _panel(data: xr.Dataset, designs: Sequence[tuple[str, str, xr.Dataset]], k: int) -> p.Panel:
-    """One measure over speed, and its limits."""
     cases = list(dict.fromkeys(case for case, *_ in designs))
     lines: list[p.Mark] = []
     borders: list[p.Mark] = []
     for case, design, one in designs:
         speeds, values, limits = one["speed"].values, one["value"].values[:, k], one["limit"].values[:, k]
-        given = design == AS_GIVEN
-        single: p.Colour = "before" if given else "after"
+        is_given = design == AS_GIVEN
+        single: p.Colour = "before" if is_given else "after"
         colour = single if len(cases) == 1 else p.colour(cases.index(case), len(cases))
         label = design if len(cases) == 1 else f"{case}, {design}"
-        lines.append(p.Line(speeds, values, colour, label, dash=p.DASHES[0] if given else ()))
+        lines.append(p.Line(speeds, values, colour, label, dash=p.DASHES[0] if is_given else ()))
         there = np.isfinite(limits)
         # one of a single operating point is a stroke
         look: dict[str, Any] = {"width": 1.2} if there.sum() > 1 else {"width": 0.0, "marker": "_", "size": 14.0}
@@ -310,7 +306,7 @@ def _speed_axis(data: xr.Dataset) -> p.Axis:
 
 
 def _orders(case: str, design: str, one: xr.Dataset) -> p.Panel:
-    """Amplitude of every order, named beside the panel; on the axis the speeds at which it meets a mode."""
+    """Draw the amplitude of every order; strokes on the axis mark speeds at which it meets a natural frequency."""
     speeds, top = one["speed"].values, float(one["amplitude"].max()) or 1.0
     edge = float(speeds.max() + 0.015 * np.ptp(speeds))
     marks: list[p.Mark] = []

@@ -18,20 +18,20 @@ MOST_EDITS, LONGEST, MOST_ENTRIES = 300, 100, 96
 
 @dataclass(frozen=True)
 class Edit:
-    """One change of the problem's tables: what is done, to which number, and the value as a file has it."""
+    """One change of the problem's tables: kind of change, name of the number, value as in a file."""
 
     what: str
     name: str
     value: Any
 
     def __call__(self, tables: Tables) -> dict[str, Any]:
-        """The tables with it; `Refused` where it cannot be made."""
+        """Return the changed tables; `Refused` if the change is impossible."""
         return _WAYS[self.what](tables, self.name, self.value)
 
 
 @dataclass(frozen=True)
-class Asked:
-    """The state of a page.
+class PageState:
+    """State of a page.
 
     Attributes
     ----------
@@ -54,46 +54,46 @@ class Asked:
     position: int = 0
 
     @classmethod
-    def of(cls, given: object) -> Asked:
-        """From what a request holds; `Refused` where it is nothing that a page asks."""
-        if not isinstance(given, dict) or not set(given) <= {"edits", "held", "design", "has", "position"}:
+    def from_json(cls, body: object) -> PageState:
+        """Parse a request; `Refused` if it is malformed."""
+        if not isinstance(body, dict) or not set(body) <= {"edits", "held", "design", "has", "position"}:
             raise _strange("request", "is no table of edits, held, design, has and position")
-        design, has, position = given.get("design", {}), given.get("has", ""), given.get("position", 0)
+        design, has, position = body.get("design", {}), body.get("has", ""), body.get("position", 0)
         if not isinstance(design, dict) or len(design) > MOST_EDITS or not all(map(_is_number, design.values())):
             raise _strange("design", "is no table of names and numbers")
         if not isinstance(has, str) or len(has) > LONGEST:
             raise _strange("has", "is no key of a model")
         if not isinstance(position, int) or not _is_number(position):
             raise _strange("position", "is no whole number")
-        told = {str(name): float(value) for name, value in design.items()}
-        return cls(_edits(given.get("edits", []), "edits"), _edits(given.get("held", []), "held"), told, has, position)
+        numbers = {str(name): float(value) for name, value in design.items()}
+        return cls(_edits(body.get("edits", []), "edits"), _edits(body.get("held", []), "held"), numbers, has, position)
 
     def tables(self, tables: Tables, with_held: bool) -> dict[str, Any]:
-        """The tables of the problem as it is asked about."""
-        found = dict(tables)
+        """Return the tables of the requested problem."""
+        changed = dict(tables)
         for edit in (*self.edits, *(self.held if with_held else ())):
-            found = edit(found)
-        return found
+            changed = edit(changed)
+        return changed
 
     def check(self, offered: Sequence[str]) -> None:
-        """Refuse numbers that the page was not offered: a path might lead to the name of a file."""
+        """Refuse numbers that the page was not offered: a path might lead to a file name."""
         for edit in (*self.edits, *self.held):
             if edit.name not in offered:
                 raise _strange(edit.name, "is not offered by this page")
 
 
-def _edits(given: object, where: str) -> tuple[Edit, ...]:
-    if not isinstance(given, list) or len(given) > MOST_EDITS:
+def _edits(body: object, where: str) -> tuple[Edit, ...]:
+    if not isinstance(body, list) or len(body) > MOST_EDITS:
         raise _strange(where, f"is no list of at most {MOST_EDITS} changes")
-    return tuple(_edit(entry, where) for entry in given)
+    return tuple(_edit(entry, where) for entry in body)
 
 
-def _edit(given: object, where: str) -> Edit:
-    if not isinstance(given, list) or len(given) != 3 or given[0] not in _WAYS or not isinstance(given[1], str):
+def _edit(body: object, where: str) -> Edit:
+    if not isinstance(body, list) or len(body) != 3 or body[0] not in _WAYS or not isinstance(body[1], str):
         raise _strange(where, "holds a change that is none of: " + ", ".join(_WAYS))
-    if not _is_plain(given[2]) or len(given[1]) > LONGEST:
-        raise _strange(where, f"holds a value of '{given[1][:LONGEST]}' that no number has")
-    return Edit(*given)
+    if not _is_plain(body[2]) or len(body[1]) > LONGEST:
+        raise _strange(where, f"holds a value of '{body[1][:LONGEST]}' that no number has")
+    return Edit(*body)
 
 
 def _is_number(value: object) -> bool:
@@ -102,10 +102,9 @@ def _is_number(value: object) -> bool:
 
 
 def _is_plain(value: object, deep: int = 0) -> bool:
-    """Whether a number, a short text, or a short list or table of these."""
     if isinstance(value, dict) and not deep:
-        own = value.items()
-        return len(value) <= MOST_ENTRIES and all(isinstance(k, str) and _is_plain(v, deep + 1) for k, v in own)
+        items = value.items()
+        return len(value) <= MOST_ENTRIES and all(isinstance(k, str) and _is_plain(v, deep + 1) for k, v in items)
     if isinstance(value, list) and deep < 2:
         return len(value) <= MOST_ENTRIES and all(_is_plain(entry, deep + 1) for entry in value)
     return value is None or (len(value) <= LONGEST if isinstance(value, str) else _is_number(value))
@@ -116,14 +115,12 @@ def _strange(where: str, rule: str) -> Refused:
 
 
 def _star(tables: Tables, _: str, value: Any) -> dict[str, Any]:
-    """A crank with its firing order, the angles of its banks and its shafts; nothing of them is open any more."""
     if not isinstance(value, dict) or not isinstance(value.get("throws"), list):
         raise _strange("star", "has no throws")
     return edits.with_star(tables, value, value.get("without") or [])
 
 
 def _open_crank(tables: Tables, _: str, __: Any) -> dict[str, Any]:
-    """Throws and firing order left open, so that all of them are ranked."""
     engine = dict(tables["engine"])
     if "cylinders" not in engine and isinstance(engine.get("firing_order"), list):
         engine["cylinders"] = len(engine["firing_order"])

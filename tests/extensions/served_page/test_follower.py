@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from laufruhe.extensions.served_page.following import Follower, can_follow
+from laufruhe.extensions.served_page.follower import Follower, can_follow
 from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.solvers import solve

@@ -31,8 +31,8 @@ _FOLLOWED = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
 
 
 @dataclass(frozen=True, eq=False)
-class Followed:
-    """A design under limits that are being moved.
+class Optimum:
+    """Optimum for the current limits.
 
     Attributes
     ----------
@@ -58,19 +58,19 @@ class Followed:
 
 
 def can_follow(problem: Problem) -> bool:
-    """Whether all that is open is what loads are affine in, of the drawing, and a norm of theirs is minimised."""
+    """Return True if all open numbers are affine and a norm of the loads is minimised."""
     kinds = {decision.kind for decision in problem.decisions}
-    told = bool(problem.objective) and not any(term.measure.channel.is_number for term in problem.objective)
+    has_norm = bool(problem.objective) and not any(term.measure.channel.is_number for term in problem.objective)
     alone = not problem.extras and problem.phasing is None
     # limits on run-ups wait, and are named; what else is not known to be affine is followed by no program and no bound
-    asked = [measure for measure in problem.measures if not measure.channel.simulation]
-    affine = all(is_affine(measure.channel, kinds, problem) for measure in asked)
+    measures = [measure for measure in problem.measures if not measure.channel.simulation]
+    affine = all(is_affine(measure.channel, kinds, problem) for measure in measures)
     convex = all(measure.norm.is_convex for measure in problem.measures if measure.is_load)
-    return bool(kinds) and kinds <= _FOLLOWED and told and alone and affine and convex
+    return bool(kinds) and kinds <= _FOLLOWED and has_norm and alone and affine and convex
 
 
 class Follower:
-    """The optimum of one problem, its limits at any place.
+    """Fast optimum of one problem under changing limits.
 
     Parameters
     ----------
@@ -92,31 +92,31 @@ class Follower:
         self._fine = model.at(TIMES * self.samples)
         self._whole = model.at(TIMES * self.samples, averaged=True)
 
-    def at(self, limits: Sequence[Limit]) -> Followed:
-        """The least value under the problem's limits, each at the place that is given here."""
+    def at(self, limits: Sequence[Limit]) -> Optimum:
+        """Return the optimum under the given limits."""
         moved = {limit.measure: limit for limit in limits if limit.maximum < np.inf}
-        coarse, fine, whole = (self._under(rows, moved) for rows in (self._coarse, self._fine, self._whole))
+        coarse, fine, averaged = (self._under(rows, moved) for rows in (self._coarse, self._fine, self._whole))
         names = [limit.name for limit in self._problem.load_limits]
-        found = solve_cones(coarse)
-        if found.x is None:
+        solution = solve_cones(coarse)
+        if solution.x is None:
             # rows that are never more than what they stand for: where these contradict each other, the cycle does
-            found = solve_cones(whole)
-            if found.x is None:
-                return _none(conflict_of(whole, names))
-            bound = best_bound(whole, found.x, found.multipliers)
+            solution = solve_cones(averaged)
+            if solution.x is None:
+                return _conflict(conflict_of(averaged, names))
+            bound = best_bound(averaged, solution.x, solution.multipliers)
         else:
-            found = replace(found, x=settled(self._problem, fine, found.x))
-            assert found.x is not None
-            bound = best_bound(whole, found.x, on_grid(coarse, whole, found.multipliers))
-        assert found.x is not None
-        x, value = found.x, fine.objective(found.x)
-        price = dict(zip(names, bound.multipliers.shadow_prices(whole), strict=True))
+            solution = replace(solution, x=settled(self._problem, fine, solution.x))
+            assert solution.x is not None
+            bound = best_bound(averaged, solution.x, on_grid(coarse, averaged, solution.multipliers))
+        assert solution.x is not None
+        x, value = solution.x, fine.objective(solution.x)
+        price = dict(zip(names, bound.multipliers.shadow_prices(averaged), strict=True))
         stands = {name: norm.value(x) for name, (_, norm) in zip(names, fine.limits, strict=True)}
         broken = tuple(n for n, (most, norm) in zip(names, fine.limits, strict=True) if _breaks(norm.value(x), most))
         idle = [n for n, (_, norm) in zip(names, fine.limits, strict=True) if not norm.slope.any()]
         if set(broken) & set(idle):
-            return _none(tuple(n for n in broken if n in idle))
-        return Followed(
+            return _conflict(tuple(n for n in broken if n in idle))
+        return Optimum(
             values=tuple(domain.complex_value(x) for domain in self._model.domains),
             value=value,
             bound=bound.value,
@@ -126,9 +126,9 @@ class Follower:
         )
 
     def _under(self, rows: AffineProblem, moved: Mapping[Measure, Limit]) -> AffineProblem:
-        own = zip(self._problem.load_limits, rows.limits, strict=True)
+        pairs = zip(self._problem.load_limits, rows.limits, strict=True)
         return replace(
-            rows, limits=tuple((moved[x.measure].maximum if x.measure in moved else most, n) for x, (most, n) in own)
+            rows, limits=tuple((moved[x.measure].maximum if x.measure in moved else most, n) for x, (most, n) in pairs)
         )
 
 
@@ -136,5 +136,5 @@ def _breaks(value: float, maximum: float) -> bool:
     return value > maximum * (1.0 + KEPT)
 
 
-def _none(conflict: tuple[str, ...]) -> Followed:
-    return Followed((), np.inf, np.inf, 0.0, (), (), conflict)
+def _conflict(conflict: tuple[str, ...]) -> Optimum:
+    return Optimum((), np.inf, np.inf, 0.0, (), (), conflict)

@@ -18,11 +18,11 @@ from laufruhe.solvers.conclusion import decision_values
 from laufruhe.solvers.values import LimitValue
 
 
-def as_text(found: dict[str, Any]) -> str:
-    """As JSON; a model is JSON already, and what is no finite number is null."""
-    told = {key: entry for key, entry in found.items() if key not in ("model", "engine")}
-    text = json.dumps(finite(told), allow_nan=False)
-    drawn = {"model": found.get("model"), "engine": json.dumps(found["engine"]) if "engine" in found else None}
+def as_text(answer: dict[str, Any]) -> str:
+    """Return JSON; a model is JSON already, numbers that are not finite become null."""
+    plain = {key: entry for key, entry in answer.items() if key not in ("model", "engine")}
+    text = json.dumps(finite(plain), allow_nan=False)
+    drawn = {"model": answer.get("model"), "engine": json.dumps(answer["engine"]) if "engine" in answer else None}
     return "".join([text[:-1], *(f', "{key}": {entry}' for key, entry in drawn.items() if entry is not None), "}"])
 
 
@@ -37,7 +37,7 @@ def design(problem: Problem, values: Sequence[Value]) -> dict[str, float]:
     return {e.name: e.value for d, v in zip(problem.decisions, values, strict=True) for e in decision_values(d, v)}
 
 
-def limits(found: Iterable[LimitValue], problem: Problem, is_estimate: bool = False) -> list[dict[str, Any]]:
+def limits(values: Iterable[LimitValue], problem: Problem, is_estimate: bool = False) -> list[dict[str, Any]]:
     """Return how a design stands to its limits, and what they cost."""
     edges = {limit.name: limit for limit in problem.limits}
     return [
@@ -50,14 +50,13 @@ def limits(found: Iterable[LimitValue], problem: Problem, is_estimate: bool = Fa
             "price": limit.shadow_price,
             "words": _words(limit, problem, is_estimate),
         }
-        for limit in found
+        for limit in values
     ]
 
 
-def _sides(found: LimitValue, limit: Limit | None) -> list[tuple[str, float]]:
-    """Return sense and edge of every side; where a band is left out, of the side that has least room."""
+def _sides(value: LimitValue, limit: Limit | None) -> list[tuple[str, float]]:
     if limit is None or limit.outside is not None:
-        return [(found.side, found.limit)]
+        return [(value.side, value.limit)]
     ends = (("at least", limit.minimum), ("at most", limit.maximum))
     return [(sense, edge) for sense, edge in ends if math.isfinite(edge)]
 

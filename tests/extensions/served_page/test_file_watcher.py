@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from laufruhe.errors import InputError
-from laufruhe.extensions.served_page.watched import Watched
+from laufruhe.extensions.served_page.file_watcher import FileWatcher
 from problem_files import FOUR, MOUNTS, PROBLEMS, written
 
 TEXT = FOUR + '[[operating_points]]\nspeed = "2500 rpm"\n' + MOUNTS
@@ -25,14 +25,14 @@ def saved(path: Path, text: str) -> None:
 
 
 @pytest.fixture
-def watched(tmp_path: Path) -> Iterator[Watched]:
-    made = Watched(written(tmp_path, TEXT))
+def watched(tmp_path: Path) -> Iterator[FileWatcher]:
+    made = FileWatcher(written(tmp_path, TEXT))
     made.start()
     yield made
     made.close()
 
 
-def test_changes_are_told_and_what_is_wrong_leaves_the_last_good_state(watched: Watched) -> None:
+def test_changes_are_told_and_what_is_wrong_leaves_the_last_good_state(watched: FileWatcher) -> None:
     first = watched.source
     saved(watched.path, TEXT.replace('"2500 rpm"', "2500 rpm"))
     assert watched.later(1, PATIENCE) == 2
@@ -51,7 +51,7 @@ def test_changes_are_told_and_what_is_wrong_leaves_the_last_good_state(watched: 
     assert "does not exist" in watched.complaint
 
 
-def test_who_waits_is_let_go_when_nothing_is_served_any_more(watched: Watched) -> None:
+def test_who_waits_is_let_go_when_nothing_is_served_any_more(watched: FileWatcher) -> None:
     watched.close()
     assert watched.later(watched.version, PATIENCE) == watched.version
     assert watched.is_closed
@@ -59,7 +59,7 @@ def test_who_waits_is_let_go_when_nothing_is_served_any_more(watched: Watched) -
 
 def test_what_cannot_be_read_is_not_served(tmp_path: Path) -> None:
     with pytest.raises(InputError):
-        Watched(tmp_path / "missing.toml")
+        FileWatcher(tmp_path / "missing.toml")
 
 
 @pytest.mark.parametrize("name", ["../trace.csv", "/etc/passwd", "inner/../../trace.csv"])
@@ -69,7 +69,7 @@ def test_nothing_beyond_the_folder_is_read(name: str, tmp_path: Path) -> None:
     folder.mkdir()
     gas = f'[gas]\nmodel = "trace"\nfile = "{name}"\n'
     with pytest.raises(InputError, match=r"gas\.file = .*outside the folder of the problem"):
-        Watched(written(folder, TEXT + gas))
+        FileWatcher(written(folder, TEXT + gas))
 
 
 @pytest.mark.parametrize(
@@ -87,7 +87,7 @@ def test_every_file_that_a_problem_names_is_watched(name: str, beside: str, tmp_
     for path in folder.glob("*.csv"):
         shutil.copy(path, tmp_path)
     shutil.copy(folder / f"{name}.toml", tmp_path)
-    made = Watched(tmp_path / f"{name}.toml")
+    made = FileWatcher(tmp_path / f"{name}.toml")
     made.start()
     try:
         first, other = made.source, tmp_path / beside

@@ -20,11 +20,11 @@ class Superseded(Exception):
 
 
 class Late(SolverError):
-    """The work took longer than it may."""
+    """The work exceeded its time."""
 
 
-class Desk:
-    """Hands the newest request to a process of its own; older ones that wait are dropped.
+class LatestWorker:
+    """Runs the newest request in a process of its own; older waiting requests are dropped.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Desk:
         self._closed = False
 
     def ask(self, seconds: float, work: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """What becomes of the work.
+        """Run the work in the process and return its result.
 
         Parameters
         ----------
@@ -80,7 +80,7 @@ class Desk:
             raise Superseded from None
 
     def _turn(self) -> tuple[int, Processes]:
-        """Wait until nothing is at work; what is there too long is ended."""
+        """Wait until the process is free; end overdue work."""
         with self._changed:
             self._newest += 1
             mine = self._newest

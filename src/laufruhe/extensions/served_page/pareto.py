@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from laufruhe.errors import ModelError
-from laufruhe.extensions.served_page.following import Followed, Follower, can_follow
+from laufruhe.extensions.served_page.follower import Follower, Optimum, can_follow
 from laufruhe.files.complaints import Refused
 from laufruhe.files.measures import QuantityTable, Scene
 from laufruhe.problem.measure import Limit, Measure, Term
@@ -22,21 +22,21 @@ _NARROW = 1e-3
 
 
 def partners(problem: Problem) -> dict[str, Measure]:
-    """Norms that the objective may be traded against, by name: those that are asked, then usual ones."""
+    """Return measures that the objective may be traded against, by name: requested ones, then usual ones."""
     if not can_follow(problem):
         return {}
-    own = {term.measure for term in problem.objective}
-    found = {limit.name: limit.measure for limit in problem.limits if limit.maximum < math.inf}
-    found |= {m.name: m for rank in problem.ranks for m in (term.measure for term in rank.terms)}
+    minimised = {term.measure for term in problem.objective}
+    measures = {limit.name: limit.measure for limit in problem.limits if limit.maximum < math.inf}
+    measures |= {m.name: m for rank in problem.ranks for m in (term.measure for term in rank.terms)}
     scene = Scene(problem.engine, problem.points)
     for name in _USUAL:
         with suppress(Refused):
-            found.setdefault(name, scene.measure(name, QuantityTable(), f"front.{name}"))
-    return {name: m for name, m in found.items() if m not in own and not m.channel.is_number}
+            measures.setdefault(name, scene.measure(name, QuantityTable(), f"front.{name}"))
+    return {name: m for name, m in measures.items() if m not in minimised and not m.channel.is_number}
 
 
-class Front:
-    """Points of a front, asked for one at a time."""
+class ParetoFront:
+    """Pareto front, computed point by point."""
 
     def __init__(self, problem: Problem, across: Measure) -> None:
         if not can_follow(problem):
@@ -51,31 +51,31 @@ class Front:
         self._least = Follower(alone.changed(objective=(Term(across),), limits=others))
 
     def ends(self) -> tuple[float, float]:
-        """Least of the other measure, and what it is where the objective is least."""
+        """Return the minimum of the other measure, and its value at the least objective."""
         least = self._least.at(self.others)
         if least.conflict:
             raise ModelError(f"no design keeps {' and '.join(least.conflict)}")
         free = self._follower.at((*self.others, self._limit))
         return least.value, max(free.standing[-1], least.value)
 
-    def at(self, most: float) -> Followed:
-        """The least objective with no more of the other than this, where the last limit stands; a conflict else."""
+    def at(self, most: float) -> Optimum:
+        """Return the least objective with the other measure at most `most`, or a conflict."""
         return self._follower.at((*self.others, replace(self._limit, maximum=most)))
 
 
 def places(low: float, high: float, count: int = POINTS) -> Iterator[float]:
-    """Where to look between two ends: they themselves, then always the middles, so that the whole is seen early."""
+    """Yield the ends and then always the midpoints, so that the front is visible early."""
     if high - low <= _NARROW * abs(high):
         yield high
         return
     # the least of the other measure is known up to a solver's tolerance
     yield high
     yield low + 1e-4 * (high - low)
-    told, parts = 2, 2
-    while told < count:
+    count_, parts = 2, 2
+    while count_ < count:
         for k in range(1, parts, 2):
             yield low + (high - low) * k / parts
-            told += 1
-            if told >= count:
+            count_ += 1
+            if count_ >= count:
                 return
         parts *= 2

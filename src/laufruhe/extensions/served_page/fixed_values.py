@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from laufruhe.errors import InputError
-from laufruhe.extensions.served_page.asked import STAR, Edit
 from laufruhe.extensions.served_page.controls import as_typed
+from laufruhe.extensions.served_page.page_state import STAR, Edit
 from laufruhe.files.complaints import Refused
 from laufruhe.present.numbers import figure
 from laufruhe.solvers.result import Result
@@ -19,11 +19,11 @@ _DIGITS = 9
 
 
 def held_by(result: Result, tables: Mapping[str, Any]) -> list[list[Any]]:
-    """Changes that hold what is not affine where a result has it; empty where there is none, or it cannot be told."""
-    found: list[list[Any]] = []
+    """Return edits that fix the numbers that are not affine; empty without any, or if one cannot be fixed."""
+    edits_: list[list[Any]] = []
     if result.phasing is not None and result.phasing.ranking:
         star = result.phasing.ranking[0]
-        found.append(["star", STAR, star_value(result, star, star.firing_orders[0] if star.firing_orders else None)])
+        edits_.append(["star", STAR, star_value(result, star, star.firing_orders[0] if star.firing_orders else None)])
     values = {entry.name: entry for entry in result.decisions}
     for decision in result.problem.decisions:
         if decision.is_affine or decision.name not in values:
@@ -33,12 +33,12 @@ def held_by(result: Result, tables: Mapping[str, Any]) -> list[list[Any]]:
             edit(tables)
         except (Refused, InputError):
             return []
-        found.append([edit.what, edit.name, edit.value])
-    return found
+        edits_.append([edit.what, edit.name, edit.value])
+    return edits_
 
 
 def star_value(result: Result, star: RankedStar, order: RankedOrder | None) -> dict[str, Any]:
-    """A star as the page may ask for it again."""
+    """Return a star as the page may request it again."""
     phasing = result.problem.phasing
     optional = [name for names in phasing.shafts.optional for name in names] if phasing is not None else []
     return {
@@ -51,7 +51,7 @@ def star_value(result: Result, star: RankedStar, order: RankedOrder | None) -> d
 
 
 def ranking_of(result: Result) -> list[dict[str, Any]]:
-    """Stars of a result and their firing orders, best first; each as it is told, and as it is asked for."""
+    """Return the stars of a result with firing orders, best first, in words and as requests."""
     if result.phasing is None:
         return []
     unit = result.problem.objective_unit or ""

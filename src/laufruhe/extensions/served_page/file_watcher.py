@@ -20,8 +20,8 @@ EVERY = 0.4
 """Seconds between two looks."""
 
 
-class Watched:
-    """A problem's file, and every file that it names, looked at while it is served.
+class FileWatcher:
+    """A problem file and every file that it names, polled while it is served.
 
     Parameters
     ----------
@@ -39,22 +39,22 @@ class Watched:
         self._closed = threading.Event()
 
     def start(self) -> None:
-        """Look at it from now on."""
+        """Start polling."""
         threading.Thread(target=self._watch, daemon=True).start()
 
     def close(self) -> None:
-        """Whoever waits is told at once."""
+        """Stop polling and wake all waiting threads."""
         self._closed.set()
         with self._changed:
             self._changed.notify_all()
 
     @property
     def is_closed(self) -> bool:
-        """Whether nothing is served any more."""
+        """True after closing."""
         return self._closed.is_set()
 
     def later(self, version: int, seconds: float) -> int:
-        """The version, as soon as it is another one."""
+        """Wait until the version changes, and return it."""
         with self._changed:
             self._changed.wait_for(lambda: self.version != version or self.is_closed, seconds)
             return self.version
@@ -85,32 +85,29 @@ class Watched:
 
 
 def _named_in(tables: Mapping[str, Any], folder: Path) -> Iterator[Path]:
-    """Yield a path for every text of a problem: any may name a file, now or as soon as there is one."""
     yield from (folder / text for text in sorted({text for _, text in texts_in(tables)}))
 
 
 def _stamp_of(path: Path) -> tuple[int, int]:
     # a text of a problem may be no name that a file can have
     with suppress(OSError, ValueError):
-        found = path.stat()
-        if stat.S_ISREG(found.st_mode):
-            return found.st_mtime_ns, found.st_size
+        status = path.stat()
+        if stat.S_ISREG(status.st_mode):
+            return status.st_mtime_ns, status.st_size
     return 0, 0
 
 
 def _hash_of(paths: tuple[Path, ...]) -> str:
-    """Return a hash of what the files hold."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for path in paths:
         with suppress(OSError, ValueError):
             if path.is_file():
                 with path.open("rb") as stream:
-                    found.update(hashlib.file_digest(stream, "sha256").digest())
-    return found.hexdigest()
+                    digest.update(hashlib.file_digest(stream, "sha256").digest())
+    return digest.hexdigest()
 
 
 def _check_inside(tables: Mapping[str, Any], path: Path) -> None:
-    """Refuse files that a problem names beyond its folder: a page reads nothing there."""
     folder = path.parent.resolve()
     for where, name in texts_in(tables):
         is_file = where[-1] == "file" or name.lower().endswith(".csv")

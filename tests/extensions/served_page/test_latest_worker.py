@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from laufruhe.extensions.served_page.desk import Desk, Late, Superseded
+from laufruhe.extensions.served_page.latest_worker import Late, LatestWorker, Superseded
 
 # nobody waits as long for what has to happen
 LONG = 600.0
@@ -19,14 +19,14 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(not hasattr(os, "mkfifo"), re
 
 
 @pytest.fixture
-def desk() -> Iterator[Desk]:
-    made = Desk(patience=0.5)
+def desk() -> Iterator[LatestWorker]:
+    made = LatestWorker(patience=0.5)
     yield made
     made.close()
 
 
 @contextmanager
-def at_work(desk: Desk, askers: ThreadPoolExecutor, folder: Path) -> Iterator[Future[bytes]]:
+def at_work(desk: LatestWorker, askers: ThreadPoolExecutor, folder: Path) -> Iterator[Future[bytes]]:
     """A request that the desk's process is at: it ends within, when the process is ended, or after that."""
     pipe = folder / "pipe"
     os.mkfifo(pipe)
@@ -37,7 +37,7 @@ def at_work(desk: Desk, askers: ThreadPoolExecutor, folder: Path) -> Iterator[Fu
 
 
 def test_the_newest_wins(tmp_path: Path) -> None:
-    with closing(Desk(patience=LONG)) as desk, ThreadPoolExecutor(3) as askers:
+    with closing(LatestWorker(patience=LONG)) as desk, ThreadPoolExecutor(3) as askers:
         with at_work(desk, askers, tmp_path) as first:
             second = askers.submit(desk.ask, LONG, abs, -2)
             while desk._newest < 2:
@@ -49,26 +49,26 @@ def test_the_newest_wins(tmp_path: Path) -> None:
         assert third.result(LONG) == 3
 
 
-def test_what_is_at_work_too_long_makes_way(desk: Desk, tmp_path: Path) -> None:
+def test_what_is_at_work_too_long_makes_way(desk: LatestWorker, tmp_path: Path) -> None:
     with ThreadPoolExecutor(2) as askers, at_work(desk, askers, tmp_path) as first:
         assert askers.submit(desk.ask, LONG, abs, -4).result(LONG) == 4
         assert isinstance(first.exception(LONG), Superseded)
 
 
-def test_time_is_limited_and_the_next_request_is_answered(desk: Desk) -> None:
+def test_time_is_limited_and_the_next_request_is_answered(desk: LatestWorker) -> None:
     with pytest.raises(Late, match="1 s"):
         desk.ask(1.0, time.sleep, LONG)
     assert desk.ask(LONG, abs, -5) == 5
 
 
-def test_a_process_that_dies_is_replaced(desk: Desk) -> None:
+def test_a_process_that_dies_is_replaced(desk: LatestWorker) -> None:
     with pytest.raises(BrokenExecutor):
         desk.ask(LONG, os._exit, 3)
     assert desk.ask(LONG, abs, -6) == 6
 
 
 def test_a_closed_desk_lets_go_of_who_waits(tmp_path: Path) -> None:
-    desk = Desk(patience=LONG)
+    desk = LatestWorker(patience=LONG)
     with ThreadPoolExecutor(2) as askers, at_work(desk, askers, tmp_path) as at:
         waiting = askers.submit(desk.ask, LONG, abs, -7)
         desk.close()
