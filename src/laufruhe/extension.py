@@ -87,6 +87,11 @@ class Extension:
     pictures: tuple[str, ...] = ()
 
 
+_OF_SIZES = (
+    "crank-pin bending stress", "web stress", "journal torsion stress", "journal stress", "rod stress", "bolt stress",
+    "main-bearing pressure times speed", "share of the buckling load", "piston-pin pressure", "piston-pin deflection",
+    "piston-pin bending stress", "piston-pin ovality", "throw clearance", "running-gear mass",
+)  # fmt: skip
 HOMES: Mapping[Tables, Mapping[str, str]] = {
     "study_kinds": {"economics": "economics", "replication": "replication", "tolerance": "robust"},
     "commands": {"page": "served_page"},
@@ -96,10 +101,12 @@ HOMES: Mapping[Tables, Mapping[str, str]] = {
         "robust": "robust",
         "assembly": "robust",
         "run_up": "run_ups",
+        "running_gear": "sizes",
     },
     "notes": {"±": "robust", "+-": "robust", "+/-": "robust", "tolerance": "robust"},
     "layouts": {"rotary": "rotary"},
     "drives": {"swinging-yoke": "swinging_yoke"},
+    "channels": dict.fromkeys(_OF_SIZES, "sizes"),
 }
 """Extensions of this package by what they add to tables: whoever asks for it without the folder is told its name."""
 INSTALL = "install laufruhe with all its folders"

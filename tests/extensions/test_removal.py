@@ -60,7 +60,15 @@ def test_the_core_runs_without_an_extension(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("table", "name"), [(table, name) for table, homes in HOMES.items() for name in homes])
+@pytest.mark.parametrize(
+    ("table", "name"),
+    # one channel of each extension stands for all
+    [
+        (t, n)
+        for t, homes in HOMES.items()
+        for n in (homes if t != "channels" else {h: n for n, h in homes.items()}.values())
+    ],
+)
 def test_a_file_or_command_that_needs_it_is_refused_by_its_name(table: Tables, name: str, tmp_path: Path) -> None:
     home = HOMES[table][name]
     environment = without(home, tmp_path / "site")
@@ -74,12 +82,15 @@ def test_a_file_or_command_that_needs_it_is_refused_by_its_name(table: Tables, n
     layout, drive = (f"{said}\nkey_of_its_own = 1" for said in (f'"{name}"', f'"inline"\ndrive = "{name}"'))
     (tmp_path / "layout.toml").write_text(text.replace('"inline"', layout), encoding="utf-8")
     (tmp_path / "drive.toml").write_text(text.replace('"inline"', drive), encoding="utf-8")
+    asked = re.sub(r"minimise = .*", f'minimise = "{name}"', text)
+    (tmp_path / "channel.toml").write_text(asked, encoding="utf-8")
     words = {
         "layouts": ("solve", tmp_path / "layout.toml"),
         "drives": ("solve", tmp_path / "drive.toml"),
         "study_kinds": ("study", tmp_path / "study.toml"),
         "commands": (name, problem),
         "keys": ("solve", tmp_path / "problem.toml"),
+        "channels": ("solve", tmp_path / "channel.toml"),
         "notes": ("solve", tmp_path / "note.toml"),
     }
     refused = run(environment, "-m", "laufruhe", *words[table])

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from laufruhe.extensions.sizes.machine import Bolts, PistonPin, RunningGear, Shank, Webs
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.machine import Bearing, OperatingPoint
-from laufruhe.machine.running_gear import Bolts, PistonPin, RunningGear, Shank, Webs
 from laufruhe.numerics.norms import NORMS, Grid, lengths
 from laufruhe.problem import channels
 from laufruhe.problem.channels import LoadChannel, MassChannel
@@ -178,7 +178,7 @@ def inside() -> tuple[Problem, AffineModel, AffineProblem]:
     gear = RunningGear(
         webs=Webs(0.08, 0.02), rod=Shank(0.022), piston_pin=PistonPin(0.028, 0.016, 0.07), bolts=Bolts(2, 0.008)
     )
-    engine = replace(whole.engine, slider_cranks=parts, bearings=bearings, gear=gear)
+    engine = replace(whole.engine, slider_cranks=parts, bearings=bearings, extras=(gear,))
     own = replace(whole, engine=engine, objective=tuple(Term(measure) for measure in INSIDE))
     model = AffineModel(own)
     return own, model, model.at(96)

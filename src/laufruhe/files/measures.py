@@ -11,6 +11,7 @@ from pydantic import Field, ValidationError
 
 from laufruhe import units
 from laufruhe.errors import ModelError
+from laufruhe.extension import HOMES, lack
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, blamed_on, measured, nearest, one_of
 from laufruhe.files.fields import Name, Open, Table
@@ -122,7 +123,8 @@ class Scene:
     def measure(self, name: str, table: QuantityTable, where: str) -> Measure:
         """Return the measure of a name and its keys for this engine."""
         if name not in MEASURES:
-            raise Refused(where, name, "is no quantity", nearest(name, list(MEASURES)))
+            home = next((home for channel, home in HOMES["channels"].items() if name.endswith(channel)), None)
+            raise Refused(where, name, *(lack(home) if home else ("is no quantity", nearest(name, list(MEASURES)))))
         channel, norm = MEASURES[name]
         key, of, weights = where.rsplit(".", 1)[0], getattr(table, "of", None), table.direction_weights
         if not channel.needs.of(self.engine):

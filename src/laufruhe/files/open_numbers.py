@@ -13,7 +13,7 @@ from typing import Any
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, key_path, number_read
 from laufruhe.files.nested import Place, annotations_at, at, inside, number_at, put, tables_on
-from laufruhe.files.problem_file import Note, ProblemFile, file_model
+from laufruhe.files.problem_file import EXTENSION_KEYS, Note, ProblemFile, file_model
 from laufruhe.files.rotors import FACTORS
 from laufruhe.machine.layouts import LAYOUTS
 from laufruhe.problem.decision import AddressDrive, Decision
@@ -79,6 +79,8 @@ def _is_fixed_there(tables: Mapping[str, Any], place: Place) -> bool:
         if isinstance(throws, list):
             is_given = not any(isinstance(throw, dict) for throw in throws)
         return not knows or (place[1] in _TOGETHER and is_given)
+    if "running_gear" not in EXTENSION_KEYS and (place[0] == "main_bearings" or place[1] in ("big_end", "rod_length")):
+        return True
     if place[0] == "engine" and place[-1] == "rod_length":
         offset = engine.get("offset", 0)
         is_zero = offset == 0 or (isinstance(offset, str) and offset.strip().startswith(("0 ", "0m")))

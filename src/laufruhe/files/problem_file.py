@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, TypeAlias
 
 from pydantic import Field, create_model
 
@@ -25,11 +25,13 @@ from laufruhe.files.operating_points import FrictionTable, OperatingPointTable
 from laufruhe.files.phasing import PhasingTable
 from laufruhe.files.quantities import QuantitiesTable
 from laufruhe.files.rotors import BalancerShaftTable, CounterweightTable
-from laufruhe.files.running_gear import RunningGearTable
+from laufruhe.machine import Bearing, SliderCrank
 from laufruhe.machine.layouts import Throw
 from laufruhe.problem.problem import Problem
 
 SCHEMA = "laufruhe.schema.json"
+Cylinders: TypeAlias = tuple[SliderCrank, ...]
+Throws: TypeAlias = tuple[Throw, ...]
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,8 @@ class Given:
     ----------
     file
         Tables of the file.
+    engine
+        Table [engine] with throws, bank and split-pin angle fixed.
     throws
         Throws of the crank.
     folder
@@ -47,6 +51,7 @@ class Given:
     """
 
     file: ProblemFile
+    engine: EngineTable
     throws: Sequence[Throw]
     folder: Path
 
@@ -68,6 +73,10 @@ class Key:
         Function that returns the labels of parts of the table in results, and their places in the file.
     single
         True if it requires a single objective.
+    adds
+        Function that returns slider-cranks and throws with what the table adds to them, before rotors are placed.
+    always
+        True if it is read without its table too, before other keys, because it finds open numbers in other tables.
     """
 
     name: str
@@ -75,6 +84,8 @@ class Key:
     read: Callable[[Any, Problem, Given], Problem]
     numbers: Callable[[Any], Iterable[tuple[str, Place]]] = lambda _: ()
     single: bool = False
+    adds: Callable[[Any, Cylinders, Throws, tuple[Bearing, ...]], tuple[Cylinders, Throws]] = lambda _, c, t, __: (c, t)
+    always: bool = False
 
 
 @dataclass(frozen=True)
@@ -128,7 +139,6 @@ class ProblemFile(Table):
     block: BlockTable | None = None
     load_cases: list[LoadCaseTable] = Field(default_factory=list)
     main_bearings: list[MainBearingTable] = Field(default_factory=list)
-    running_gear: RunningGearTable | None = None
     flywheel: FlywheelTable | None = None
     geared_inertias: list[GearedInertiaTable] = Field(default_factory=list)
     counterweights: list[CounterweightTable] = Field(default_factory=list)

@@ -32,8 +32,7 @@ from laufruhe.files.operating_points import Brake, operating_points
 from laufruhe.files.phasing import is_open, opened
 from laufruhe.files.problem_file import EXTENSION_KEYS, Given, Note, ProblemFile, file_model
 from laufruhe.files.quantities import followed
-from laufruhe.files.rotors import RotorList, balancer_shafts, check_factors, counterweights
-from laufruhe.files.running_gear import size_decisions, weighed
+from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.toml_text import line_deeper_than, toml_complaint
 from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.machine.layouts import throw_rotors
@@ -278,9 +277,11 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     """Return the problem of a file with this [engine]."""
     loaded = [point.model_copy(update={"gas": point.gas and not without_gas}) for point in file.operating_points]
     cylinders, throws = moving_parts(table, gas=needs_bore(file.gas) and any(point.gas for point in loaded))
-    bearing_tables = one_by_one(file.main_bearings, throws)
-    bearings = bearings_of(bearing_tables, cylinders)
-    gear, cylinders, throws = weighed(file.running_gear, cylinders, throws, bearings)
+    bearings = bearings_of(one_by_one(file.main_bearings, throws), cylinders)
+    keys = sorted(EXTENSION_KEYS.values(), key=lambda key: not key.always)
+    for key in keys:
+        if (own := getattr(file, key.name)) is not None:
+            cylinders, throws = key.adds(own, cylinders, throws, bearings)
     collected = RotorList(rotors=list(throw_rotors(throws)))
     counterweights(file.counterweights, cylinders, throws, collected)
     balancer_shafts(file.balancer_shafts, collected)
@@ -290,19 +291,16 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
     points = operating_points(loaded, gas_of(file.gas, path.parent, cycle, cylinders), cycle, table.stroke, brake)
     geared, of_geared = geared_of(file.geared_inertias)
     engine = Engine(
-        file.title, cycle, cylinders, rotors, on_mounts.mounts, on_mounts.block, bearings, wheel, gear, geared,
+        file.title, cycle, cylinders, rotors, on_mounts.mounts, on_mounts.block, bearings, wheel, geared,
         load_cases_of(file.load_cases, on_mounts.block),
     )  # fmt: skip
-    of_sizes = size_decisions(file.running_gear, table, bearing_tables, bearings)
-    if of_sizes and gear is not None and gear.density is not None:
-        check_factors(file.counterweights, "counts masses that follow from sizes, which are open")
     loads = (*piston_masses(table, cylinders, file.counterweights), *leads_of(table), *collected.decisions, *of_geared)
     problem = Problem(
         name=printed(path.stem),
         title=file.title,
         engine=engine,
         points=points,
-        decisions=(*loads, *on_mounts.decisions, *of_wheel, *of_sizes),
+        decisions=(*loads, *on_mounts.decisions, *of_wheel),
         source=file.source,
         assumptions=(*file.assumptions, *(brake.said if brake else ())),
         tolerance=file.tolerance,
@@ -310,10 +308,10 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         search=Search(**file.search.model_dump()),
         fires_together=table.fires_together,
     )
-    given = Given(file, throws, path.parent)
-    for name, key in EXTENSION_KEYS.items():
-        if (own := getattr(file, name)) is not None:
-            problem = key.read(own, problem, given)
+    given = Given(file, table, throws, path.parent)
+    for key in keys:
+        if key.always or getattr(file, key.name) is not None:
+            problem = key.read(getattr(file, key.name), problem, given)
     scene = Scene(problem.engine, points)
     ranks = objectives_of(file.objective, scene, file.single)
     problem = replace(

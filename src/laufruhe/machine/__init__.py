@@ -10,7 +10,6 @@ from laufruhe.machine.gas import Charge, PressureTrace, Seiliger, Wiebe
 from laufruhe.machine.geared import GearedInertia
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
-from laufruhe.machine.running_gear import Bolts, PistonPin, RunningGear, Shank, Webs
 from laufruhe.machine.slider_crank import SliderCrank
 
 __all__ = [
@@ -18,7 +17,6 @@ __all__ = [
     "Arms",
     "Bearing",
     "Block",
-    "Bolts",
     "Chamber",
     "Chambers",
     "Charge",
@@ -29,19 +27,15 @@ __all__ = [
     "GearedInertia",
     "Mount",
     "OperatingPoint",
-    "PistonPin",
     "PressureTrace",
     "Pump",
     "Rim",
     "Rod",
     "Role",
     "Rotor",
-    "RunningGear",
     "Seiliger",
     "Shaft",
-    "Shank",
     "SliderCrank",
     "Steam",
-    "Webs",
     "Wiebe",
 ]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from fractions import Fraction
@@ -21,7 +20,6 @@ from laufruhe.machine.geared import GearedInertia
 from laufruhe.machine.load_case import LoadCase
 from laufruhe.machine.mount import Mount
 from laufruhe.machine.rotor import Rotor, Shaft
-from laufruhe.machine.running_gear import Moving, RunningGear, Size
 from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.numerics.spectrum import as_order
 from laufruhe.numerics.turns import as_turn, cis, direction, within
@@ -88,8 +86,6 @@ class Engine:
         Main bearings of its shafts; empty where nothing is asked of them.
     flywheel
         What turns with the crank; None where nothing is asked of it.
-    gear
-        Sizes of its running gear; None where nothing is asked of them.
     geared
         Shares of the inertia of all that turns on shafts of other speeds.
     load_cases
@@ -106,7 +102,6 @@ class Engine:
     block: Block | None = None
     bearings: tuple[Bearing, ...] = ()
     flywheel: Flywheel | None = None
-    gear: RunningGear | None = None
     geared: tuple[GearedInertia, ...] = ()
     load_cases: tuple[LoadCase, ...] = ()
     extras: tuple[Extra, ...] = ()
@@ -150,18 +145,6 @@ class Engine:
     def with_extra(self, extra: Extra) -> Engine:
         """Return the engine with a part of an extension in place of that of its class."""
         return replace(self, extras=(*(one for one in self.extras if type(one) is not type(extra)), extra))
-
-    @cached_property
-    def moving(self) -> Moving:
-        """Parts that sizes change."""
-        return Moving(self.gear, self.slider_cranks, self.rotors, self.bearings)
-
-    def resized(self, sizes: Mapping[Size, float]) -> Engine:
-        """Return the engine with other sizes, and the masses that follow from them."""
-        found = self.moving.resized(sizes)
-        return replace(
-            self, gear=found.gear, slider_cranks=found.parts, rotors=found.rotors, bearings=found.bearings
-        )  # fmt: skip
 
     @property
     def shafts(self) -> tuple[Shaft, ...]:

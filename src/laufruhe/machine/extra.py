@@ -20,9 +20,14 @@ class Extra(ABC):
 
     name: ClassVar[str]
 
-    @abstractmethod
-    def moved(self, changes: Mapping[Any, float], before: Sequence[SliderCrank], after: Sequence[SliderCrank]) -> Self:
+    def moved(self, _: Mapping[Any, float], __: Sequence[SliderCrank], ___: Sequence[SliderCrank]) -> Self:
         """Return the part with changes of its numbers, and with other slider-cranks in place of those before."""
+        return self
+
+    def move(self, engine: Any, changes: Mapping[Any, float], before: Sequence[SliderCrank]) -> Any:
+        """Return an engine in which its numbers have changed; before are the slider-cranks of the engine as given."""
+        moved = self.moved(changes, before, engine.slider_cranks)
+        return engine if moved is self else engine.with_extra(moved)
 
     @abstractmethod
     def scaled(self, length: float, mass: float) -> Self:

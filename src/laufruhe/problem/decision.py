@@ -154,11 +154,9 @@ class Numbers:
         engine = replace(
             given, slider_cranks=tuple(parts), rotors=tuple(rotors), mounts=mounts, flywheel=flywheel, geared=geared
         )
-        if any(kind is Kind.SIZE for kind, _ in self.changes):
-            engine = engine.resized(self._of_kind(Kind.SIZE, given.moving.sizes))
         for extra in given.extras:
             changes = {key: change for (kind, key), change in self.changes.items() if kind.name == extra.name}
-            engine = engine.with_extra(extra.moved(changes, given.slider_cranks, engine.slider_cranks))
+            engine = extra.move(engine, changes, given.slider_cranks)
         leads = {shaft: change for (kind, shaft), change in self.changes.items() if kind is Kind.LEAD}
         return led(engine, leads) if leads else engine
 

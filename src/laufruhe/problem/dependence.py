@@ -71,24 +71,12 @@ resultant mount force               a a a  b m >  >  s s  0
 mount travel                        a a a  b m >  >  s s  0
 main-bearing force                  a a a  v m >  >  0 0  0
 main-bearing pressure               a a a  v m >  >  0 0  0
-main-bearing pressure times speed   a a a  v m >  >  0 0  0
 hammer blow                         a a a  v m >  >  0 0  0
 friction power                      a a a  v m >  >  0 0  0
-web stress                          a a a  s m s  >  0 0  0
-journal torsion stress              a a a  s m >  >  0 0  0
-journal stress                      a a a  s m s  >  0 0  0
 crank-pin force                     0 0 a  0 m s  >  0 0  0
 crank-pin pressure                  0 0 a  0 m s  >  0 0  0
-crank-pin bending stress            a 0 a  0 m s  >  0 0  0
 side force                          0 0 a  0 m s  >  0 0  0
 rod force                           0 0 a  0 m s  >  0 0  0
-rod stress                          0 0 a  0 m s  >  0 0  0
-share of the buckling load          0 0 a  0 m s  >  0 0  0
-bolt stress                         0 0 a  0 m s  >  0 0  0
-piston-pin pressure                 0 0 a  0 m s  >  0 0  0
-piston-pin bending stress           0 0 a  0 m s  >  0 0  0
-piston-pin deflection               0 0 a  0 m s  >  0 0  0
-piston-pin ovality                  0 0 a  0 m s  >  0 0  0
 crank torque                        0 0 a  0 m >  >  0 0  0
 stored work                         0 0 a  0 m >  >  0 0  0
 counterweight mass                  a 0 a  0 0 0  a  0 0  0
@@ -112,8 +100,6 @@ flywheel inertia                    0 0 0  0 0 0  0  0 0  +
 flywheel mass                       0 0 0  0 0 0  0  0 0  +
 rim stress                          0 0 0  0 0 0  0  0 0  +
 arm stress                          0 0 0  0 s s  0  0 0  +
-throw clearance                     0 0 0  0 - 0  0  0 0  0
-running-gear mass                   0 0 0  0 + 0  0  0 0  0
 """
 
 

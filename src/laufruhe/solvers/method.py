@@ -9,7 +9,7 @@ from typing import Any
 
 from laufruhe.numerics.norms import Norm
 from laufruhe.numerics.processes import call_by_name
-from laufruhe.problem.channels import AT_EACH_MOUNT, CHANNELS, OF_MOUNTING, OF_SIZES, Channel
+from laufruhe.problem.channels import AT_EACH_MOUNT, CHANNELS, OF_MOUNTING, Channel
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence, kinds_of
 from laufruhe.problem.measure import Measure
@@ -22,7 +22,7 @@ from laufruhe.solvers.result import Result
 BUILT = (Dependence.SHIFT, Dependence.AFFINE, Dependence.SWING)
 OF_MOUNTS = AT_EACH_MOUNT | {*OF_MOUNTING, *(channel for channel in CHANNELS.values() if channel.simulation)}
 """Channels that programs of mounts have formulas for, or peaks of a simulation."""
-OF_SIZES_ALONE = frozenset(channel for channel in OF_SIZES if channel.of_engine is not None)
+OF_SIZES_ALONE = frozenset(channel for channel in CHANNELS.values() if channel.of_engine is not None)
 """Channels that are functions of the sizes of an engine alone."""
 
 

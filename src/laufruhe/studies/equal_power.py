@@ -60,7 +60,6 @@ def _engine(engine: Engine, scale: EqualPowerScale) -> Engine:
         ),
         bearings=tuple(bearing.scaled(k) for bearing in engine.bearings),
         extras=tuple(extra.scaled(k, m) for extra in engine.extras),
-        gear=None if engine.gear is None else engine.gear.scaled(k, m / k**3),
         mounts=tuple(
             mount.each(lambda m: replace(m, position=(m.position[0] * k, m.position[1] * k, m.position[2] * k)))
             for mount in engine.mounts

@@ -17,6 +17,7 @@ import ready
 from claims.test_broken_bounders import scaled, times
 from laufruhe.errors import BoundError, InputError, ModelError
 from laufruhe.extensions.sizes.boxes import SizeBoxes
+from laufruhe.extensions.sizes.machine import RunningGear
 from laufruhe.extensions.sizes.model import SizeModel
 from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.evaluation import evaluate
@@ -250,7 +251,7 @@ def test_where_masses_weigh_nothing_it_is_a_geometric_program() -> None:
     engine, point = result.final.engine, result.problem.points[0]
     forces = {limit.name: limit.value for limit in result.limits}
     # loads back from the stresses at the design: what is compared is the optimum over the sizes
-    pin, journal, web = engine.slider_cranks[0].big_end, engine.bearings[1], engine.gear.webs
+    pin, journal, web = engine.slider_cranks[0].big_end, engine.bearings[1], engine.extra(RunningGear).webs
     load = forces["maximum crank-pin bending stress"] * math.pi / 32.0 * pin[0] ** 3 / 0.05
     torque = forces["maximum journal torsion stress"] * math.pi / 16.0 * journal.diameter**3
     assert torque == pytest.approx(np.abs(crank_torque(engine, point).sample(100_000)).max(), rel=1e-4)

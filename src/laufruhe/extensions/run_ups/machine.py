@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import ClassVar, Self
 
-from laufruhe.machine import SliderCrank
 from laufruhe.machine.extra import Extra
 
 
@@ -29,10 +27,6 @@ class Run(Extra):
     up: float
     down: float
     point: str = ""
-
-    def moved(self, _: Mapping[Any, float], __: Sequence[SliderCrank], ___: Sequence[SliderCrank]) -> Self:
-        """Return the same: no decision moves it."""
-        return self
 
     def scaled(self, _: float, __: float) -> Self:
         """Return the same: speeds and times have no size."""

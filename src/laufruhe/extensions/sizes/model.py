@@ -16,10 +16,10 @@ from functools import cached_property
 
 import numpy as np
 
+from laufruhe.extensions.sizes.machine import ROD_LENGTH, RunningGear, Size, moving_of, resized
 from laufruhe.extensions.sizes.pieces import Piece, plain
 from laufruhe.load_models.affine import AffineNorm
 from laufruhe.machine import Engine
-from laufruhe.machine.running_gear import ROD_LENGTH, Size
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem.decision import Decision, Kind, domains_of, ends_of, vector_of
@@ -61,7 +61,7 @@ class SizeModel:
         self.names = [size for d in self.sizes for size in d.keys(Kind.SIZE)]
         self.lower = np.array([d.lower for d in self.sizes])
         self.upper = np.array([d.upper for d in self.sizes])
-        given = problem.engine.moving
+        given = self._moving = moving_of(problem.engine)
         self._given = given.sizes
         self._engines, self._masses = dict[bytes, Engine](), dict[bytes, Array]()
         # of its sizes alone: one slider-crank, no rotors
@@ -98,7 +98,7 @@ class SizeModel:
         if key not in self._engines:
             if len(self._engines) > MOST_KEPT:
                 self._engines.clear()
-            self._engines[key] = self.problem.engine.resized(self._sizes(x))
+            self._engines[key] = resized(self.problem.engine, self._sizes(x))
         return self._engines[key]
 
     def _sizes(self, x: Array) -> dict[Size, float]:
@@ -106,7 +106,7 @@ class SizeModel:
 
     def masses(self, x: Array) -> Array:
         """That the running gear adds, shape (4,)."""
-        gear, key = self.problem.engine.gear, x.tobytes()
+        gear, key = self._moving.gear, x.tobytes()
         if gear is None or gear.density is None:
             return np.zeros(MASSES)
         if key not in self._masses:
@@ -118,9 +118,8 @@ class SizeModel:
 
     def with_masses(self, masses: Array) -> Engine:
         """The engine as given, with these in place of what its running gear adds."""
-        given = self.problem.engine
-        bare = given.moving.bare
-        return _heavier(replace(given, slider_cranks=bare.parts, rotors=bare.rotors), masses)
+        bare = self._moving.bare
+        return _heavier(replace(self.problem.engine, slider_cranks=bare.parts, rotors=bare.rotors), masses)
 
     def factors(self, piece: Piece, measure: Measure, engine: Engine) -> list[Array]:
         """Of the sizes of an engine, for the rows of a piece."""
@@ -220,9 +219,9 @@ class SizeModel:
         if length not in self._evaluations:
             problem, unbalances = self.problem, self.problem.unbalances
             given = problem.design([0.0] * len(unbalances), unbalances)
-            sizes = given.moving.sizes
-            given = given if length == sizes[ROD_LENGTH] else given.resized({**sizes, ROD_LENGTH: length})
-            bare = given.moving.bare
+            sizes = moving_of(given).sizes
+            given = given if length == sizes[ROD_LENGTH] else resized(given, {**sizes, ROD_LENGTH: length})
+            bare = moving_of(given).bare
             weightless = replace(given, slider_cranks=bare.parts, rotors=bare.rotors)
             engines = [weightless, *(_heavier(weightless, unit) for unit in np.eye(MASSES))]
             engines += [_moved(weightless, d, direction) for d in unbalances for direction in d.set.directions]
@@ -285,7 +284,8 @@ def _heavier(engine: Engine, masses: Array) -> Engine:
         )
         for part in engine.slider_cranks
     )  # fmt: skip
-    ways = dict(engine.gear.throws) if engine.gear else {}
+    gear = engine.extra(RunningGear)
+    ways = dict(gear.throws) if gear else {}
     rotors = (replace(r, unbalance=r.unbalance + masses[3] * ways.get(r.name, 0.0)) for r in engine.rotors)
     return replace(engine, slider_cranks=parts, rotors=tuple(rotors))
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from laufruhe.extensions.sizes.machine import RunningGear
 from laufruhe.extensions.sizes.model import SizeModel
 from laufruhe.extensions.sizes.solver import check_acts, solve_sizes
 from laufruhe.numerics.arrays import Array
@@ -103,7 +104,8 @@ def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> 
     at = dict(zip((d.name for d in problem.decisions), values, strict=True))
     masses = model.masses(np.array([at[d.name].real for d in model.sizes])) - middle
     engine = model.with_masses(middle)
-    ways = engine.gear.throws if engine.gear is not None else ()
+    gear = engine.extra(RunningGear)
+    ways = gear.throws if gear is not None else ()
     drives: list[tuple[Drive, ...]] = [
         *(tuple(NumberDrive(Kind.PISTON, (part.name, mass)) for part in engine.slider_cranks) for mass in MASSES),
         tuple(RotorDrive(name, way) for name, way in ways),

@@ -27,6 +27,14 @@ from laufruhe.physics.bearing_loads import (
 from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.problem.channels.flywheel import FLYWHEEL_INERTIA, IRREGULARITY, OF_FLYWHEEL
+from laufruhe.problem.channels.inside import (
+    AT_EACH_BEARING,
+    AT_EACH_CRANK_PIN,
+    IN_EACH_CYLINDER,
+    OF_EACH_BEARING,
+    Where,
+    inside,
+)
 from laufruhe.problem.channels.kinds import (
     AT_MOUNTS,
     OF_MOUNTS,
@@ -57,15 +65,6 @@ from laufruhe.problem.channels.mounting import (
     motion_indices,
     mounting_in,
 )
-from laufruhe.problem.channels.sizes import (
-    AT_EACH_BEARING,
-    AT_EACH_CRANK_PIN,
-    IN_EACH_CYLINDER,
-    OF_EACH_BEARING,
-    OF_SIZES,
-    Where,
-    inside,
-)
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
 __all__ = [
@@ -82,7 +81,6 @@ __all__ = [
     "OF_MOUNTING",
     "OF_MOUNTS",
     "OF_SHAFT_PLACES",
-    "OF_SIZES",
     "ON_BLOCK",
     "RAW_TORQUE_ROLL",
     "SAG",
@@ -198,5 +196,5 @@ CHANNELS: Mapping[str, Channel] = extended("channels", Channel, (
     MOUNT_FORCE, RESULTANT_MOUNT_FORCE, MOUNT_TRAVEL, *OF_BLOCK,
     HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,
     SIDE_FORCE, FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS,
-    ADDED_MASS, *OF_MOUNTING, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS, *OF_SIZES,
+    ADDED_MASS, *OF_MOUNTING, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS,
 ))  # fmt: skip

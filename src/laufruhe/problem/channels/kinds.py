@@ -15,10 +15,11 @@ from laufruhe.machine.clearances import Span
 from laufruhe.numerics.norms import MEAN, NORMS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.mount_numbers import AxisResidual, Band
-from laufruhe.physics.strength import Factor
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
+Factor: TypeAlias = Callable[[Engine, OperatingPoint], NDArray[np.float64]]
+"""One over the sizes that bear a load, shape (places,) or (places, d)."""
 OfWheel: TypeAlias = Callable[[Flywheel], float]
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 ON_BLOCK = ("operating_points", "orders", "alternating")

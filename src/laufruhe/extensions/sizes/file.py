@@ -10,16 +10,31 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from laufruhe import units
+from laufruhe.extensions.sizes.machine import (
+    BIG_END,
+    ROD_LENGTH,
+    STEEL,
+    Bolts,
+    Moving,
+    PistonPin,
+    RunningGear,
+    Shank,
+    Size,
+    Webs,
+    on,
+)
 from laufruhe.files import fields as f
-from laufruhe.files.bearings import MainBearingTable
+from laufruhe.files.bearings import MainBearingTable, one_by_one
 from laufruhe.files.complaints import Refused, blamed_on
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fields import Open, Table
-from laufruhe.machine import CRANKSHAFT, Bearing, Bolts, PistonPin, RunningGear, Shank, SliderCrank, Webs
+from laufruhe.files.problem_file import Given, Key
+from laufruhe.files.rotors import check_factors
+from laufruhe.machine import CRANKSHAFT, Bearing, SliderCrank
 from laufruhe.machine.layouts import Throw
-from laufruhe.machine.running_gear import BIG_END, ROD_LENGTH, STEEL, Moving, Size, on
 from laufruhe.numerics.turns import as_turn, cis
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
+from laufruhe.problem.problem import Problem
 
 
 class WebsTable(Table):
@@ -70,20 +85,17 @@ class RunningGearTable(Table):
     bolts: BoltsTable | None = None
 
 
-def weighed(
-    table: RunningGearTable | None, parts: tuple[SliderCrank, ...], throws: tuple[Throw, ...],
-    bearings: tuple[Bearing, ...],
-) -> tuple[RunningGear | None, tuple[SliderCrank, ...], tuple[Throw, ...]]:  # fmt: skip
-    """Return sizes with open ones at their start, and slider-cranks and throws with their masses (Z2)."""
-    if table is None:
-        return None, parts, throws
+def _weighed(
+    table: RunningGearTable, parts: tuple[SliderCrank, ...], throws: tuple[Throw, ...], bearings: tuple[Bearing, ...]
+) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
+    """Return slider-cranks and throws with the masses of sizes, open ones at their start (Z2)."""
     others = tuple(throw for throw in throws if throw.shaft != CRANKSHAFT)
     throws = tuple(throw for throw in throws if throw.shaft == CRANKSHAFT)
     gear = _gear_of(table, parts, throws)
     bare = Moving(gear, parts, (), bearings)
     ways, size = dict(gear.throws).values(), bare.throw_unbalance
     heavy = tuple(replace(t, unbalance=t.unbalance + size * way) for t, way in zip(throws, ways, strict=True))
-    return gear, bare.weighed().parts, (*heavy, *others)
+    return bare.weighed().parts, (*heavy, *others)
 
 
 def _gear_of(table: RunningGearTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> RunningGear:
@@ -133,10 +145,21 @@ def _opened(
             yield f"running_gear.{name}.{key}", (name, key), getattr(part, key)
 
 
-def size_decisions(
+def _read(table: RunningGearTable | None, problem: Problem, given: Given) -> Problem:
+    """Return the problem with the running gear, and with decisions about sizes that are open."""
+    engine, throws = problem.engine, [throw for throw in given.throws if throw.shaft == CRANKSHAFT]
+    found = _decisions(table, given.engine, one_by_one(given.file.main_bearings, given.throws), engine.bearings)
+    if found and table is not None and table.density is not None:
+        check_factors(given.file.counterweights, "counts masses that follow from sizes, which are open")
+    gear = RunningGear() if table is None else _gear_of(table, engine.slider_cranks, throws)
+    if found or table is not None:
+        engine = engine.with_extra(gear)
+    return replace(problem, engine=engine, decisions=(*problem.decisions, *found))
+
+
+def _decisions(
     table: RunningGearTable | None, engine: EngineTable, bearings: Sequence[MainBearingTable], built: Sequence[Bearing]
 ) -> list[Decision]:
-    """Return the decisions about open sizes."""
     decisions = list[Decision]()
     for name, size, value in _opened(table, engine, bearings, built):
         decisions += Open.from_value(value).decisions(name, "m", NumberDrive(Kind.SIZE, size))
@@ -150,3 +173,6 @@ def size_decisions(
             shown = units.shown(shortest, "m")
             raise Refused("engine.rod_length", shown, "does not let the crank turn", "raise its lower bound")
     return decisions
+
+
+KEY = Key("running_gear", RunningGearTable, _read, adds=_weighed, always=True)

@@ -11,24 +11,22 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TypeAlias, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import (
-    CRANKSHAFT,
-    Bearing,
+from laufruhe.extensions.sizes.machine import (
     Bolts,
-    Engine,
-    OperatingPoint,
     PistonPin,
     RunningGear,
     Shank,
-    SliderCrank,
     Webs,
+    ring_area,
+    round_inertia,
+    round_modulus,
 )
-from laufruhe.machine.running_gear import ring_area, round_inertia, round_modulus
+from laufruhe.machine import CRANKSHAFT, Bearing, Engine, OperatingPoint, SliderCrank
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.bearing_loads import crank_forces, pin_forces
@@ -37,7 +35,6 @@ from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import rotor_loads
 
 T = TypeVar("T")
-Factor: TypeAlias = Callable[[Engine, OperatingPoint], Array]
 
 # shear strain energy: a shear stress counts as so much of a normal one (textbook 10.3)
 SHEAR = math.sqrt(3.0)
@@ -165,9 +162,10 @@ def _moment(section: float, front: Bearing, rear: Bearing, x: float) -> float:
 
 def gear_of(engine: Engine) -> RunningGear:
     """Return the running gear of an engine, which must have one."""
-    if engine.gear is None:
+    gear = engine.extra(RunningGear)
+    if gear is None:
         raise ModelError("sizes of the running gear are asked for, and none are given; add [running_gear]")
-    return engine.gear
+    return gear
 
 
 def big_end_factors(engine: Engine, _: OperatingPoint) -> Array:

@@ -11,8 +11,9 @@ import pytest
 
 import laufruhe
 from laufruhe.errors import InputError, ModelError
-from laufruhe.machine import Bearing, Bolts, Engine, OperatingPoint, PistonPin, RunningGear, Shank, Webs
-from laufruhe.physics import strength
+from laufruhe.extensions.sizes import strength
+from laufruhe.extensions.sizes.machine import Bolts, PistonPin, RunningGear, Shank, Webs, moving_of, resized
+from laufruhe.machine import Bearing, Engine, OperatingPoint
 from laufruhe.physics.bearing_loads import pin_forces, piston_pin_forces
 from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT
@@ -74,7 +75,7 @@ FORCE, PIN = 25000.0, PistonPin(0.022, 0.015, 0.063, given_span=0.045)
 
 
 def sized(engine: Engine, **parts: object) -> Engine:
-    return replace(engine, gear=RunningGear(212e9, **parts))  # type: ignore[arg-type]
+    return engine.with_extra(RunningGear(212e9, **parts))  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
@@ -131,7 +132,7 @@ class TestWorkedDiesel:
         """19, and 55050 kg at a factor of 15, with 10 for pi^2 and 870 cm4 for the section; these make 55422 kg."""
         rod = replace(engine.slider_cranks[0], rod_length=1.5, crank_radius=0.3)
         gear = RunningGear(2150000 * 98066.5, rod=Shank(0.115))
-        (factor,) = strength.buckling_factors(replace(engine, slider_cranks=(rod,), gear=gear), POINT)
+        (factor,) = strength.buckling_factors(replace(engine, slider_cranks=(rod,), extras=(gear,)), POINT)
         rounded = 10.0 / math.pi**2 * 870e-8 / Shank(0.115).inertia
         assert rounded / (44000.0 * 9.80665 * factor) == pytest.approx(19.0, abs=0.5)
         carried = rounded / (15.0 * 9.80665 * factor)
@@ -244,10 +245,10 @@ def test_masses_follow_the_sizes() -> None:
 
 def test_sizes_there_and_back_leave_the_engine_as_it_is() -> None:
     engine = laufruhe.load(TEXT.replace("[running_gear]", '[running_gear]\ndensity = "7850 kg/m^3"')).engine
-    sizes = engine.moving.sizes
-    larger = engine.resized({size: 1.1 * value for size, value in sizes.items()})
-    assert larger.moving.sizes == pytest.approx({size: 1.1 * value for size, value in sizes.items()})
-    back = larger.resized(sizes)
+    sizes = moving_of(engine).sizes
+    larger = resized(engine, {size: 1.1 * value for size, value in sizes.items()})
+    assert moving_of(larger).sizes == pytest.approx({size: 1.1 * value for size, value in sizes.items()})
+    back = resized(larger, sizes)
     for a, b in zip(engine.slider_cranks, back.slider_cranks, strict=True):
         assert [b.reciprocating_mass, b.rotating_mass] == pytest.approx([a.reciprocating_mass, a.rotating_mass])
     assert [r.unbalance for r in back.rotors] == pytest.approx([r.unbalance for r in engine.rotors])
@@ -272,8 +273,8 @@ def test_sizes_that_are_none_are_one_line_each(old: str, new: str, rule: str, tm
 @pytest.mark.parametrize(
     ("change", "rule"),
     [
-        (lambda e: replace(e, gear=None), "add \\[running_gear\\]"),
-        (lambda e: replace(e, gear=replace(e.gear, webs=None)), "has no webs"),
+        (lambda e: replace(e, extras=()), "add \\[running_gear\\]"),
+        (lambda e: e.with_extra(replace(e.extra(RunningGear), webs=None)), "has no webs"),
         (lambda e: replace(e, bearings=e.bearings[1:]), "no main bearing on one side"),
         (lambda e: replace(e, bearings=e.bearings[::2]), "no main bearing between them"),
     ],

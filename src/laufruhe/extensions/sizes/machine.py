@@ -7,13 +7,15 @@ moduli and areas of sections, and masses (Z1, Z2).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, Self, TypeAlias
 
 from laufruhe.errors import ModelError
+from laufruhe.machine import Engine
 from laufruhe.machine.bearing import Bearing
+from laufruhe.machine.extra import Extra
 from laufruhe.machine.rotor import Rotor
 from laufruhe.machine.slider_crank import SliderCrank
 
@@ -131,8 +133,8 @@ class Bolts:
 
 
 @dataclass(frozen=True)
-class RunningGear:
-    """Sizes that all throws share.
+class RunningGear(Extra):
+    """Sizes that all throws share; empty where only rods, crank pins or journals are sized.
 
     Attributes
     ----------
@@ -142,6 +144,7 @@ class RunningGear:
         Names of the rotors that pins and webs are, and which way each throw points (C4).
     """
 
+    name: ClassVar[str] = "size"
     elastic_modulus: float = STEEL
     density: float | None = None
     webs: Webs | None = None
@@ -157,15 +160,23 @@ class RunningGear:
             raise ModelError(f"the running gear has no {name.replace('_', ' ')}; add it to [running_gear]")
         return found
 
-    def scaled(self, length: float, density: float) -> RunningGear:
-        """Return the running gear in another size and density."""
+    def move(self, engine: Engine, changes: Mapping[Any, float], _: Sequence[SliderCrank]) -> Engine:
+        """Return an engine with changes of its sizes, and of the masses of these."""
+        if not changes:
+            return engine
+        return resized(
+            engine, {size: value + changes.get(size, 0.0) for size, value in moving_of(engine).sizes.items()}
+        )
+
+    def scaled(self, length: float, mass: float) -> Self:
+        """Return the gear of an engine whose lengths and masses are so many times as large."""
         longer: dict[str, object] = {}
         for name in PARTS:
             own = getattr(self, name)
             if own is not None:
                 sizes = {f.name: getattr(own, f.name) for f in fields(own) if f.name not in ("count", "in_bosses")}
                 longer[name] = replace(own, **{k: None if v is None else v * length for k, v in sizes.items()})
-        heavy = None if self.density is None else self.density * density
+        heavy = None if self.density is None else self.density * (mass / length**3)
         return replace(self, density=heavy, **longer)  # type: ignore[arg-type]
 
     def rod_masses(self, part: SliderCrank) -> tuple[float, float, float]:
@@ -266,6 +277,18 @@ class Moving:
             if told and gear is not None:
                 gear = replace(gear, **{name: replace(own, **told)})
         return replace(bare, gear=gear, parts=parts, bearings=bearings).weighed()
+
+
+def moving_of(engine: Engine) -> Moving:
+    """Return what sizes move in an engine."""
+    return Moving(engine.extra(RunningGear), engine.slider_cranks, engine.rotors, engine.bearings)
+
+
+def resized(engine: Engine, sizes: Mapping[Size, float]) -> Engine:
+    """Return the engine with sizes in place of its own, and the masses of these."""
+    moved = moving_of(engine).resized(sizes)
+    found = replace(engine, slider_cranks=moved.parts, rotors=moved.rotors, bearings=moved.bearings)
+    return found if moved.gear is None else found.with_extra(moved.gear)
 
 
 def _heavier(gear: RunningGear, part: SliderCrank, sense: float) -> SliderCrank:
