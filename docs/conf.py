@@ -1,5 +1,6 @@
 """Settings of the documentation site: `make docs` writes it to docs/_build, and fetches nothing."""
 
+import re
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
@@ -27,14 +28,12 @@ exclude_patterns = [
     "gallery/*.ipynb",
     "gallery/*.py",
     "gallery/*.md5",
-    # index.rst includes the one, and the site has the other with its pictures
+    # index.rst includes it
     "README.md",
-    "gallery.md",
 ]
 myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "amsmath"]
 myst_heading_anchors = 3
-# links to files beside docs/ are for readers of the repository
-suppress_warnings = ["myst.xref_missing", "config.cache"]
+suppress_warnings = ["config.cache"]
 
 autodoc_typehints = "none"
 
@@ -76,14 +75,30 @@ def for_readers_aloud(app, page, template, context, doctree):
     context["body"] = body.replace('<div class="table-wrapper', '<div tabindex="0" class="table-wrapper')
 
 
-def with_pictures(app, *given):
-    """Links to the list of examples lead to the gallery, which the site alone has."""
+HERE = Path(__file__).parent
+MEASURED = HERE / "measured"
+
+
+def write_measured_pages(app, config):
+    """Write a page for each page of measurements, which stand beside docs/ in the repository."""
+    MEASURED.mkdir(exist_ok=True)
+    for path in sorted((HERE.parent / "results" / "benchmarks").glob("*.md")):
+        options = ":relative-images:\n:relative-docs: ../../docs/"
+        text = f"```{{include}} ../../results/benchmarks/{path.name}\n{options}\n```\n"
+        (MEASURED / path.name).write_text(text, encoding="utf-8")
+
+
+def lead_within_the_site(app, *given):
+    """Turn links to files beside docs/, and to the list of examples, into links to pages of the site."""
     content = given[-1]
-    content[0] = content[0].replace("gallery.md)", "gallery/index.rst)")
+    text = content[0].replace("gallery.md)", "gallery/index.rst)").replace("../CHANGELOG.md)", "changes.md)")
+    text = re.sub(r"\[([^\]]+)\]\((?:results/README|SECURITY)\.md\)", r"\1", text)
+    content[0] = re.sub(r"\]\((?:\.\./)+results/benchmarks/([\w-]+\.md)", r"](/measured/\1", text)
 
 
 def setup(app):
     """After the theme has made its navigation."""
-    app.connect("source-read", with_pictures)
-    app.connect("include-read", with_pictures)
+    app.connect("config-inited", write_measured_pages)
+    app.connect("source-read", lead_within_the_site)
+    app.connect("include-read", lead_within_the_site)
     app.connect("html-page-context", for_readers_aloud, priority=900)
