@@ -21,8 +21,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from pages import PAGES, ROOT, publish, spent
 
-from laufruhe.extensions.long_cranks.amplitudes import StarAmplitudes
-from laufruhe.extensions.long_cranks.search import search_stars
+from laufruhe.extensions.long_cranks.couple_objectives import StarAmplitudes
+from laufruhe.extensions.long_cranks.couple_search import search_stars
 from laufruhe.files.reader import load
 from laufruhe.load_models.amplitudes import AmplitudeTerm
 from laufruhe.load_models.star_model import StarModel
@@ -36,10 +36,10 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.report.sections import stars
 from laufruhe.solvers import solve
-from laufruhe.solvers.stars.cuts import search_designs
+from laufruhe.solvers.stars.cut_search import search_designs
+from laufruhe.solvers.stars.enumeration import enumerate_stars
 from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.program import owners_of, solve_design
-from laufruhe.solvers.stars.search import enumerate_stars
+from laufruhe.solvers.stars.star_program import shaft_owners, solve_design
 
 OUT = PAGES / "crank-phasing.md"
 RANKED = (
@@ -159,7 +159,7 @@ def joint(n: int) -> tuple[str, ...]:
     model = StarModel(phasing, family.space, family.geometry)
     found = search_designs(model, family.stars, 1, problem.tolerance, 90.0, floor)
     by_cuts = time.process_time() - start
-    owners = owners_of(model)
+    owners = shaft_owners(model)
     start = time.process_time()
     some = family.stars[:60]
     for star in some.tolist():

@@ -28,8 +28,8 @@ from laufruhe.report.wording import explained
 from laufruhe.solvers import solve, walk
 from laufruhe.solvers.conclusion import decision_values, state
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.stars.conclusion import with_star
 from laufruhe.solvers.stars.ranking import candidates_of, ranked_star, ranking_result
+from laufruhe.solvers.stars.star_results import with_star
 from problem_files import PROBLEMS
 from ready import solved
 

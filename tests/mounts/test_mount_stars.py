@@ -18,7 +18,7 @@ from laufruhe.solvers.conclusion import state
 from laufruhe.solvers.mounts.stars import _bounded, _method, _solved_fully, _stars
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.smooth.program import SmoothProgram
-from laufruhe.solvers.stars.design import StarDesign
+from laufruhe.solvers.stars.star_results import StarDesign
 from mounts.files import BLOCK, MOUNTS, OPEN, SAG, changed, problem_of
 
 ENGINE = """

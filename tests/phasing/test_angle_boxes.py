@@ -17,9 +17,9 @@ from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
-from laufruhe.solvers.stars.design import StarDesign, solve_fixed
-from laufruhe.solvers.throws.search import ThrowSearch
-from laufruhe.solvers.throws.windows import design_at, firing_of, windows_of
+from laufruhe.solvers.stars.star_results import StarDesign, solve_fixed
+from laufruhe.solvers.throws.throw_search import ThrowSearch
+from laufruhe.solvers.throws.throw_windows import design_at, firing_bounds, windows_of
 from problem_files import PROBLEMS, changed
 
 TWIN = """
@@ -133,7 +133,7 @@ def test_waves_and_windows_are_those_of_the_exact_model(text: str, gas: str, nam
     """At random angles of every kind: loads, and the firing intervals that a window tells."""
     problem = _read(text + gas + MOUNTS + _objective(name))
     phasing, measure, rng = problem.phasing, problem.objective[0].measure, np.random.default_rng(3)
-    windows, firing = windows_of(problem, phasing), firing_of(phasing)
+    windows, firing = windows_of(problem, phasing), firing_bounds(phasing)
     waves = ThrowSearch(problem, phasing, windows, lambda _: None, None).roots[0][0].programs.waves
     norm, seen = waves.norm(measure, waves.samples(measure, 96)), 0
     for window in (windows[k] for k in rng.integers(len(windows), size=6)):

@@ -14,12 +14,12 @@ from laufruhe.load_models.star_model import StarModel
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.prove.certificate import Multipliers, Proof, gap_of, lower_bound
-from laufruhe.prove.throws.star_cut import cut_of
+from laufruhe.prove.throws.star_cuts import cut_of
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.stars.cuts import search_designs
+from laufruhe.solvers.stars.cut_search import search_designs
 from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.program import coarse_value, owners_of, solve_design
+from laufruhe.solvers.stars.star_program import coarse_value, shaft_owners, solve_design
 from phasing import engines
 
 TWO_SHAFTS = engines.shaft("against", -1) + engines.shaft("second", 2)
@@ -89,7 +89,7 @@ def test_a_set_of_shafts_is_worth_what_an_engine_with_these_alone_is(tmp_path, b
     weight = engines.WEIGHTS.partition('[[counterweights]]\nname = "rear"')[0]
     problem = engines.problem(tmp_path, 3, rest=engines.MOUNTS + weight + TWO_SHAFTS + engines.MOUNT_FORCE)
     model, stars = model_of(problem)
-    star, owners = tuple(map(int, stars[0])), owners_of(model)
+    star, owners = tuple(map(int, stars[0])), shaft_owners(model)
     found, _ = solve_design(model, star, built, owners, 1e-4, numerical_zero(problem))
     candidate = replace(
         model.phasing.star(star, model.space.phases, model.geometry), left_out=model.phasing.without(built)
@@ -110,7 +110,7 @@ def test_a_cut_is_the_certificate_of_every_star(tmp_path, name):
         tuple(rng.standard_normal(n.constant.shape) for _, n in fine.terms),
         tuple(0.1 * np.abs(rng.standard_normal(n.constant.shape)) for _, n in fine.limits),
     )
-    bounds = cut_of(fine, multipliers).bounds(stars, [()], owners_of(model))[:, 0]
+    bounds = cut_of(fine, multipliers).bounds(stars, [()], shaft_owners(model))[:, 0]
     for star, bound in zip(stars, bounds, strict=True):
         assert bound == pytest.approx(lower_bound(fine.at(star), multipliers).value, rel=1e-9, abs=1e-9)
 
@@ -119,12 +119,12 @@ def test_a_cut_is_the_certificate_of_every_star(tmp_path, name):
 def test_cuts_never_exceed_an_optimum(tmp_path, name):
     problem = engines.problem(tmp_path, 4, rest=CASES[name])
     model, stars = model_of(problem)
-    owners = owners_of(model)
+    owners = shaft_owners(model)
     answers = [solve_design(model, tuple(star), (), owners, 1e-6) for star in stars.tolist()]
     for _, cut in answers:
         bounds = cut.bounds(stars, [()], owners)[:, 0]
         assert np.all(bounds <= [s.value * (1.0 + 1e-9) for s, _ in answers])
-        assert cut.least(model.space) <= min(s.value for s, _ in answers) * (1.0 + 1e-9)
+        assert cut.minimum(model.space) <= min(s.value for s, _ in answers) * (1.0 + 1e-9)
 
 
 @pytest.mark.slow
@@ -133,7 +133,7 @@ def test_limits_that_contradict_each_other_at_one_star_exclude_others(tmp_path):
     couple = '[[constraints]]\nlimit = "rms rocking couple"\nmax = "850 N m"\n'
     problem = engines.problem(tmp_path, 5, rest=CASES["limited"] + couple)
     model, stars = model_of(problem)
-    owners = owners_of(model)
+    owners = shaft_owners(model)
     answers = [solve_design(model, tuple(star), (), owners, 1e-4) for star in stars.tolist()]
     without = np.array([solved is None for solved, _ in answers])
     assert without.sum() == 12
@@ -266,7 +266,7 @@ def test_a_star_that_breaks_a_limit_which_nothing_open_moves_is_no_design(tmp_pa
     low, high = min(star_values.values()), max(star_values.values())
     assert low < 0.9 * high
     model, _ = model_of(engines.problem(tmp_path, 4, rest=rest + limit.format(0.5 * (low + high))))
-    owners = owners_of(model)
+    owners = shaft_owners(model)
     for aim in (min, max):
         star = aim(star_values, key=star_values.__getitem__)
         solved, cut = solve_design(model, star, (), owners, 1e-4)

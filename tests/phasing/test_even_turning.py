@@ -1,25 +1,20 @@
-"""Degree of irregularity over firing orders and stars: bounded by one order of the torque, against brute force."""
+"""Degree of irregularity over firing orders and stars: against brute force."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import laufruhe
 from laufruhe.files.reader import load_tables
 from laufruhe.machine.firing import lap_orders
-from laufruhe.physics.fidelity import EXACT
 from laufruhe.physics.irregularity import irregularity
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.throws.swing import SwingBound
 from laufruhe.solvers import Result, Status
-from laufruhe.solvers.stars.even_turning import floors
 
 THROWS = [0, 50, 130, 180, 265]
 WIDE = {"intervals": {"min": "5 deg", "max": "400 deg"}}
@@ -65,46 +60,6 @@ def test_the_best_firing_order_is_that_of_all_of_them(uneven: Any) -> None:
     assert result.certificate.lower_bound <= min(every.values()) * (1.0 + 1e-12)
     assert every[result.phasing.ranking[0].firing_orders[0].order] == pytest.approx(min(every.values()), rel=1e-9)
     assert max(every.values()) > 2.0 * min(every.values())
-    assert "by one order of the torque alone" in result.certificate.method
-
-
-def test_floors_of_firing_orders_are_under_their_degrees_and_near() -> None:
-    """With the flywheel of the file; a limit under a floor is broken for certain, one over the degree is not."""
-    problem = problem_of(phasing=WIDE)
-    phasing = problem.phasing
-    orders = list(lap_orders(phasing.cycle, phasing.layout(None, None), phasing.throws))[::3]
-    designs = [Candidate(tuple(phasing.throws), order) for order in orders]
-    degrees = np.array([
-        max(
-            irregularity(problem_of({"throws": THROWS, "firing_order": list(order)}).engine, point, 0.3, EXACT)
-            for point in problem.points
-        )
-        for order in orders
-    ])  # fmt: skip
-    found, broken = floors(problem, phasing, designs)
-    assert not broken.any()
-    assert np.all(found <= degrees)
-    assert np.all(found > 0.3 * degrees)
-    most = float(0.5 * (found.min() + found.max()))
-    limit = {"limit": "degree of irregularity", "max": most}
-    other = problem_of(phasing=WIDE, constraints=[limit], objective={"minimise": "mean shaking force"})
-    nothing, broken = floors(other, other.phasing, designs)
-    assert not nothing.any()
-    assert np.array_equal(broken, found > most)
-    assert 0 < broken.sum() < len(designs)
-
-
-def test_one_order_is_under_every_degree(uneven: Any) -> None:
-    """Of each firing order at any inertia and speed; where one order is nearly all there is, it is close."""
-    problem, _, every = uneven
-    for order in [*every][::4]:
-        engine = problem_of({"throws": THROWS, "firing_order": list(order)}).engine
-        fires = np.array([[part.firing_angle / (2.0 * np.pi) for part in engine.slider_cranks]])
-        for point in problem.points:
-            for inertia in (0.02, 0.1, 1.0, 30.0):
-                bound = SwingBound.of(engine, point, problem.fidelity, inertia)
-                degree = irregularity(engine, point, inertia, problem.fidelity)
-                assert 0.3 * min(degree, 0.2) < bound.least(fires)[0] <= degree
 
 
 def test_a_limit_takes_orders_away(uneven: Any) -> None:

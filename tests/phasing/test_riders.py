@@ -14,7 +14,7 @@ from laufruhe.machine import Engine
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.sets import Interval
-from laufruhe.solvers.throws.riders import Riders
+from laufruhe.solvers.throws.riding_weights import Riders
 from phasing import engines
 
 STILL = """

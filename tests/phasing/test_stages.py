@@ -9,7 +9,7 @@ import pytest
 
 from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.solvers.throws.stages import Stage, missed
+from laufruhe.solvers.throws.throw_search import Stage, missed_peak
 from phasing import engines
 
 
@@ -44,9 +44,9 @@ def test_a_stage_too_large_to_hold_is_none():
 
 def test_steps_are_asked_for_where_boxes_tell_no_more():
     wide, narrow = (SimpleNamespace(spread=np.array([width, 0.0])) for width in (0.2, 0.05))
-    assert stage().tells_all(900.0, 1000.0, wide)
-    assert not stage().tells_all(800.0, 1000.0, wide)
-    assert stage().tells_all(800.0, 1000.0, narrow)
+    assert stage().is_exhausted(900.0, 1000.0, wide)
+    assert not stage().is_exhausted(800.0, 1000.0, wide)
+    assert stage().is_exhausted(800.0, 1000.0, narrow)
 
 
 def test_a_peak_misses_no_more_than_told(tmp_path):
@@ -60,7 +60,7 @@ def test_a_peak_misses_no_more_than_told(tmp_path):
     for samples in (48, 96, 192):
         sizes = np.linalg.norm(signal.sample(12 * samples), axis=-1).max(axis=1)
         worst = max(sizes.max() - sizes[shift::12].max() for shift in (0, 6))
-        told.append(missed(measure, best, samples))
+        told.append(missed_peak(measure, best, samples))
         assert worst <= told[-1]
     assert told[0] < 0.05 * sizes.max()
     assert told[2] < 0.4 * told[1] < 0.16 * told[0]

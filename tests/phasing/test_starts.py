@@ -11,7 +11,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import SOONEST, Candidate, bounded_stars
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.throws.starts import firing_intervals, turning_back
+from laufruhe.solvers.throws.throw_starts import firing_intervals, turning_back
 from phasing import engines
 
 OPEN = 'throws = "open"\nfiring_order = "open"'

@@ -19,10 +19,10 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.throws.arcs import ArcBox
 from laufruhe.solvers import Status, solve
-from laufruhe.solvers.stars.design import StarDesign, solve_fixed
-from laufruhe.solvers.throws.boxes import ThrowPrograms, _small
-from laufruhe.solvers.throws.riders import Riders
-from laufruhe.solvers.throws.windows import firing_of, nearest, windows_of
+from laufruhe.solvers.stars.star_results import StarDesign, solve_fixed
+from laufruhe.solvers.throws.riding_weights import Riders
+from laufruhe.solvers.throws.throw_boxes import ThrowPrograms, compressed
+from laufruhe.solvers.throws.throw_windows import firing_bounds, nearest, windows_of
 from phasing import engines
 
 GAS = '[gas]\nmodel = "seiliger"\npeak_pressure = "70 bar"\nimep = "8 bar"\n'
@@ -83,7 +83,7 @@ def programs_of(problem, phasing, window, samples=64):
     rides = rides_of(phasing, candidate)
     riders = Riders(realised, rides, candidate.throws)
     waves = ThrowWaves(riders.problem, phasing.layout(*phasing.least_geometry), rides)
-    return ThrowPrograms(waves, riders, firing_of(phasing), samples)
+    return ThrowPrograms(waves, riders, firing_bounds(phasing), samples)
 
 
 def drawn(rng, window):
@@ -187,7 +187,7 @@ def test_every_way_to_fire_is_in_one_window(tmp_path, layout, cycle, count):
         tmp_path, count, cycle, engine, ALLOWED, engines.MOUNTS + GAS + engines.MOUNT_FORCE, layout
     )
     phasing = problem.phasing
-    windows, firing = windows_of(problem, phasing), firing_of(phasing)
+    windows, firing = windows_of(problem, phasing), firing_bounds(phasing)
     own = phasing.layout(*phasing.least_geometry)
     rng = np.random.default_rng(4)
     kept = 0
@@ -230,12 +230,12 @@ def test_arcs_are_never_less_than_their_least(seed, beside):
         values += (np.exp(1j * turned) @ waves[p]).real
     for followed in (5, 3):
         arcs = ArcBox(orders[:followed], lower, upper).functions(waves, slopes, shared)
-        assert arcs.least <= values.min() + 1e-12
-        low, high = arcs.kept(0.3)
-        less = angles[values - arcs.least < 0.3]
+        assert arcs.minimum <= values.min() + 1e-12
+        low, high = arcs.cut(0.3)
+        less = angles[values - arcs.minimum < 0.3]
         assert np.all((less >= low - 1e-12) & (less <= high + 1e-12))
         if followed == 5:
-            assert arcs.least >= values.min() - (0.03, 0.1, 0.5)[beside]
+            assert arcs.minimum >= values.min() - (0.03, 0.1, 0.5)[beside]
 
 
 BOUNDED = 'throws = [0, { between = [60, 180] }, { between = [170, 300] }]\nrotating_mass = "0.7 kg"\n'
@@ -296,11 +296,11 @@ def test_rows_lose_only_components_that_nothing_loads():
     waves = np.zeros((1, 2, 5, 4), dtype=complex)
     constant[1, 0], slope[2, 1, 0], waves[0, 1, 3, 2] = 3.0, -4.0, 5.0j
     grid = Grid(np.full(5, 0.2), 5)
-    small = _small(WaveNorm(AffineNorm(NORMS["maximum"], constant, slope, grid), waves, 0.5))
+    small = compressed(WaveNorm(AffineNorm(NORMS["maximum"], constant, slope, grid), waves, 0.5))
     assert np.array_equal(small.fixed.constant, constant[:, :3])
     assert np.array_equal(small.fixed.slope, slope[:, :3])
     assert np.array_equal(small.waves, waves[..., :3])
     assert small.left_out == 0.5
     # a signal of nothing keeps a row to have a norm
-    none = _small(WaveNorm(AffineNorm(NORMS["maximum"], 0.0 * constant, 0.0 * slope, grid), 0.0 * waves, 0.0))
+    none = compressed(WaveNorm(AffineNorm(NORMS["maximum"], 0.0 * constant, 0.0 * slope, grid), 0.0 * waves, 0.0))
     assert none.fixed.constant.shape == (5, 1)

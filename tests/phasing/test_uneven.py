@@ -14,11 +14,11 @@ from laufruhe.load_models.uneven_model import Symbols, UnevenModel, rides_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.throws.uneven import least_bound, star_bounds, throw_costs, uneven_bound
+from laufruhe.prove.throws.firing_windows_bound import least_bound, star_bounds, throw_costs, uneven_bound
 from laufruhe.solvers import solve
+from laufruhe.solvers.stars.enumeration import enumerate_stars
 from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.search import enumerate_stars
-from laufruhe.solvers.throws.uneven import local_optimum
+from laufruhe.solvers.throws.uneven_throws import local_optimum
 from phasing import engines
 from problem_files import PROBLEMS, loaded
 from ready import solved
@@ -115,7 +115,7 @@ def test_a_start_that_fires_too_unevenly_leads_to_a_crank_that_does_not(tmp_path
         Candidate(tuple(math.radians(a) for a in throws), (1, 3, 2)) for throws in ((0, 120, 240), (0, 100, 220))
     )
     assert not phasing.intervals.holds(phasing.realise(bent).engine.firing_intervals)
-    found = local_optimum(phasing, bent, phasing.intervals, beside=False)
+    found = local_optimum(phasing, bent, phasing.intervals, nudged=False)
     assert phasing.intervals.holds(found.result.final.engine.firing_intervals, 1e-7)
     assert found.value <= solve(replace(phasing.realise(even), phasing=None)).objective.value * (1.0 + 1e-6)
 

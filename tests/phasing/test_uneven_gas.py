@@ -14,9 +14,9 @@ from laufruhe.load_models.uneven_model import LEFT_OUT, Symbols, UnevenModel, ri
 from laufruhe.numerics.norms import NORMS
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
-from laufruhe.prove.throws.uneven import steady_bound
+from laufruhe.prove.throws.firing_windows_bound import steady_bound
 from laufruhe.solvers import solve
-from laufruhe.solvers.throws.uneven import local_optimum
+from laufruhe.solvers.throws.uneven_throws import local_optimum
 from phasing import engines
 from smooth import smooth_value
 

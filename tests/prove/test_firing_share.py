@@ -13,9 +13,9 @@ import pytest
 from laufruhe.files.reader import load_tables
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.throws.firing_share import firing_bound
+from laufruhe.prove.throws.firing_average import firing_bound
 from laufruhe.solvers import solve
-from laufruhe.solvers.stars.phasing import every_star
+from laufruhe.solvers.stars.phasing_solver import even_stars
 from problem_files import PROBLEMS
 
 
@@ -38,7 +38,7 @@ CASES = [
 def test_no_even_star_with_any_weights_goes_under_it(name: str, quantity: str, engine: dict[str, Any]) -> None:
     own = problem(name, quantity, **engine)
     random, found = np.random.default_rng(3), []
-    stars = every_star(own.phasing)
+    stars = even_stars(own.phasing)
     for k in random.choice(len(stars), 4):
         realised = replace(own.phasing.realise(stars[int(k)][0]), phasing=None)
         for size in (0.0, 0.02, 0.3):
@@ -61,6 +61,6 @@ def test_a_six_in_line_reaches_it() -> None:
 def test_shafts_that_turn_with_the_firing_leave_nothing_known() -> None:
     """Four cylinders fire twice a turn, as the shafts of the second order turn."""
     own = problem("inline", cylinders=4)
-    (candidate, _), *_ = every_star(own.phasing)
+    (candidate, _), *_ = even_stars(own.phasing)
     realised = replace(own.phasing.realise(candidate), phasing=None)
     assert firing_bound(own, evaluate(realised)) == 0.0

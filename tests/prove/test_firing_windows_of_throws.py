@@ -11,7 +11,7 @@ import pytest
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import firing_lattice
 from laufruhe.problem.phasing import Intervals
-from laufruhe.prove.throws.uneven import windows
+from laufruhe.prove.throws.firing_windows_bound import windows
 from phasing import engines
 
 

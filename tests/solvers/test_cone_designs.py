@@ -18,8 +18,8 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.sets import Interval
 from laufruhe.solvers.conclusion import FEASIBLE
 from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.cones.lightest import _is_moved
-from laufruhe.solvers.cones.unbalances import _allowed, settled
+from laufruhe.solvers.cones.tie_break import break_ties, is_moved_along
+from laufruhe.solvers.cones.unbalances import allowed_optimum
 
 
 def test_a_peak_between_angles_keeps_its_limit() -> None:
@@ -44,7 +44,7 @@ def test_a_peak_between_angles_keeps_its_limit() -> None:
         return design.value(problem.limits[0].measure)
 
     plain = solve_cones(model.at(48)).x
-    found = _allowed(problem, model, 48, nothing)
+    found = allowed_optimum(problem, model, 48, nothing)
     assert plain is not None
     assert found is not None
     assert peak(plain) > 9000.0 * (1.0 + 1e-4)
@@ -65,7 +65,7 @@ def test_designs_that_no_load_tells_apart_end_at_the_lightest() -> None:
     affine = AffineProblem(((1.0, norm),), (), domains_of(decisions), 2)
     problem = SimpleNamespace(objective=(), load_limits=())
     x = np.array([0.4, 1e11, 0.6, 0.7])
-    found = settled(problem, affine, x)
+    found = break_ties(problem, affine, x)
     assert norm.rows(found) == pytest.approx(norm.rows(x), rel=1e-6)
     assert found[3] == pytest.approx(0.0, abs=1e-6)
 
@@ -73,6 +73,6 @@ def test_designs_that_no_load_tells_apart_end_at_the_lightest() -> None:
 def test_a_rounding_is_no_move_of_a_limit() -> None:
     slope = np.array([[[1.0, 1.0]], [[0.0, 0.0]]])
     norm = AffineNorm(NORMS["maximum"], np.ones((2, 1)), slope, Grid(np.full(2, 0.5), 2))
-    assert not _is_moved(norm, np.array([[0.1 + 0.2], [-0.3]]))
-    assert _is_moved(norm, np.array([[0.3], [-0.3 + 1e-9]]))
-    assert not _is_moved(replace(norm, slope=0.0 * slope), np.ones((2, 1)))
+    assert not is_moved_along(norm, np.array([[0.1 + 0.2], [-0.3]]))
+    assert is_moved_along(norm, np.array([[0.3], [-0.3 + 1e-9]]))
+    assert not is_moved_along(replace(norm, slope=0.0 * slope), np.ones((2, 1)))

@@ -24,8 +24,8 @@ from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof, lower_bound
 from laufruhe.solvers import Status, solve
 from laufruhe.solvers.cones import conic
+from laufruhe.solvers.cones.cone_program import SparseMatrix
 from laufruhe.solvers.cones.conic import TIGHT, solve_cones
-from laufruhe.solvers.cones.rows import Sparse
 from problem_files import PROBLEMS, loaded
 
 NAMES = ("tractor-single", "tractor-two", "tractor-four-lanchester", "tractor-four-lanchester-and-moment",
@@ -139,7 +139,9 @@ def test_a_peak_is_limited_at_few_angles_as_at_all(share: float, monkeypatch: py
     maximum = at_peak + share * (at_mean - at_peak) + 1e-3 * at_peak
     limited_so = replace(loose, limits=((maximum, loose.limits[0][1]),))
     rows = []
-    monkeypatch.setattr(conic, "told", lambda own, *rest, told=conic.told: rows.append(own.count) or told(own, *rest))
+    monkeypatch.setattr(
+        conic, "run_clarabel", lambda own, *rest, run=conic.run_clarabel: rows.append(own.count) or run(own, *rest)
+    )
     few = solve_cones(limited_so)
     monkeypatch.setattr(conic, "FEW_ROWS", 10**9)
     whole = solve_cones(limited_so)
@@ -273,10 +275,9 @@ def test_a_sparse_matrix_is_that_of_scipy(shape: tuple[int, int]) -> None:
     rows, columns = rng.integers(0, shape[0], count), rng.integers(0, max(shape[1], 1), count)
     values = rng.integers(-2, 3, count).astype(float)
     for some in (slice(0, 0), slice(0, 3), slice(None)):
-        own = Sparse.of(rows[some], columns[some], values[some], shape)
+        own = SparseMatrix.from_entries(rows[some], columns[some], values[some], shape)
         theirs = csc_array((own.data, own.indices, own.indptr), shape=shape)
         np.testing.assert_array_equal(
             theirs.toarray(), coo_array((values[some], (rows[some], columns[some])), shape).toarray()
         )
         assert theirs.has_canonical_format
-        assert own.nnz == len(own.data)

@@ -22,7 +22,7 @@ from laufruhe.report.sections.decisions import tables
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import Shown, concluded, judged
-from laufruhe.solvers.cones.equal_designs import FREE, _ranges, free_decisions
+from laufruhe.solvers.cones.equal_designs import FREE, free_decisions, ranges_of
 from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import meaningful
@@ -196,6 +196,6 @@ def test_a_free_angle_runs_from_the_first_to_the_last_of_its_designs() -> None:
              "objective": {"minimise": "rms shaking force"}}  # fmt: skip
     (domain,) = domains_of(load_tables(table, Path("one.toml")).decisions)
     turns = (0.5, 0.2, 0.9)
-    told = _ranges(domain, [0.05 * np.array([math.cos(turn), math.sin(turn)]) for turn in turns])
+    told = ranges_of(domain, [0.05 * np.array([math.cos(turn), math.sin(turn)]) for turn in turns])
     assert [(one.name, one.unit) for one in told] == [("web.angle", "rad")]
     assert (told[0].low, told[0].high) == pytest.approx((0.2, 0.9))

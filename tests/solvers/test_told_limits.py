@@ -15,10 +15,9 @@ from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import best_bound
 from laufruhe.solvers import Status, solve
-from laufruhe.solvers.conclusion import KEPT
+from laufruhe.solvers.conclusion import KEPT, broken_limits
 from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.stars.rooms import surely_broken
-from laufruhe.solvers.throws import uneven
+from laufruhe.solvers.throws.uneven_throws import evaluate_crank
 
 ENGINE: dict[str, Any] = {
     "layout": "inline", "cycle": "two-stroke", "stroke": "100 mm", "rod_ratio": 0.3, "reciprocating_mass": "1 kg",
@@ -57,7 +56,7 @@ def test_a_limit_that_nothing_open_moves_is_broken_where_many_angles_tell() -> N
     limit = {"name": "second", "limit": "mean shaking force", "orders": [2], "max": "962 N"}
     told = problem({}, objective={"minimise": "rms shaking force"}, constraints=[limit])
     assert evaluate(told).excess(told.limits) <= 0.0
-    assert surely_broken(told.limits, evaluate(told)) == ("second",)
+    assert broken_limits(told.limits, with_fine_sampling(evaluate(told))) == ("second",)
 
 
 def test_a_program_in_which_nothing_is_open_is_its_own_answer() -> None:
@@ -81,5 +80,5 @@ def test_a_crank_of_a_box_that_breaks_a_limit_is_no_design() -> None:
     candidate = Candidate((0.0,), (1, 2), np.radians(75.0))
     free = told.changed(limits=())
     assert free.phasing is not None
-    assert uneven._near(free.phasing, candidate, moving=False) is not None
-    assert uneven._near(phasing, candidate, moving=False) is None
+    assert evaluate_crank(free.phasing, candidate) is not None
+    assert evaluate_crank(phasing, candidate) is None

@@ -26,7 +26,7 @@ from laufruhe.prove.witness import Known
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.prices import ACTIVE, Price, angle_name
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.stars.ranking import none_of_given
+from laufruhe.solvers.stars.ranking import why_no_order
 from laufruhe.solvers.values import DecisionValue, LimitValue, Nearest, ObjectiveValue
 
 FEASIBLE = 1e-6
@@ -264,7 +264,7 @@ def state(problem: Problem, to_start_from: bool = False) -> Result:
     problem = problem.drawing
     evaluation = evaluate_start(problem) if to_start_from else evaluate(problem)
     open_of = problem.phasing
-    why = none_of_given(open_of, open_of.throws) if open_of is not None and open_of.throws is not None else ""
+    why = why_no_order(open_of, open_of.throws) if open_of is not None and open_of.throws is not None else ""
     return Result(
         problem=problem,
         status=Status.INFEASIBLE if why else Status.FEASIBLE,

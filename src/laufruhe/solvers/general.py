@@ -24,10 +24,10 @@ from laufruhe.prove.certificate import Reach
 from laufruhe.solvers.conclusion import concluded, judged, values_of
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, searched, shown
-from laufruhe.solvers.stars.conclusion import no_star
-from laufruhe.solvers.stars.phasing import by_each_order, every_star
-from laufruhe.solvers.throws.as_numbers import solve_moved_throws
-from laufruhe.solvers.throws.starts import none_fires
+from laufruhe.solvers.stars.phasing_solver import even_stars, solve_each_order
+from laufruhe.solvers.stars.star_results import no_star
+from laufruhe.solvers.throws.moved_throws import solve_moved_throws
+from laufruhe.solvers.throws.throw_starts import why_none_fires
 
 Decide = Callable[[Problem], Result]
 INNER = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
@@ -101,7 +101,7 @@ def solve_star_by_star(problem: Problem, decide: Decide) -> Result:
     """Decide each star that fires evenly, with each set of shafts, as a problem of its own; of many, some drawn."""
     phasing = problem.phasing
     assert phasing is not None
-    stars = every_star(phasing)
+    stars = even_stars(phasing)
     if not stars:
-        return no_star(problem, none_fires(phasing)[0])
-    return by_each_order(problem, phasing, stars, lambda own, _: decide(replace(own, phasing=None)), MOST_STARS)
+        return no_star(problem, why_none_fires(phasing)[0])
+    return solve_each_order(problem, phasing, stars, lambda own, _: decide(replace(own, phasing=None)), MOST_STARS)

@@ -25,7 +25,7 @@ from laufruhe.problem.channels import (
 )
 from laufruhe.problem.decision import KINDS, Kind
 from laufruhe.problem.dependence import Dependence, depends, kinds_of
-from laufruhe.problem.evaluation import objective_value
+from laufruhe.problem.evaluation import objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
@@ -33,16 +33,16 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, Reach
 from laufruhe.solvers.apart import is_apart, solve_apart
 from laufruhe.solvers.boxes.place_boxes import without_places
-from laufruhe.solvers.conclusion import KEPT, Shown, concluded, judged, none_within, with_limits
+from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, with_limits
 from laufruhe.solvers.cones.equal_designs import free_decisions
-from laufruhe.solvers.cones.unbalances import beyond_mounts
+from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts
 from laufruhe.solvers.in_order import solve_in_order
 from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, by_home, is_no_number, is_pointwise
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex
 from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.relaxed import solve_relaxed
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.stars.rooms import surely_broken, with_room
+from laufruhe.solvers.stars.shaft_collisions import exclude_collisions
 from laufruhe.solvers.told_limits import solve_told, told_excess
 from laufruhe.solvers.walk import walked
 from laufruhe.solvers.withheld import without_proof
@@ -96,8 +96,8 @@ _U, _P, _K, _M, _S, _F = Kind.UNBALANCE, Kind.PLACE, Kind.STIFFNESS, Kind.MOUNT,
 _Z, _Q = Kind.SIZE, Kind.PISTON
 _AFFINE, _MASSES, _SHIFT = (Dependence.AFFINE,), (Dependence.MASSES,), (Dependence.SHIFT,)
 _PLACED = (Dependence.BIAFFINE, Dependence.BENT)
-_CONES, _JOINT = ".cones.unbalances:solve_sharply", ".mounts.nonlinear:solve_joint"
-_STARS = ".stars.phasing:solve_phasing"
+_CONES, _JOINT = ".cones.unbalances:solve_polished", ".mounts.nonlinear:solve_joint"
+_STARS = ".stars.phasing_solver:solve_phasing"
 _OWN: tuple[Method, ...] = (
     Method("evaluation", {}, Reach.WHOLE, ".conclusion:state", norms=lambda _: True,
            proves="the value itself"),
@@ -246,7 +246,7 @@ def refuse(problem: Problem) -> None:
         words = " and ".join(kind.name.lower() for kind in sorted(kinds))
         raise ModelError(f"{words} is open and nothing is minimised; add [objective] or [mounts]")
     if problem.phasing is not None and _method(problem).home == _STARS:
-        call_by_name("laufruhe.solvers.stars.answers:refuse", problem)
+        call_by_name("laufruhe.solvers.stars.even_search:refuse_long", problem)
 
 
 def _decided(problem: Problem, left: Sequence[Reduction] | None = None) -> Result:
@@ -263,7 +263,7 @@ def _by_method(problem: Problem) -> Result:
     method, kinds = _method(problem), kinds_of(problem)
     # what is decided apart is asked once more, each part by itself
     report_progress(method.name)
-    conflict = beyond_mounts(problem) if Kind.MOUNT in method.decides and kinds <= {_U, _K, _M} else ()
+    conflict = conflict_on_any_mounts(problem) if Kind.MOUNT in method.decides and kinds <= {_U, _K, _M} else ()
     if conflict:
         return none_within(problem, evaluate_start(problem), conflict, {})
     closing = _closing(problem, kinds, method)
@@ -288,8 +288,8 @@ def _without_fixed_limits(problem: Problem, decide: Decide, _: Decide) -> Result
     given = evaluate_start(problem)
     # what cannot be evaluated is refused first
     objective_value(problem, given)
-    problem, least = with_room(problem, fixed, given)
-    broken = surely_broken(fixed, least)
+    problem, least = exclude_collisions(problem, fixed, given)
+    broken = broken_limits(fixed, with_fine_sampling(least))
     if broken:
         return none_within(problem, given, broken, {})
     moved = tuple(limit for limit in problem.limits if limit not in fixed)

@@ -128,9 +128,9 @@ def _moved(phasing: Phasing, star: Candidate, known: Result) -> Engine | None:
 
         moves = ThrowMoves(phasing, phasing.layout_of(star), star, phasing.intervals)
         return _engine(solve_moved(_begun(problem, known), moves, None)[0])
-    from laufruhe.solvers.throws.uneven import local_optimum
+    from laufruhe.solvers.throws.uneven_throws import local_optimum
 
-    found = local_optimum(phasing, star, phasing.intervals, beside=False)
+    found = local_optimum(phasing, star, phasing.intervals, nudged=False)
     return None if found is None else _engine(found.result)
 
 

@@ -14,8 +14,7 @@ from laufruhe.problem.decision import Decision
 from laufruhe.problem.measure import Limit, Side
 from laufruhe.problem.sets import EDGE
 from laufruhe.prove.certificate import Bound
-from laufruhe.solvers.cones.program import told
-from laufruhe.solvers.cones.rows import Rows
+from laufruhe.solvers.cones.cone_program import ConeRows, run_clarabel
 
 ALIKE = 0.02
 """Share of the larger price up to which two sides are one."""
@@ -208,10 +207,10 @@ class _Program:
         """Return the least cost; less than any number where it has none, and no number where the solver stopped."""
         import clarabel
 
-        rows = Rows(len(cost))
+        rows = ConeRows(len(cost))
         rows.add(np.arange(len(self.right))[:, None], np.arange(len(cost)), self.rows, self.right)
         rows.cones += [clarabel.ZeroConeT(self.equal), clarabel.NonnegativeConeT(len(self.right) - self.equal)]
-        answer = told(rows, cost, {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10})
+        answer = run_clarabel(rows, cost, {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10})
         status = str(answer.status)
         if "DualInfeasible" in status:
             return -math.inf

@@ -29,8 +29,8 @@ from laufruhe.prove.certificate import withheld
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import Design, decided, limit_values, values_of
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.stars.conclusion import phase_decisions
 from laufruhe.solvers.stars.ranking import candidates_of, ranked_star
+from laufruhe.solvers.stars.star_results import phase_decisions
 from laufruhe.solvers.told_limits import told_excess
 from laufruhe.solvers.values import ObjectiveValue, RankValue
 from laufruhe.solvers.withheld import without_proof

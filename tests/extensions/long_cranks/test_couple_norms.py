@@ -9,17 +9,16 @@ import numpy as np
 import pytest
 
 from lanes import first_fast
-from laufruhe.extensions.long_cranks.couples import CoupleNorms, CoupleTerm, couple_norms, three_stars
-from laufruhe.extensions.long_cranks.search import search_stars
-from laufruhe.extensions.long_cranks.starts import _blocks, good_starts, swaps
+from laufruhe.extensions.long_cranks.couple_objectives import CoupleNorms, CoupleTerm, couple_norms, three_stars
+from laufruhe.extensions.long_cranks.couple_search import _blocks, good_starts, search_stars, swaps
 from laufruhe.numerics.norms import NORMS, Grid
 from laufruhe.physics.crank_stars import Stars, star_sums
 from laufruhe.problem.evaluation import evaluate, objective_value, with_fine_sampling
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
+from laufruhe.solvers.stars.enumeration import enumerate_stars
 from laufruhe.solvers.stars.families import Family, families_of
-from laufruhe.solvers.stars.search import enumerate_stars
 from phasing import engines
 
 MOUNTS = (
@@ -54,7 +53,7 @@ def norms_of(problem: Problem, family: Family) -> CoupleNorms | None:
     return couple_norms(problem, family.space, [of_star(problem, family, star) for star in three_stars(family.space)])
 
 
-def every_star(family: Family) -> Stars:
+def even_stars(family: Family) -> Stars:
     first = family.first
     found = {(0, *rest) for rest in itertools.islice(itertools.permutations(first[1:]), 2000)}
     return np.array(sorted(found)[:: max(1, len(found) // 60)], dtype=np.uint8)
@@ -65,7 +64,7 @@ def every_star(family: Family) -> Stars:
 def test_couples_say_what_the_exact_model_says(cylinders, cycle, name, gas, tmp_path):
     """Values are no more than those of the cycle and near them; what is worth as little lies in the window."""
     problem, family = asked(tmp_path, cylinders, cycle, name, gas)
-    own, stars = norms_of(problem, family), every_star(family)
+    own, stars = norms_of(problem, family), even_stars(family)
     assert own is not None
     exact = np.array([
         objective_value(problem, with_fine_sampling(evaluate(of_star(problem, family, star)))) for star in stars

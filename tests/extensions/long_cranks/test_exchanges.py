@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from laufruhe.extensions.long_cranks.exchange import exchanges, improved
+from laufruhe.extensions.long_cranks.long_crank_search import exchanges, improved
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.stars import answers
-from laufruhe.solvers.stars.program import coarse_value, owners_of
+from laufruhe.solvers.stars import even_search
+from laufruhe.solvers.stars.star_program import coarse_value, shaft_owners
 from phasing import engines
 from phasing.test_designs import CASES, TWO_SHAFTS, model_of
 
@@ -20,7 +20,7 @@ def test_exchanges_reach_what_cuts_prove(tmp_path, monkeypatch, cylinders):
     problem = engines.problem(tmp_path, cylinders, phasing="best = 1\nmost_shafts = 1", rest=rest)
     proven = solve(problem)
     assert proven.certificate.kind is Proof.GLOBAL
-    monkeypatch.setattr(answers, "MOST_LISTED", 0)
+    monkeypatch.setattr(even_search, "MOST_LISTED", 0)
     found = solve(problem)
     assert "exchanges of throws" in found.certificate.method
     assert sum(d.value for d in found.decisions if d.name.endswith("built")) <= 1
@@ -33,7 +33,7 @@ def test_exchanges_lead_to_stars_that_no_exchange_betters(tmp_path, name):
     choice = "most_shafts = 1" if name == "shafts" else ""
     problem = engines.problem(tmp_path, 5, phasing=choice, rest=CASES[name])
     model, stars = model_of(problem)
-    owners = owners_of(model)
+    owners = shaft_owners(model)
     values = {tuple(map(int, star)): coarse_value(model, tuple(map(int, star)), (), owners) for star in stars}
     worst = max(values, key=values.__getitem__)
     found = improved(model, worst, (), owners)

@@ -13,7 +13,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
-from laufruhe.solvers.stars.answers import MOST_LISTED
+from laufruhe.solvers.stars.even_search import MOST_LISTED
 from laufruhe.solvers.stars.families import families_of
 from phasing import engines
 from problem_files import changed

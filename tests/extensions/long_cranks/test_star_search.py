@@ -9,17 +9,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from laufruhe.extensions.long_cranks import search as star_search
-from laufruhe.extensions.long_cranks import starts
-from laufruhe.extensions.long_cranks.amplitudes import StarAmplitudes
-from laufruhe.extensions.long_cranks.halves import Free, Window, meeting, shares_of, work_of
-from laufruhe.extensions.long_cranks.search import search_stars
+from laufruhe.extensions.long_cranks import couple_search as star_search
+from laufruhe.extensions.long_cranks.couple_objectives import StarAmplitudes
+from laufruhe.extensions.long_cranks.couple_search import search_stars
+from laufruhe.extensions.long_cranks.throw_halves import Free, Window, meeting, shares_of, work_of
 from laufruhe.load_models.amplitudes import AmplitudeTerm
 from laufruhe.machine.layouts import inline
 from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.physics.crank_stars import star_sums
 from laufruhe.physics.star_space import StarSpace, outside_in
-from laufruhe.solvers.stars.search import enumerate_stars
+from laufruhe.solvers.stars.enumeration import enumerate_stars
 
 NONE = (0.0,) * 4
 ORDERS = (1, 2, 3, 4)
@@ -84,7 +83,7 @@ def test_halves_meet_in_every_star_of_a_window(throws, name, share, data):
     values = objective.values(space, every)
     cut = share * float(np.median(values)) + 1e-9
     window = objective.window(space, space.patterns[0], cut)
-    free = Free.whole(space.patterns[0])
+    free = Free.from_pattern(space.patterns[0])
     blocks = [
         space.canonical(block)
         for own in shares_of(space, free)
@@ -103,7 +102,10 @@ def test_halves_meet_in_every_star_of_a_window(throws, name, share, data):
 @pytest.mark.parametrize("throws", [5, 8, 11])
 def test_some_throws_are_arranged_in_every_order(throws):
     """Of free throws all orders are met where the window is wide, and the others stay."""
-    space, free = replace(whole(throws), reflect=False), Free.of(np.arange(throws, dtype=np.uint8), (1, 2, 3, 4))
+    space, free = (
+        replace(whole(throws), reflect=False),
+        Free.from_throws(np.arange(throws, dtype=np.uint8), (1, 2, 3, 4)),
+    )
     wide = Window(1, complex(-np.inf, -np.inf), complex(np.inf, np.inf))
     found = np.concatenate([block for own in shares_of(space, free) for block in meeting(space, free, own, wide)])
     assert len(np.unique(found, axis=0)) == len(found) == 24
@@ -113,9 +115,9 @@ def test_some_throws_are_arranged_in_every_order(throws):
 @pytest.mark.parametrize("throws", [4, 7, 9, 10])
 def test_arrangements_are_counted(throws):
     for space in (whole(throws), *((in_pairs(throws),) if throws % 2 == 0 else ())):
-        free = Free.whole(space.patterns[0])
+        free = Free.from_pattern(space.patterns[0])
         ways = len(shares_of(replace(space, reflect=False), free))
-        assert work_of(replace(space, reflect=False)) == free.each * ways
+        assert work_of(replace(space, reflect=False)) == free.arrangements * ways
         assert len(shares_of(space, free)) * 2 <= ways + 2 ** (throws // 2)
 
 
@@ -184,7 +186,7 @@ def test_a_search_that_nothing_is_left_of_ends(throws):
 def test_a_piece_may_be_left_without_stars(monkeypatch):
     """All that stand in pieces may be excluded before the pieces are many."""
     monkeypatch.setattr(star_search, "WORTH_SHARING", 0)
-    monkeypatch.setattr(starts, "STARTS", 40)
+    monkeypatch.setattr(star_search, "STARTS", 40)
     space, objective = whole(7), OBJECTIVES["one order"]
     found = search_stars(space, objective, 1)
     assert found.complete
@@ -193,13 +195,13 @@ def test_a_piece_may_be_left_without_stars(monkeypatch):
 
 def test_a_piece_without_an_answer_leaves_the_search_open(monkeypatch):
     """What nobody looked at may hold a better star: nothing is proven but what holds of every star."""
-    given, objective, space = star_search.each, OBJECTIVES["rms of four"], whole(6)
+    given, objective, space = star_search.unordered_map, OBJECTIVES["rms of four"], whole(6)
 
     def all_but_one(work, pieces, *more, **keys):
         yield from list(given(work, pieces, *more, **keys))[1:]
 
     assert search_stars(space, objective).complete
-    monkeypatch.setattr(star_search, "each", all_but_one)
+    monkeypatch.setattr(star_search, "unordered_map", all_but_one)
     found = search_stars(space, objective)
     assert not found.complete
     assert found.lower_bound == objective.least(space)

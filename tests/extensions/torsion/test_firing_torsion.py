@@ -19,8 +19,8 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.stars.enumeration import enumerate_orders
 from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.firing_search import enumerate_orders
 from problem_files import PROBLEMS
 
 READY = PROBLEMS / "inline-five-torsion.toml"

@@ -12,7 +12,7 @@ from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.prove.certificate import Bound, Multipliers, best_bound, lower_bound, spread
 from laufruhe.solvers.cones.conic import rows_near, rows_of, solve_cones
-from laufruhe.solvers.cones.equations import on_grid
+from laufruhe.solvers.cones.equations import refine_multipliers
 
 ROWS, LEAST_SAMPLES = (1000, 3000), 24
 """Rows of all norms at fewer samples, in the order in which they are tried; and samples that are left at the least."""
@@ -53,9 +53,9 @@ def _best(problem: AffineProblem) -> tuple[Array | None, Bound]:
         coarse = coarser(problem, times)
         found = solve_cones(coarse)
         if found.x is None:
-            limits = spread(problem, on_grid(coarse, problem, replace(found.multipliers, terms=()))).limits
+            limits = spread(problem, refine_multipliers(coarse, problem, replace(found.multipliers, terms=()))).limits
             return None, replace(best, multipliers=replace(best.multipliers, limits=limits))
-        x, best = found.x, best_bound(problem, found.x, on_grid(coarse, problem, found.multipliers))
+        x, best = found.x, best_bound(problem, found.x, refine_multipliers(coarse, problem, found.multipliers))
         if times > 1 and _few_count(problem):
             x, best = _peaks(problem, x, best)
         if problem.objective(x) - best.value <= ENOUGH * best.value:

@@ -5,4 +5,4 @@ Without it the stars of shorter cranks are looked at one by one, and longer ones
 
 from laufruhe.extension import Extension
 
-EXTENSION = Extension("long_cranks", methods=("laufruhe.extensions.long_cranks.method:LONG_CRANKS",))
+EXTENSION = Extension("long_cranks", methods=("laufruhe.extensions.long_cranks.long_crank_method:LONG_CRANKS",))

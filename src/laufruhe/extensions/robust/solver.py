@@ -40,7 +40,7 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, READINGS, Shown, judged, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.cones.unbalances import conflict_of, is_empty, tightened
+from laufruhe.solvers.cones.unbalances import is_infeasible, smallest_conflict, tighten_limits
 from laufruhe.solvers.general import solve_star_by_star
 from laufruhe.solvers.result import Result, Status
 
@@ -252,13 +252,13 @@ class _Program:
     def solved(self, samples: int) -> tuple[tuple[Value, ...], float] | None:
         """Return its optimum and the bound of all designs; None where no design keeps the limits at these angles."""
         coarse, owners = self.at(samples)
-        coarse = tightened(coarse, self.margin)
+        coarse = tighten_limits(coarse, self.margin)
         solution = solve_cones(coarse)
         if solution.x is None:
             # margins, and means of a few angles, forbid what is allowed (P7)
             averaged, _ = self.at(samples, averaged=True)
             names = [limit.name for _, limit in owners]
-            self.conflict = tuple(dict.fromkeys(conflict_of(averaged, names))) if is_empty(averaged) else ()
+            self.conflict = tuple(dict.fromkeys(smallest_conflict(averaged, names))) if is_infeasible(averaged) else ()
             return None
         shares = solution.shares
         terms = tuple(z for z, k in zip(solution.multipliers.terms, coarse.groups, strict=True) if shares[k] > 0.0)

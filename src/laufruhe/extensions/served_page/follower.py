@@ -21,8 +21,9 @@ from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import best_bound, gap_of
 from laufruhe.solvers.conclusion import KEPT
 from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.cones.equations import on_grid
-from laufruhe.solvers.cones.unbalances import conflict_of, settled
+from laufruhe.solvers.cones.equations import refine_multipliers
+from laufruhe.solvers.cones.tie_break import break_ties
+from laufruhe.solvers.cones.unbalances import smallest_conflict
 
 FEW_ANGLES = 48
 """Over the period of the loads, where the problem itself takes more."""
@@ -102,12 +103,12 @@ class Follower:
             # rows that are never more than what they stand for: where these contradict each other, the cycle does
             solution = solve_cones(averaged)
             if solution.x is None:
-                return _conflict(conflict_of(averaged, names))
+                return _conflict(smallest_conflict(averaged, names))
             bound = best_bound(averaged, solution.x, solution.multipliers)
         else:
-            solution = replace(solution, x=settled(self._problem, fine, solution.x))
+            solution = replace(solution, x=break_ties(self._problem, fine, solution.x))
             assert solution.x is not None
-            bound = best_bound(averaged, solution.x, on_grid(coarse, averaged, solution.multipliers))
+            bound = best_bound(averaged, solution.x, refine_multipliers(coarse, averaged, solution.multipliers))
         assert solution.x is not None
         x, value = solution.x, fine.objective(solution.x)
         price = dict(zip(names, bound.multipliers.shadow_prices(averaged), strict=True))

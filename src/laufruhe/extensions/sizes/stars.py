@@ -12,10 +12,10 @@ from laufruhe.errors import ModelError
 from laufruhe.extensions.sizes.solver import solve_sizes
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.stars.conclusion import no_star
 from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.phasing import by_each_order, every_star
-from laufruhe.solvers.throws.starts import none_fires
+from laufruhe.solvers.stars.phasing_solver import even_stars, solve_each_order
+from laufruhe.solvers.stars.star_results import no_star
+from laufruhe.solvers.throws.throw_starts import why_none_fires
 
 MOST_STARS = 60
 """That are decided one by one."""
@@ -39,8 +39,8 @@ def solve_star_sizes(problem: Problem) -> Result:
     if phasing.throws is None and sum(family.size for family in families_of(phasing)[0]) > MOST_STARS:
         many = f"more than {MOST_STARS} stars are open together with sizes"
         raise ModelError(f"{many}; fix the firing order or the sizes")
-    stars = every_star(phasing)
+    stars = even_stars(phasing)
     if not stars:
-        return no_star(problem, none_fires(phasing)[0])
-    found = by_each_order(problem, phasing, stars, solve_sizes)
+        return no_star(problem, why_none_fires(phasing)[0])
+    found = solve_each_order(problem, phasing, stars, solve_sizes)
     return replace(found, timing={**found.timing, "phasing": time.perf_counter() - started})

@@ -1,1 +1,1 @@
-"""What no stars and no throws do better than."""
+"""Lower bounds over crank stars and throws."""

@@ -1,10 +1,9 @@
-"""What a bound leaves of throws between bounds: the least of sums of waves over their arcs (S27, S30).
+"""Bounds of sums of waves over arcs of throw angles (S27, S30).
 
-With multipliers given, what is minimised and limited is no less than a constant and, of every throw by
-itself, a function Re sum_h c_h e^{i h theta} + s theta of its angle. Its least value between two bounds
-is found on a grid, with the most that it can fall between two angles taken off. An open bank angle, or that of split
-pins, is one angle that all these functions share: with it given they are of one throw each again, so that the least of
-their sum is that over it of the sum of the least.
+With given multipliers, objective and limits are no less than a constant and, for every throw by itself, a function
+Re sum_h c_h e^{i h theta} + s theta of its angle. Its minimum between two bounds is taken on a grid, less the most that
+it can fall between two angles. An open bank or split-pin angle is shared by all these functions: with it fixed they are
+of one throw each again, so the minimum of the sum is that over the shared angle of the sum of minima.
 """
 
 from __future__ import annotations
@@ -17,52 +16,52 @@ import numpy as np
 from laufruhe.numerics.arrays import Array, ComplexArray
 
 GRIDS = (65, 33, 17)
-"""Angles of every throw and open angle, by how many angles are open beside throws."""
+"""Angles of every throw and shared angle, by how many shared angles are open."""
 
 
 class ArcBox:
-    """Angles of a box of throws, and of open angles that all of them share, and their waves e^{i (h theta + m . beta)}.
+    """Box of throws and shared angles, with the waves e^{i (h theta + m . beta)} at its angles.
 
     Parameters
     ----------
     orders
-        h and m of the waves that are followed, shape (waves, 1 + open angles); of those beyond only the size is known.
+        h and m of the waves whose phase counts, shape (waves, 1 + shared angles); of further waves only the size does.
     lower, upper
-        Of every throw, then of every open angle [rad].
+        Bounds of every throw, then of every shared angle [rad].
     """
 
     def __init__(self, orders: Array, lower: Array, upper: Array) -> None:
-        beside = orders.shape[1] - 1
-        self.throws, grid = len(lower) - beside, GRIDS[beside]
+        shared = orders.shape[1] - 1
+        self.throws, grid = len(lower) - shared, GRIDS[shared]
         self.angles = lower[:, None] + (upper - lower)[:, None] * np.linspace(0.0, 1.0, grid)
-        self._shared = np.array(list(product(*self.angles[self.throws :]))).reshape(grid**beside, beside)
+        self._shared = np.array(list(product(*self.angles[self.throws :]))).reshape(grid**shared, shared)
         self._by_throw = np.exp(1j * self.angles[: self.throws, :, None] * orders[:, 0])
         self._by_shared = np.exp(1j * self._shared @ orders[:, 1:].T)
-        # a function bends away from what is straight between angles by no more than the sum of a'' step^2 / 8 over
-        # them, and no wave by more than twice its size
+        # between angles a function leaves its chord by no more than the sum of a'' step^2 / 8 over them, and no wave
+        # by more than twice its size
         steps = np.square((upper - lower) / (grid - 1)) / 8.0
         bends = np.square(orders[:, 0]) * steps[: self.throws, None] + np.square(orders[:, 1:]) @ steps[self.throws :]
         self._bends = np.minimum(bends, 2.0)
 
     def functions(self, waves: ComplexArray, slopes: Array, shared: Array) -> Arcs:
-        """The sum over throws of Re sum_j c_j e^{i (h_j theta + m_j . beta)} + s theta, and of sigma . beta.
+        """Evaluate the sum over throws of Re sum_j c_j e^{i (h_j theta + m_j . beta)} + s theta, and of sigma . beta.
 
         Parameters
         ----------
         waves, slopes
             c, shape (throws, waves), and s of every throw.
         shared
-            sigma of every open angle.
+            sigma of every shared angle.
         """
-        followed, size = self._bends.shape[1], np.abs(waves)
-        turned = waves[:, None, :followed] * self._by_shared
+        count, size = self._bends.shape[1], np.abs(waves)
+        turned = waves[:, None, :count] * self._by_shared
         values = np.matmul(turned, self._by_throw.swapaxes(1, 2)).real
         values += slopes[:, None, None] * self.angles[: self.throws, None, :]
-        bend = float((size[:, :followed] * self._bends).sum() + size[:, followed:].sum())
-        # every throw by itself where open angles are told, and what that leaves together
-        least = values.min(axis=2)
-        total = least.sum(axis=0) + self._shared @ shared
-        by_throw = (values + (total - least)[:, :, None]).min(axis=1)
+        bend = float((size[:, :count] * self._bends).sum() + size[:, count:].sum())
+        # minimum over each throw by itself where shared angles are fixed, and what that leaves of the sum
+        minima = values.min(axis=2)
+        total = minima.sum(axis=0) + self._shared @ shared
+        by_throw = (values + (total - minima)[:, :, None]).min(axis=1)
         cells = total.reshape((self.angles.shape[1],) * len(shared))
         by_shared = [cells.min(axis=tuple(j for j in range(cells.ndim) if j != k))[None] for k in range(cells.ndim)]
         return Arcs(self.angles, np.concatenate([by_throw, *by_shared]), bend)
@@ -70,14 +69,14 @@ class ArcBox:
 
 @dataclass(frozen=True, eq=False)
 class Arcs:
-    """What a sum of functions of throws leaves over a box of their angles.
+    """Minima of a sum of functions of throws over a box of their angles.
 
     Attributes
     ----------
     angles, values
-        Of every throw and open angle, and the least of the sum with that angle given, shape (angles, grid).
+        Grid of every throw and shared angle, and the minimum of the sum with that angle fixed, shape (angles, grid).
     bend
-        What the sum may be less than at the nearest angles.
+        Most that the sum may fall between the angles of the grid.
     """
 
     angles: Array
@@ -85,16 +84,16 @@ class Arcs:
     bend: float
 
     @property
-    def least(self) -> float:
-        """Not exceeded."""
+    def minimum(self) -> float:
+        """Lower bound of the sum."""
         return float(self.values[0].min()) - self.bend
 
-    def kept(self, room: float) -> tuple[Array, Array] | None:
-        """Ends of the angles that leave less than `room` above the least; None if none do."""
-        # the least between two angles of the grid is bounded by both ends
-        open_ = np.minimum(self.values[:, :-1], self.values[:, 1:]) - self.bend - self.least < room
-        if not open_.any(axis=1).all():
+    def cut(self, margin: float) -> tuple[Array, Array] | None:
+        """Return bounds of the angles at which the sum may be less than `margin` above its minimum; None if nowhere."""
+        # between two angles of the grid both ends bound the sum
+        is_open = np.minimum(self.values[:, :-1], self.values[:, 1:]) - self.bend - self.minimum < margin
+        if not is_open.any(axis=1).all():
             return None
-        first, last = open_.argmax(axis=1), open_.shape[1] - 1 - open_[:, ::-1].argmax(axis=1)
-        rows = np.arange(len(open_))
+        first, last = is_open.argmax(axis=1), is_open.shape[1] - 1 - is_open[:, ::-1].argmax(axis=1)
+        rows = np.arange(len(is_open))
         return self.angles[rows, first], self.angles[rows, last + 1]

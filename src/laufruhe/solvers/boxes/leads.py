@@ -27,7 +27,7 @@ from laufruhe.solvers.boxes.box_designs import SHARE, RebalancedDesign, Rebalanc
 from laufruhe.solvers.boxes.search import search_from_grid
 from laufruhe.solvers.conclusion import judged
 from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.cones.equations import on_grid
+from laufruhe.solvers.cones.equations import refine_multipliers
 from laufruhe.solvers.result import Result
 
 MOST_BOXES, MOST_PROGRAMS = 20_000, 2_000
@@ -105,7 +105,7 @@ class LeadSearch(RebalancedSearch[_Box]):
             excluded = self._excluded(middle, half, coarse, rough[len(coarse.terms) :], limits)
             # the middle has no feasible design, but the halves may have one
             return excluded or LeadBound(0.0, math.inf, half)
-        bound = best_bound(fine, solution.x, on_grid(coarse, fine, solution.multipliers))
+        bound = best_bound(fine, solution.x, refine_multipliers(coarse, fine, solution.multipliers))
         return self.boxes.bound(middle, half, fine, norms, bound.multipliers)
 
     def _bound_without_unbalances(

@@ -1,4 +1,4 @@
-"""Designs that an objective does not tell apart: how far each unbalance may go and leave it least (P12)."""
+"""Designs that an objective does not tell apart: ranges of unbalances that leave it at its optimum (P12, P17)."""
 
 from __future__ import annotations
 
@@ -18,10 +18,9 @@ from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.numerical_zero import numerical_zero
-from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, judged, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
-from laufruhe.solvers.cones.lightest import distance
+from laufruhe.solvers.cones.tie_break import distance
 from laufruhe.solvers.prices import angle_name
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionRange
@@ -29,149 +28,137 @@ from laufruhe.solvers.values import DecisionRange
 MOST_OPEN = 16
 """Decisions whose ranges are sought: each takes two programs, or some more where its angle is open."""
 DIRECTIONS = 8
-FEW, ROOM = 180, 1e-7
+COARSE, ROOM = 180, 1e-7
 """Angles at which designs are compared, and the share by which a limit is wider there for a solver to find them."""
-GLANCE, LEAST, LITTLE, FAR, NEGLIGIBLE = 48, 1e-8, 1e-7, 10.0, 1e-2
-"""Angles at which is found out whether there are others at all; shares of the objective that a decision's whole size is
-worth in that, and where ends are sought; how many sizes off both aim; share of a size that is none."""
+COARSEST, FAINT, WEAK, FAR, NEGLIGIBLE = 48, 1e-8, 1e-7, 10.0, 1e-2
+"""Angles at which other designs are looked for at all; shares of the objective that a decision's whole size is worth
+there, and where ends are sought; sizes by which both aim away; share of a size that is none."""
 SHARES = (1.0, 0.99, 0.9, 0.5)
-"""Of the way to an end at which a design is tried: what a program knows of a peak is not its last digit."""
+"""Shares of the way to an end at which a design is tried: what a program knows of a peak is not its last digit."""
 FREE = 0.2
 """Least share of the largest decision, and least turn of an angle [rad], by which one is free."""
 
 
-def equal_designs(found: Result, limit: Limit) -> tuple[DecisionRange, ...]:
-    """Ends of every unbalance among the designs that keep the limits and this one; none where they are not affine.
+def equal_designs(result: Result, limit: Limit) -> tuple[DecisionRange, ...]:
+    """Return the range of every unbalance among designs within the limits and one more; none unless all are affine.
 
     Parameters
     ----------
-    found
+    result
         The best design of an objective.
     limit
         That objective at its least value.
     """
-    problem = found.problem
+    problem = result.problem
     affine = [decision for decision in problem.decisions if decision.is_affine]
     kinds = {decision.kind for decision in affine}
     moved = [bound for bound in (*problem.limits, limit) if depends(bound.measure.channel, kinds, problem)]
     problem = replace(problem, phasing=None, objective=(), limits=tuple(moved))
-    numbers = any(_has_no_cones(bound.measure) for bound in moved)
-    if not affine or len(affine) < len(problem.decisions) or len(affine) > MOST_OPEN or numbers or passed():
+    has_numbers = any(_has_no_cones(bound.measure) for bound in moved)
+    if not affine or len(affine) < len(problem.decisions) or len(affine) > MOST_OPEN or has_numbers or passed():
         return ()
     model = AffineModel(problem)
-    rows = model.at(min(model.full_samples, FEW))
-    values = unbalances_of(found.problem, found)
-    x = vector_of(model.domains, values)
-    rows = _kept_by(rows, x)
-    sizes = [(domain, [_size(domain, end) for end in _ends(rows, domain)]) for domain in model.domains]
-    return tuple(
-        DecisionRange(domain.decision.name, domain.decision.unit, min(own), max(own))
-        for domain, own in sizes
-        if len(own) > 1
-    )
+    x = vector_of(model.domains, unbalances_of(result.problem, result))
+    rows = _widen_limits(model.at(min(model.full_samples, COARSE)), x)
+    ranges = []
+    for domain in model.domains:
+        bounds = domain.set
+        # the least and the largest size; of an open angle the largest along some directions
+        if domain.width == 1:
+            targets = [np.array([bounds.lower]), np.array([bounds.upper])]
+        else:
+            turns = (cmath.exp(2j * math.pi * k / DIRECTIONS) for k in range(DIRECTIONS))
+            targets = [np.zeros(2), *(bounds.upper * np.array([turn.real, turn.imag]) for turn in turns)]
+        ends = [end for target in targets for end in _approach(rows, distance(domain, target, rows.size), 1.0)]
+        sizes = [_size(domain, end) for end in ends]
+        if len(sizes) > 1:
+            ranges.append(DecisionRange(domain.decision.name, domain.decision.unit, min(sizes), max(sizes)))
+    return tuple(ranges)
 
 
-def free_decisions(found: Result) -> tuple[DecisionRange, ...] | None:
-    """Decisions that an optimum leaves free, and values between which each may lie at no loss (P17).
+def free_decisions(result: Result) -> tuple[DecisionRange, ...] | None:
+    """Return decisions that an optimum leaves free, and values between which each may lie at no loss (P17).
 
-    Both are of designs that the exact model shows to be as good within the tolerance, and all between two of them are:
-    objective and limits are convex. There may be designs beyond. None where it is not looked at.
+    Both values are of designs that the exact model shows to be as good within the tolerance, and so are all between
+    two of them, for objective and limits are convex. There may be designs beyond. None where it is not looked at.
     """
-    problem = replace(found.problem, phasing=None)
-    of_numbers = any(_has_no_cones(measure) for measure in problem.measures)
-    plain = not problem.extras and not problem.ranks and not of_numbers
-    affine = all(decision.is_affine for decision in problem.decisions)
-    if not (plain and affine and 0 < len(problem.decisions) <= MOST_OPEN) or passed():
+    problem = replace(result.problem, phasing=None)
+    is_plain = not problem.extras and not problem.ranks and not any(map(_has_no_cones, problem.measures))
+    is_affine = all(decision.is_affine for decision in problem.decisions)
+    if not (is_plain and is_affine and 0 < len(problem.decisions) <= MOST_OPEN) or passed():
         return None
     model = AffineModel(problem)
-    x = columns_of(model.domains, unbalances_of(problem, found))
-    rows = _kept_by(model.at(min(model.full_samples, GLANCE)), x)
-    others = [] if rows.groups else _around(rows, x, LEAST)
+    x = columns_of(model.domains, unbalances_of(problem, result))
+    rows = _widen_limits(model.at(min(model.full_samples, COARSEST)), x)
+    others = [] if rows.groups else _ends(rows, x, FAINT)
     if not others:
         return None
     if not _moving(rows, [x, *others]):
         return ()
-    rows = _kept_by(model.at(min(model.full_samples, FEW)), x)
-    designs = [x, *(good for end in _around(rows, x, LITTLE) for good in _good(found, problem, model, x, end))]
-    return tuple(told for domain in _moving(rows, designs) for told in _ranges(domain, designs))
+    rows = _widen_limits(model.at(min(model.full_samples, COARSE)), x)
+    highest = objective_value(problem, result.final) * (1.0 + problem.tolerance)
+    highest += numerical_zero(problem, result.final.engine)
+    designs = [x]
+    for end in _ends(rows, x, WEAK):
+        # the farthest design towards the end that the exact model shows to be as good
+        for share in SHARES:
+            there = x + share * (end - x)
+            values = [domain.complex_value(there) for domain in model.domains]
+            design = judged(problem, values, result.final.samples)
+            if design.value <= highest and design.excess <= KEPT:
+                designs.append(there)
+                break
+    return tuple(entry for domain in _moving(rows, designs) for entry in ranges_of(domain, designs))
 
 
 def _has_no_cones(measure: Measure) -> bool:
     return measure.channel.is_number or not measure.norm.is_convex
 
 
-def _kept_by(rows: AffineProblem, x: Array) -> AffineProblem:
-    """With limits that a design keeps: at few angles a mean is another one."""
+def _widen_limits(rows: AffineProblem, x: Array) -> AffineProblem:
+    # at few angles a mean is another one
     limits = tuple((max(most, norm.value(x) * (1.0 + ROOM)) if most else 0.0, norm) for most, norm in rows.limits)
     return replace(rows, limits=limits)
 
 
-def _around(rows: AffineProblem, x: Array, share: float) -> list[Array]:
-    """Designs on either side of all that are as good."""
+def _ends(rows: AffineProblem, x: Array, share: float) -> list[Array]:
     aim = np.random.default_rng(1964).standard_normal(rows.size)
     slope = np.diag(1.0 / rows.units)[None]
     targets = (x / rows.units + sign * FAR * aim for sign in (-1.0, 1.0))
     far = (AffineNorm(MEAN, -target[None], slope, Grid(np.ones(1), 1)) for target in targets)
     weight = share * (rows.objective(x) or 1.0)
-    return [end for norm in far for end in _toward(rows, norm, weight)]
+    return [end for norm in far for end in _approach(rows, norm, weight)]
+
+
+def _approach(rows: AffineProblem, goal: AffineNorm, weight: float) -> list[Array]:
+    x = solve_cones(replace(rows, terms=(*rows.terms, (weight, goal)))).x
+    return [] if x is None or rows.excess(x) > 10.0 * FEASIBLE else [x]
 
 
 def _moving(rows: AffineProblem, designs: Sequence[Array]) -> list[Domain]:
-    """Decisions that designs have apart, beside the largest of their unit and what they could be."""
-    apart = np.ptp(designs, axis=0)
+    spans = np.ptp(designs, axis=0)
     most = {d.decision.unit: 0.0 for d in rows.domains}
     for domain in rows.domains:
-        sizes = [abs(_size(domain, found)) for found in designs]
+        sizes = [abs(_size(domain, design)) for design in designs]
         most[domain.decision.unit] = max(most[domain.decision.unit], *sizes, NEGLIGIBLE * rows.units[domain.start])
-    return [d for d in rows.domains if np.hypot.reduce(apart[d.columns]) > FREE * most[d.decision.unit]]
+    return [d for d in rows.domains if np.hypot.reduce(spans[d.columns]) > FREE * most[d.decision.unit]]
 
 
-def _good(found: Result, problem: Problem, model: AffineModel, x: Array, end: Array) -> list[Array]:
-    """The design farthest from the optimum towards an end that the exact model shows to be as good."""
-    most = objective_value(problem, found.final) * (1.0 + problem.tolerance) + numerical_zero(
-        problem, found.final.engine
-    )
-    for share in SHARES:
-        there = x + share * (end - x)
-        values = [domain.complex_value(there) for domain in model.domains]
-        design = judged(problem, values, found.final.samples)
-        if design.value <= most and design.excess <= KEPT:
-            return [there]
-    return []
-
-
-def _ranges(domain: Domain, designs: Sequence[Array]) -> list[DecisionRange]:
-    """Of the size, and of the angle where that is open and turns."""
-    sizes = [_size(domain, found) for found in designs]
-    least, largest = min(sizes), max(sizes)
+def ranges_of(domain: Domain, designs: Sequence[Array]) -> list[DecisionRange]:
+    """Return the range of a decision's size among designs, and of its angle where that is open and turns."""
+    sizes = [_size(domain, design) for design in designs]
+    smallest, largest = min(sizes), max(sizes)
     decision = domain.decision
-    told = []
-    if largest - least > FREE * max(abs(least), abs(largest)):
-        told.append(DecisionRange(decision.name, decision.unit, least, largest))
-    if domain.width > 1 and least > FREE * largest:
+    ranges = []
+    if largest - smallest > FREE * max(abs(smallest), abs(largest)):
+        ranges.append(DecisionRange(decision.name, decision.unit, smallest, largest))
+    if domain.width > 1 and smallest > FREE * largest:
         first = domain.complex_value(designs[0])
-        turns = [cmath.phase(domain.complex_value(found) / first) for found in designs]
+        turns = [cmath.phase(domain.complex_value(design) / first) for design in designs]
         if max(turns) - min(turns) > FREE:
             at = cmath.phase(first)
-            told.append(DecisionRange(angle_name(decision), "rad", at + min(turns), at + max(turns)))
-    return told
-
-
-def _ends(rows: AffineProblem, domain: Domain) -> list[Array]:
-    """Designs of least and largest size that are attained; of an open angle the largest along some directions."""
-    own = domain.set
-    if domain.width == 1:
-        targets = [np.array([own.lower]), np.array([own.upper])]
-    else:
-        turns = (cmath.exp(2j * math.pi * k / DIRECTIONS) for k in range(DIRECTIONS))
-        targets = [np.zeros(2), *(own.upper * np.array([turn.real, turn.imag]) for turn in turns)]
-    return [end for target in targets for end in _toward(rows, distance(domain, target, rows.size), 1.0)]
-
-
-def _toward(rows: AffineProblem, far: AffineNorm, weight: float) -> list[Array]:
-    """The design that comes nearest to something, beside what is minimised."""
-    found = solve_cones(replace(rows, terms=(*rows.terms, (weight, far))))
-    return [] if found.x is None or rows.excess(found.x) > 10.0 * FEASIBLE else [found.x]
+            ranges.append(DecisionRange(angle_name(decision), "rad", at + min(turns), at + max(turns)))
+    return ranges
 
 
 def _size(domain: Domain, x: Array) -> float:

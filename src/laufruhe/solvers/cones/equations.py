@@ -1,8 +1,8 @@
-"""Limits of zero are equations between the decisions, which are kept to the last digit (P11).
+"""Limits of zero as equations between the decisions, kept to the last digit (P11).
 
-Where the sum of all loads of a kind is to vanish, V0 + B x = 0, no cone has an inside that a solver could go through.
-The rows of such limits are brought to as many equations as there are directions in which they act. Dual rows of a
-limit of zero cost nothing, whatever they are, so that a bound may take those that make it level.
+Where the sum of all loads of a kind is to vanish, V0 + B x = 0, no cone has an interior that a solver could go
+through. The rows of such limits are reduced to as many equations as there are directions in which they act. Dual rows
+of a limit of zero cost nothing, so a bound may take those that level it.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import numpy as np
 from laufruhe.load_models.affine import AffineProblem
 from laufruhe.numerics.arrays import Array
 from laufruhe.prove.certificate import Multipliers
-from laufruhe.solvers.cones.program import projected
+from laufruhe.solvers.cones.cone_program import project_on_sets
 
 SAME = 1e-10
 """Share of what the decisions do, or of what is to vanish, under which there is nothing."""
-MOST_TURNS = 40
+MOST_PROJECTIONS = 40
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +29,9 @@ class Equations:
     Attributes
     ----------
     dual
-        Of every limit what makes dual rows of multipliers of the equations, shapes (k d, equations).
+        Matrix of every limit that makes its dual rows from multipliers of the equations, shape (k d, equations).
     shapes
-        Of the rows of every limit.
+        Shapes (k, d) of the rows of every limit.
     """
 
     matrix: Array
@@ -40,31 +40,31 @@ class Equations:
     dual: tuple[Array, ...]
     shapes: tuple[tuple[int, ...], ...]
 
-    def beside(self, held: tuple[Array, Array] | None) -> tuple[Array, Array]:
-        """With others that hold as well, these first."""
-        if held is None:
+    def joined_with(self, others: tuple[Array, Array] | None) -> tuple[Array, Array]:
+        """Return matrix and right side of these equations, followed by others."""
+        if others is None:
             return self.matrix, self.right
-        return np.concatenate([self.matrix, held[0]]), np.concatenate([self.right, held[1]])
+        return np.concatenate([self.matrix, others[0]]), np.concatenate([self.right, others[1]])
 
-    def kept(self, problem: AffineProblem, x: Array) -> Array:
-        """The decisions that keep the equations, near others and in their sets."""
-        for _ in range(MOST_TURNS):
+    def project(self, problem: AffineProblem, x: Array) -> Array:
+        """Return decisions near x that keep the equations and lie in their sets."""
+        for _ in range(MOST_PROJECTIONS):
             missing = self.right - self.matrix @ x
             x = x + self.units**2 * (missing @ self.matrix)
-            inside = projected(problem, x.copy())
+            inside = project_on_sets(problem, x.copy())
             if np.array_equal(inside, x):
                 break
             x = inside
         return x
 
-    def rows(self, prices: Array) -> list[Array]:
-        """Dual rows of the limits from the multipliers of the equations."""
-        own = prices[: len(self.right)]
-        return [(each @ own).reshape(shape) for each, shape in zip(self.dual, self.shapes, strict=True)]
+    def dual_rows(self, prices: Array) -> list[Array]:
+        """Return dual rows of every limit from the multipliers of the equations."""
+        multipliers = prices[: len(self.right)]
+        return [(matrix @ multipliers).reshape(shape) for matrix, shape in zip(self.dual, self.shapes, strict=True)]
 
 
 def equations_of(problem: AffineProblem, limits: Sequence[int]) -> Equations | None:
-    """What some limits of zero ask of the decisions; None where there is none, or they contradict each other."""
+    """Return the equations of limits of zero, given by number; None if there are none, or they contradict."""
     norms = [problem.limits[k][1] for k in limits]
     if not norms:
         return None
@@ -87,15 +87,15 @@ def equations_of(problem: AffineProblem, limits: Sequence[int]) -> Equations | N
     )  # fmt: skip
 
 
-def on_grid(coarse: AffineProblem, fine: AffineProblem, found: Multipliers) -> Multipliers:
-    """Dual rows of limits of zero on a finer grid, with the slope that they have on the coarse one."""
+def refine_multipliers(coarse: AffineProblem, fine: AffineProblem, multipliers: Multipliers) -> Multipliers:
+    """Replace dual rows of limits of zero by those of a finer grid that have the same slope."""
     equal = [k for k, (maximum, _) in enumerate(coarse.limits) if maximum == 0.0]
     equations = equations_of(fine, equal)
     if equations is None:
-        return found
-    slope = sum((coarse.limits[k][1].pulled(found.limits[k]) for k in equal), np.zeros(coarse.size))
-    rows = equations.rows(equations.matrix @ (equations.units**2 * slope))
-    limits = list(found.limits)
+        return multipliers
+    slope = sum((coarse.limits[k][1].pulled(multipliers.limits[k]) for k in equal), np.zeros(coarse.size))
+    rows = equations.dual_rows(equations.matrix @ (equations.units**2 * slope))
+    limits = list(multipliers.limits)
     for k, z in zip(equal, rows, strict=True):
         limits[k] = z
-    return Multipliers(found.terms, tuple(limits))
+    return Multipliers(multipliers.terms, tuple(limits))

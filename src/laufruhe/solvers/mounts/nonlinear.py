@@ -28,7 +28,7 @@ from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.provers import Question, proven, provers
 from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, decided, nearest_of, none_within, unbalances_of
-from laufruhe.solvers.cones.unbalances import beyond_mounts, solve_unbalances
+from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_unbalances
 from laufruhe.solvers.mounts.bounds import conflict_of, divided_by, excludes
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mounts.places import Place, judged_at
@@ -166,7 +166,7 @@ def _convex_part(problem: Problem) -> Problem | None:
 
 def _proven_conflict(problem: Problem) -> tuple[str, ...]:
     """Limits that cannot be met together, where what mounts do not touch or what is convex in them proves it."""
-    conflict = beyond_mounts(problem)
+    conflict = conflict_on_any_mounts(problem)
     if conflict:
         return conflict
     convex = _convex_part(problem)

@@ -37,13 +37,12 @@ from laufruhe.solvers.mounts.bounds import bounded_under, mount_numbers
 from laufruhe.solvers.mounts.nonlinear import solve_mounts, solve_moved
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.stars.answers import MOST_LISTED
-from laufruhe.solvers.stars.conclusion import no_star, with_star
-from laufruhe.solvers.stars.cuts import search_designs
-from laufruhe.solvers.stars.design import StarDesign
+from laufruhe.solvers.stars.cut_search import search_designs
+from laufruhe.solvers.stars.even_search import MOST_LISTED
 from laufruhe.solvers.stars.families import Family, families_of
-from laufruhe.solvers.stars.ranking import RankedStar, ranked_star, ranking_result, told_orders
-from laufruhe.solvers.throws.starts import firing_intervals, none_fires, starts_of
+from laufruhe.solvers.stars.ranking import RankedStar, distinct_orders, ranked_star, ranking_result
+from laufruhe.solvers.stars.star_results import StarDesign, no_star, with_star
+from laufruhe.solvers.throws.throw_starts import firing_intervals, starts_of, why_none_fires
 from laufruhe.solvers.told_limits import over_read
 
 MOST_SEARCHED = 3
@@ -87,7 +86,7 @@ def solve_star_mounts(problem: Problem) -> Result:
     started = time.perf_counter()
     ranking, count = _stars(problem, phasing)
     stars = [(replace(star, firing_order=order.order), steps) for star, steps in ranking
-             for order in told_orders(problem, _only(phasing, star, steps), star, steps)]  # fmt: skip
+             for order in distinct_orders(problem, _only(phasing, star, steps), star, steps)]  # fmt: skip
     designs = count - len(ranking) + len(stars)
     ranked = time.perf_counter()
     # searches and bounds have the same workers, whose start costs as much as a star
@@ -132,7 +131,10 @@ def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> t
         model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, numerical_zero(given)
     )
     stars: list[tuple[float, Star]] = [
-        (s.value, (family.candidate(phasing, s.star, phasing.without(s.built)), family.steps_of(s.star)))
+        (
+            s.value,
+            (family.candidate(phasing, s.star, phasing.without(s.built)), None if family.is_of_orders else s.star),
+        )
         for s in found.solved
     ]
     return stars, found.designs
@@ -231,7 +233,7 @@ def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign]) -> list[
 def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs: int) -> Result:
     given = evaluate(problem)
     if not found:
-        why, proven = none_fires(phasing)
+        why, proven = why_none_fires(phasing)
         return no_star(problem, why, Status.INFEASIBLE if proven else Status.FAILED)
     best = found[0]
     if _rank(best)[0]:

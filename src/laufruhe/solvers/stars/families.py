@@ -21,113 +21,88 @@ from laufruhe.problem.problem import Phasing
 
 @dataclass(frozen=True, eq=False)
 class Family:
-    """Even stars of one bank angle and split pin."""
+    """Even stars of one bank angle and split pin, or firing orders of cylinders that have a throw each (V9).
+
+    Attributes
+    ----------
+    geometry
+        Bank angle and split pin angle [rad]; None where the layout has none.
+    fixed
+        Steps of the only star, where the firing order is given.
+    is_of_orders
+        Whether every firing order is a design: the steps of its star are slots of the cycle.
+    """
 
     geometry: tuple[float | None, float | None]
     layout: Layout
     space: StarSpace
     fixed: tuple[int, ...] | None = None
+    is_of_orders: bool = False
 
     @property
     def size(self) -> int:
-        """Stars, images counted."""
+        """Number of stars, images counted."""
         return 1 if self.fixed is not None else self.space.size
 
     @property
     def first(self) -> tuple[int, ...]:
-        """One of the stars."""
+        """Steps of one of the stars."""
         return self.space.first if self.fixed is None else self.fixed
-
-    def candidate(self, phasing: Phasing, steps: Sequence[int], left_out: tuple[str, ...] = ()) -> Candidate:
-        """The design of a star, with the first of its firing orders."""
-        return phasing.star(steps, self.space.phases, self.geometry, left_out)
-
-    def steps_of(self, star: Sequence[int]) -> tuple[int, ...] | None:
-        """Steps of the throws of one of its stars; None of a firing order."""
-        return tuple(map(int, star))
-
-    def told(self, phasing: Phasing, candidate: Candidate) -> Phasing:
-        """What is open of one of its stars: the firing order, where it is."""
-        del candidate
-        return phasing
-
-    def model(self, phasing: Phasing, space: StarSpace | None = None) -> StarModel:
-        """Rows of every star, of those of another space where one is given."""
-        return StarModel(phasing, space or self.space, self.geometry, self.fixed)
 
     @property
     def stars(self) -> Stars:
-        """Every star, one of each set of images."""
+        """Stars, one of each set of images, shape (n, throws)."""
         if self.fixed is not None:
             return np.array([self.fixed], dtype=np.uint8)
         return np.concatenate(list(self.space.blocks()))
 
-
-class FiringFamily(Family):
-    """Firing orders of cylinders that have a throw each: a star for every one (V9)."""
-
     def candidate(self, phasing: Phasing, steps: Sequence[int], left_out: tuple[str, ...] = ()) -> Candidate:
-        """The design of a firing order."""
-        return phasing.fired(steps, self.geometry, left_out)
-
-    def steps_of(self, star: Sequence[int]) -> None:
-        """Its steps are slots of the cycle."""
-        del star
-
-    def told(self, phasing: Phasing, candidate: Candidate) -> Phasing:
-        """Nothing: its firing order is the design's own."""
-        return replace(phasing, firing_order=candidate.firing_order)
+        """Return the design of a star, with the first of its firing orders."""
+        if self.is_of_orders:
+            return phasing.fired(steps, self.geometry, left_out)
+        return phasing.star(steps, self.space.phases, self.geometry, left_out)
 
     def model(self, phasing: Phasing, space: StarSpace | None = None) -> StarModel:
-        """Rows of every firing order."""
-        return FiringModel(phasing, space or self.space, self.geometry, self.fixed)
+        """Return rows of every star, of those of another space where one is given."""
+        kind = FiringModel if self.is_of_orders else StarModel
+        return kind(phasing, space or self.space, self.geometry, self.fixed)
 
 
 def families_of(phasing: Phasing, by_firing: bool = False) -> tuple[tuple[Family, ...], str]:
-    """Stars that fire evenly for every geometry allowed; and why there are none.
+    """Return stars that fire evenly for every geometry allowed, and why there are none.
 
     Parameters
     ----------
     by_firing
-        Whether firing orders of one star are told apart, so that each of them is a design.
+        Whether firing orders of one star differ, so that each of them is a design.
     """
-    found, reason = [], "no bank angle and split pin within the bounds let the firing be even"
+    families, reason = [], "no bank angle and split pin within the bounds let the firing be even"
+    lattice = firing_lattice(phasing.cycle, phasing.cylinders)
+    order = phasing.firing_order
     for geometry in phasing.geometries:
         layout = phasing.layout(*geometry)
+        fixed = None
         try:
             patterns = even_patterns(phasing.cycle, layout)
-            fixed = _of_order(phasing, layout)
+            if order is not None:
+                throws = even_throws(phasing.cycle, layout, order)
+                fixed = tuple(round((angle - throws[0]) / math.tau * lattice.steps) % lattice.steps for angle in throws)
         except ModelError as error:
             reason = str(error)
             continue
-        steps = firing_lattice(phasing.cycle, phasing.cylinders).steps
-        if phasing.steps is not None and phasing.steps != steps:
-            throws = len(layout.throw_positions)
+        if phasing.steps is not None and phasing.steps != lattice.steps:
+            count = len(layout.throw_positions)
+            too_many = f"{phasing.steps} phases are more than {count} throws can take, and "
             reason = (
-                f"phasing.phases = {phasing.steps} conflicts with {throws} throws: "
-                + (
-                    f"{phasing.steps} phases are more than {throws} throws can take, and "
-                    if phasing.steps > throws
-                    else ""
-                )
-                + f"even firing stands on {steps}; leave phases out, or allow uneven intervals"
+                f"phasing.phases = {phasing.steps} conflicts with {count} throws: "
+                + too_many * (phasing.steps > count)
+                + f"even firing stands on {lattice.steps}; leave phases out, or allow uneven intervals"
             )
             continue
+        space = StarSpace(lattice.steps, patterns, layout.throw_positions)
+        family = Family(geometry, layout, space, fixed)
         if by_firing:
-            found.append(_by_firing(phasing, geometry, layout))
-        else:
-            found.append(Family(geometry, layout, StarSpace(steps, patterns, layout.throw_positions), fixed))
-    return tuple(found), reason
-
-
-def _by_firing(phasing: Phasing, geometry: tuple[float | None, float | None], layout: Layout) -> Family:
-    fixed = None if phasing.firing_order is None else order_slots(phasing.firing_order)
-    return FiringFamily(geometry, layout, slot_space(phasing.cylinders, layout.throw_positions), fixed)
-
-
-def _of_order(phasing: Phasing, layout: Layout) -> tuple[int, ...] | None:
-    if phasing.firing_order is None:
-        return None
-    throws = even_throws(phasing.cycle, layout, phasing.firing_order)
-    steps = firing_lattice(phasing.cycle, phasing.cylinders).steps
-    return tuple(round((angle - throws[0]) / math.tau * steps) % steps for angle in throws)
+            slots = slot_space(phasing.cylinders, layout.throw_positions)
+            family = replace(family, space=slots, fixed=order and order_slots(order), is_of_orders=True)
+        families.append(family)
+    return tuple(families), reason

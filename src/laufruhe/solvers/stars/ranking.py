@@ -1,4 +1,4 @@
-"""The best stars side by side, and the firing orders that belong to each (S8, S9, S17)."""
+"""Ranking of the best stars, and of the firing orders of each (S8, S9, S17)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.machine import firing
-from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.turns import as_turn, star_sum
 from laufruhe.problem.phasing import Candidate, Intervals, OrderCriterion
 from laufruhe.problem.problem import Phasing, Problem
@@ -21,7 +20,7 @@ ORDERS_LISTED = 6
 
 @dataclass(frozen=True)
 class RankedOrder:
-    """A firing order and what it is judged by.
+    """A firing order and the criteria that rank it.
 
     Attributes
     ----------
@@ -45,11 +44,11 @@ class RankedOrder:
 
     @property
     def is_even(self) -> bool:
-        """Whether all intervals are equal."""
+        """True if all intervals are equal."""
         return max(self.intervals) - min(self.intervals) <= 1e-9 * math.tau
 
-    def by(self, criterion: OrderCriterion) -> float:
-        """What a criterion sees, small is good."""
+    def score(self, criterion: OrderCriterion) -> float:
+        """Return the value of a criterion; small is good."""
         if criterion is OrderCriterion.NEIGHBOURS:
             return float(self.neighbours)
         exact = self.longest_gap if criterion is OrderCriterion.LONGEST_GAP else self.roll_content
@@ -58,7 +57,7 @@ class RankedOrder:
 
 @dataclass(frozen=True)
 class RankedStar:
-    """One design of a ranking.
+    """Entry of a ranking.
 
     Attributes
     ----------
@@ -69,8 +68,7 @@ class RankedStar:
     shafts
         Optional shafts that are built.
     value, lower_bound
-        Objective with everything else at its optimum, and what no design of this star
-        goes under [SI].
+        Objective with everything else at its optimum, and its bound over all designs of this star [SI].
     proven
         Whether no design left out of the ranking before this one is better.
     forces, couples
@@ -103,18 +101,18 @@ class RankedStar:
 
 @dataclass(frozen=True)
 class TradePoint:
-    """One design on the trade of objective against unevenness [rad, SI].
+    """Point on the trade of objective against unevenness [rad, SI].
 
     Attributes
     ----------
     allowed, deviation
         Largest deviation of an interval from even that was allowed, and that is used [rad].
     value, lower_bound
-        Objective, and what no design with this freedom goes under [SI].
+        Objective, and its bound over all designs with this freedom [SI].
     throws
         Angles [rad].
     kkt_residual
-        Of the nonlinear program.
+        Residual of the nonlinear program.
     """
 
     allowed: float
@@ -127,20 +125,20 @@ class TradePoint:
 
 @dataclass(frozen=True)
 class PhasingResult:
-    """What was decided of stars and firing orders, and how.
+    """Stars and firing orders that were decided, and how.
 
     Attributes
     ----------
     ranking
         Best first; the first one is the design of the result.
     places, banks
-        Of the throws along x [m], and of the cylinders [rad], for pictures.
+        Places of the throws along x [m], and banks of the cylinders [rad], for pictures.
     designs
-        How many stars, times sets of shafts, were to choose from.
+        Number of stars, times sets of shafts, to choose from.
     looked_at
         Partial and whole stars that the search looked at, or cone programs solved.
     method
-        In words.
+        Method in words.
     trade
         Objective against the largest deviation from even firing.
     even_value
@@ -160,12 +158,12 @@ class PhasingResult:
 def ranked_orders(
     phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None = None
 ) -> tuple[RankedOrder, ...]:
-    """Firing orders of a star that keep the intervals, best first (S8).
+    """Return firing orders of a star that keep the intervals, best first (S8).
 
     Parameters
     ----------
     steps
-        Of an even star; None for throws at any angle.
+        Steps of an even star; None for throws at any angle.
     """
     layout, throws = phasing.layout_of(candidate), candidate.throws
     orders: Iterable[tuple[int, ...]]
@@ -175,39 +173,41 @@ def ranked_orders(
         orders = firing.even_orders(phasing.cycle, layout, steps)
     else:
         orders = firing.lap_orders(phasing.cycle, layout, throws)
-    found = []
+    ranked = []
     for order in itertools.islice(orders, firing.MOST_ORDERS):
         turns = firing.firing_turns(layout, throws, order)
         intervals = firing.intervals_of(phasing.cycle, turns)
         if phasing.intervals.holds(intervals, 1e-6):
-            found.append(_judged(phasing, layout, order, turns, intervals))
-    found.sort(key=lambda o: (*(o.by(criterion) for criterion in phasing.criteria), o.order))
-    return tuple(found)
+            gap = firing.longest_bank_gap(phasing.cycle, layout, order, turns)
+            content = firing.order_content(phasing.cycle, turns)
+            ranked.append(RankedOrder(order, firing.successive_neighbours(layout, order), gap, content, intervals))
+    ranked.sort(key=lambda o: (*(o.score(criterion) for criterion in phasing.criteria), o.order))
+    return tuple(ranked)
 
 
-def none_of_given(phasing: Phasing, throws: Sequence[float]) -> str:
-    """Why throws as given have no firing order; empty where they have one."""
-    given = Candidate(tuple(throws), phasing.firing_order, *phasing.least_geometry)
-    if ranked_orders(phasing, given):
+def why_no_order(phasing: Phasing, throws: Sequence[float]) -> str:
+    """Return why throws as given [rad] have no firing order; empty where they have one."""
+    candidate = Candidate(tuple(throws), phasing.firing_order, *phasing.least_geometry)
+    if ranked_orders(phasing, candidate):
         return ""
-    orders = ranked_orders(replace(phasing, intervals=Intervals(0.0, math.inf)), given)
-    shown = ", ".join(f"{math.degrees(angle):g}" for angle in throws)
+    orders = ranked_orders(replace(phasing, intervals=Intervals(0.0, math.inf)), candidate)
+    angles = ", ".join(f"{math.degrees(angle):g}" for angle in throws)
     if not orders:
-        return f"throws [{shown}] deg let cylinders fire at once, and in a firing order each has its turn"
+        return f"throws [{angles}] deg let cylinders fire at once, and in a firing order each has its turn"
     nearest = min(orders, key=lambda o: max(o.intervals) - min(o.intervals))
-    text = f"throws [{shown}] deg contradict the firing intervals allowed, {phasing.intervals.shown}"
-    return f"{text}; the most even order of these throws has intervals {ends_of(nearest.intervals)}"
+    text = f"throws [{angles}] deg contradict the firing intervals allowed, {phasing.intervals.shown}"
+    return f"{text}; the most even order of these throws has intervals {interval_range(nearest.intervals)}"
 
 
-def ends_of(intervals: Sequence[float]) -> str:
-    """Shortest and longest of some firing intervals, in words."""
+def interval_range(intervals: Sequence[float]) -> str:
+    """Return the shortest and longest of some firing intervals [rad], in words."""
     return f"from {abs(math.degrees(min(intervals))):.6g} to {math.degrees(max(intervals)):.6g} deg"
 
 
-def told_orders(
+def distinct_orders(
     problem: Problem, phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None = None
 ) -> tuple[RankedOrder, ...]:
-    """Those of its firing orders that the loads tell apart: one, unless gas is felt and they are uneven (S8).
+    """Return firing orders of a star that the loads tell apart: one, unless gas is felt and they are uneven (S8).
 
     Each of them twists the crankshaft in a way of its own (V6).
     """
@@ -217,20 +217,8 @@ def told_orders(
     return orders if problem.feels_gas and not all(order.is_even for order in orders) else orders[:1]
 
 
-def _judged(
-    phasing: Phasing, layout: Layout, order: tuple[int, ...], turns: tuple[float, ...], intervals: tuple[float, ...]
-) -> RankedOrder:
-    return RankedOrder(
-        order,
-        firing.successive_neighbours(layout, order),
-        firing.longest_bank_gap(phasing.cycle, layout, order, turns),
-        firing.order_content(phasing.cycle, turns),
-        intervals,
-    )
-
-
 def free_balance(places: Sequence[float], throws: Sequence[float]) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """|F_h| and |C_h| of the orders of a ranking, for one force a throw and unit spacing (S1)."""
+    """Return |F_h| and |C_h| of the orders of a ranking, for one force a throw and unit spacing (S1)."""
     x = np.array(places)
     spacing = float(np.abs(np.diff(x)).max()) if len(x) > 1 else 1.0
     weights = np.stack([np.ones_like(x), x / spacing], axis=1)
@@ -241,7 +229,7 @@ def free_balance(places: Sequence[float], throws: Sequence[float]) -> tuple[tupl
 def ranked_star(
     phasing: Phasing, candidate: Candidate, steps: Sequence[int] | None, value: float, bound: float, proven: bool
 ) -> RankedStar:
-    """One entry of a ranking."""
+    """Return one entry of a ranking."""
     orders = ranked_orders(phasing, candidate, steps)
     forces, couples = free_balance(phasing.layout_of(candidate).throw_positions, candidate.throws)
     return RankedStar(
@@ -251,7 +239,7 @@ def ranked_star(
 
 
 def candidates_of(phasing: Phasing, ranking: Sequence[RankedStar], orders: int = 1) -> list[Candidate]:
-    """The designs of a ranking, each star with the first few of its firing orders."""
+    """Return the designs of a ranking, each star with the first few of its firing orders."""
     return [
         Candidate(
             s.throws, fired.order, s.bank_angle, s.split_pin,
@@ -265,6 +253,6 @@ def candidates_of(phasing: Phasing, ranking: Sequence[RankedStar], orders: int =
 def ranking_result(
     phasing: Phasing, best: Candidate, ranking: Sequence[RankedStar], designs: int, looked_at: int, method: str
 ) -> PhasingResult:
-    """What was decided, the best design first."""
+    """Return the stars that were decided, the best design first."""
     layout = phasing.layout_of(best)
     return PhasingResult(tuple(ranking), layout.throw_positions, layout.banks, designs, looked_at, method)

@@ -1,0 +1,323 @@
+"""Objectives of even stars as convex functions of their couples (S3, S5, S48).
+
+Even stars of one pattern have the same forces, so that two of them differ by what couples load:
+V = V' + Re sum_h g_h (C_h - C'_h) e^{i h phi}, with g_h from two stars whose loads the exact model gives. Averages of V
+over shifts by s are no more, in a norm that no shift changes. With the weights 2 cos(h s), of mean size 4 / pi, one
+order V_h is left. With 1 + cos(h s - psi) over firing intervals all that no couple changes is left, and half of that
+order at any phase.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from laufruhe.extensions.long_cranks.throw_halves import Window
+from laufruhe.load_models.amplitudes import AmplitudeObjective
+from laufruhe.load_models.star_model import in_few_rows
+from laufruhe.machine import Role
+from laufruhe.numerics.arrays import Array, ComplexArray
+from laufruhe.numerics.norms import Grid, Norm
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics.crank_stars import Stars, phase_waves, star_sums
+from laufruhe.physics.star_space import StarSpace
+from laufruhe.problem.channels import LoadChannel
+from laufruhe.problem.evaluation import Evaluation, evaluate, over
+from laufruhe.problem.measure import Measure, bends_of, load_rows
+from laufruhe.problem.problem import Problem
+
+ONE_ORDER = 4.0 / math.pi
+"""Largest ratio of the norm of one order of a signal to that of the signal."""
+PHASES, HALVINGS = 16, 24
+SMALL, SHORT = 0.01, 0.1
+"""Share of what no couple changes, and lever [m], that planes touch the objective at."""
+ALIASES = 1.1
+"""Safety factor of orders that shifts by firing intervals do not separate from the one of the window."""
+_SAME, _NEGLIGIBLE = 1e-9, 1e-13
+_AT_ONCE = 1 << 22
+
+
+class StarAmplitudes(AmplitudeObjective):
+    """Sum of norms of forces and couples of single orders, with the window of better stars (S3)."""
+
+    def largest(self, space: StarSpace) -> float:
+        """Return an upper bound of all stars: all throws on the side of their places [SI]."""
+        levers = float(np.abs(space.places).sum())
+        return sum(
+            term.weight * float(np.hypot(np.multiply(term.force, space.throws), np.multiply(term.couple, levers)).sum())
+            for term in self.terms
+        )
+
+    def least(self, space: StarSpace) -> float:
+        """Return a lower bound of all stars: forces alone, which the pattern fixes [SI]."""
+        return min(self._forces(space, pattern) for pattern in space.patterns)
+
+    def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
+        """Return the window of the order that weighs most: no norm is less than its share in it (S5)."""
+        shares = np.sum([np.multiply(term.weight, term.couple) for term in self.terms], axis=0)
+        place, room = int(np.argmax(shares)), value - self._forces(space, pattern)
+        if room < 0.0:
+            return None
+        most = room / shares[place] if shares[place] > 0.0 else np.inf
+        return Window(self.orders[place], complex(-most, -most), complex(most, most))
+
+    def _forces(self, space: StarSpace, pattern: Sequence[int]) -> float:
+        forces = np.abs(phase_waves(space.phases, self.orders) @ np.array(pattern))
+        forces[forces <= 1e-12 * space.throws] = 0.0
+        pure = [term for term in self.terms if not any(term.couple)]
+        return sum(term.weight * float(np.linalg.norm(np.multiply(term.force, forces))) for term in pure)
+
+
+@dataclass(frozen=True, eq=False)
+class CoupleTerm:
+    """w N(V0 + sum_h Re C_h A_h + Im C_h B_h).
+
+    Attributes
+    ----------
+    constant, couples
+        V0 and the rows A and B of every order one after the other, shapes (k, d) and (2 orders, k, d).
+    alone
+        Norm of one unit of couple in every order, shape (orders,).
+    """
+
+    weight: float
+    norm: Norm
+    grid: Grid
+    constant: Array
+    couples: Array
+    alone: Array
+
+    def values(self, couples: Array) -> Array:
+        """Return values [SI], shape (n,), from real and imaginary parts of every order in turn, shape (n, 2 orders)."""
+        size, out = self.constant.size, np.empty(len(couples))
+        flat, step = self.couples.reshape(len(self.couples), -1), max(1, _AT_ONCE // size)
+        for start in range(0, len(couples), step):
+            part = slice(start, start + step)
+            rows = self.constant.reshape(-1) + couples[part] @ flat
+            rows = rows.reshape(-1, *self.constant.shape)
+            if self.norm.of_row_lengths:
+                row_lengths = np.sqrt(np.einsum("nkd,nkd->nk", rows, rows))
+                out[part] = self.norm.of_lengths(row_lengths, self.grid.weights)
+            else:
+                out[part] = self.norm.values(self.grid, rows)
+        return self.weight * out
+
+    def plane(self, couples: Array) -> tuple[float, Array]:
+        """Return constant and slope of a linear function under the term, which it meets at these couples (P2)."""
+        rows = self.constant + np.tensordot(couples, self.couples, axes=1)
+        z = self.norm.dual_feasible(self.grid, self.norm.subgradient(self.grid, rows))
+        return self.weight * float(np.vdot(z, self.constant)), self.weight * np.tensordot(self.couples, z, axes=2)
+
+    @property
+    def shares(self) -> Array:
+        """Least value of the term for one unit of couple, in every order."""
+        return self.weight * self.alone / (1.0 if self.norm.is_euclidean else ONE_ORDER)
+
+
+@dataclass(frozen=True, eq=False)
+class CoupleNorms:
+    """A sum of norms of the couples of even stars, of means averaged so that it bounds the whole cycle (P7)."""
+
+    orders: tuple[int, ...]
+    terms: tuple[CoupleTerm, ...]
+
+    def values(self, space: StarSpace, stars: Stars, most: float = math.inf) -> Array:
+        """Return values of many stars, shape (n,); over `most` any number between it and the value."""
+        couples = star_sums(stars, space.phases, space.places, self.orders)[:, :, 1]
+        parts = np.ascontiguousarray(couples).view(float).reshape(len(stars), 2 * len(self.orders))
+        if most == math.inf:
+            return np.asarray(sum(term.values(parts) for term in self.terms))
+        constants, slopes = self._planes
+        out = (constants + parts @ slopes.T).max(axis=1, initial=0.0)
+        near = out <= most
+        out[near] = sum(term.values(parts[near]) for term in self.terms)
+        return np.asarray(out)
+
+    @cached_property
+    def _planes(self) -> tuple[Array, Array]:
+        """Constants and slopes of linear functions under the objective (P2): few stars then need all rows."""
+        shares = np.asarray(sum(term.shares for term in self.terms))
+        turns = np.exp(1j * np.arange(PHASES // 2) * math.tau / (PHASES // 2))
+        heavy = np.argsort(-shares, kind="stable")[:2]
+        at = np.zeros((len(turns) ** len(heavy), len(self.orders)), dtype=complex)
+        for row, chosen in zip(at, itertools.product(turns, repeat=len(heavy)), strict=True):
+            # small beside what no couple changes, where there is any
+            row[heavy] = np.array(chosen) / np.maximum(shares[heavy], 1e-300)
+        rest = float(sum(term.values(np.zeros((1, 2 * len(self.orders))))[0] for term in self.terms))
+        unit = SMALL * max(rest, float(shares.max(initial=0.0)) * SHORT)
+        pieces = [term.plane(unit * row.view(float)) for row in at for term in self.terms]
+        grouped = [pieces[k : k + len(self.terms)] for k in range(0, len(pieces), len(self.terms))]
+        constants = np.array([sum(constant for constant, _ in parts) for parts in grouped])
+        return constants, np.array([sum(slope for _, slope in parts) for parts in grouped])
+
+    def largest(self, space: StarSpace) -> float:
+        """Return an upper bound of all stars [SI]."""
+        levers = float(np.abs(space.places).sum())
+        return self.least(space) + levers * sum(term.weight * float(term.alone.sum()) for term in self.terms)
+
+    def least(self, space: StarSpace) -> float:
+        """Return a lower bound of all stars: the value without couples (S40) [SI]."""
+        del space
+        return float(sum(term.values(np.zeros((1, len(term.couples))))[0] for term in self.terms))
+
+    def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
+        """Return the window of the order that weighs most, by what that order alone leaves (S48)."""
+        del pattern
+        least = self.least(space)
+        if value < least:
+            return None
+        shares = np.asarray(sum(term.shares for term in self.terms))
+        if not len(shares) or not shares.max() > 0.0 or value == math.inf:
+            return Window(1, complex(-math.inf, -math.inf), complex(math.inf, math.inf))
+        place = int(np.argmax(shares))
+        if len(self.terms) == 1 and self.terms[0].norm.is_euclidean:
+            # squares of orders add up, so that what no couple changes leaves less room
+            most = math.sqrt((value - least) * (value + least)) / float(shares[place])
+        else:
+            most = self._reach(space, place, value, value / float(shares[place]))
+        return Window(self.orders[place], complex(-most, -most), complex(most, most))
+
+    def _reach(self, space: StarSpace, place: int, value: float, most: float) -> float:
+        """Return the largest couple of an order whose half, at any phase, is worth no more than a value (S48)."""
+        order, levers = self.orders[place], float(np.abs(space.places).sum())
+        same = [
+            k for k, other in enumerate(self.orders)
+            if k != place and ((other - order) % space.phases == 0 or (other + order) % space.phases == 0)
+        ]  # fmt: skip
+        room = value + 0.5 * ALIASES * levers * sum(term.weight * float(term.alone[same].sum()) for term in self.terms)
+        turns = np.exp(1j * np.arange(PHASES) * math.tau / PHASES)
+        parts = np.zeros((PHASES, 2 * len(self.orders)))
+        parts[:, 2 * place], parts[:, 2 * place + 1] = turns.real, turns.imag
+        low = 0.0
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + most)
+            values = sum(term.values(0.5 * middle * parts) for term in self.terms)
+            low, most = (low, middle) if float(np.max(values)) > room else (middle, most)
+        return most
+
+
+def couple_norms(problem: Problem, space: StarSpace, stars: Sequence[Problem]) -> CoupleNorms | None:
+    """Return the objective of even stars as one of their couples; None where it is none.
+
+    Parameters
+    ----------
+    problem
+        Problem with nothing open but the phasing, and nothing limited.
+    stars
+        Problems of the stars of `three_stars`.
+    """
+    known = all(term.measure.is_load and not term.measure.is_inside for term in problem.objective)
+    if not known or problem.fidelity.is_uneven or problem.limits or len(space.patterns) > 1:
+        return None
+    if any(rotor.role is not Role.THROW for star in stars for rotor in star.engine.rotors):
+        return None
+    spread = _Spread.from_stars(problem, space, [evaluate(star) for star in stars])
+    if spread is None:
+        return None
+    return CoupleNorms(spread.orders, tuple(spread.term(term.weight, term.measure) for term in problem.objective))
+
+
+def three_stars(space: StarSpace) -> Stars:
+    """Return a star, one with two throws of neighbouring steps exchanged, and one to check that couples say all."""
+    first = np.array(space.first, dtype=np.uint8)
+    second, third = first.copy(), first.copy()
+    one = int(np.flatnonzero(first == 1)[-1])
+    second[[one, one + 1]] = first[[one + 1, one]]
+    third[1:] = np.random.default_rng(2).permutation(first[1:])
+    return np.array([first, second, third])
+
+
+@dataclass(frozen=True, eq=False)
+class _Spread:
+    """Loads of even stars: the part that all share, and the loads of a unit of couple in every order.
+
+    Attributes
+    ----------
+    rest, units
+        Signal without couples, and g_h, shape (orders, places, d), of every channel and operating point.
+    """
+
+    problem: Problem
+    design: Evaluation
+    orders: tuple[int, ...]
+    rest: dict[LoadChannel, list[Spectrum]]
+    units: dict[LoadChannel, list[ComplexArray]]
+
+    @classmethod
+    def from_stars(cls, problem: Problem, space: StarSpace, designs: Sequence[Evaluation]) -> _Spread | None:
+        """Separate the loads of three stars; None where they differ in more than couples."""
+        base = designs[0].engine.cycle.base_order
+        channels = {term.measure.load for term in problem.objective}
+        signals = {channel: [over(base, design.signals(channel)) for design in designs] for channel in channels}
+        every = [signal for each in signals.values() for own in each for signal in own]
+        if any(signal.base != base for signal in every):
+            return None
+        count, per_turn = max(len(signal.coefficients) for signal in every), round(1 / base)
+        orders = [order for order in range(1, (count - 1) // per_turn + 1) if order % space.phases]
+        sums = star_sums(three_stars(space), space.phases, space.places, orders)[:, :, 1]
+        rest: dict[LoadChannel, list[Spectrum]] = {}
+        units: dict[LoadChannel, list[ComplexArray]] = {}
+        used = np.zeros(len(orders), dtype=bool)
+        # what shifts by firing intervals change
+        fired = np.arange(count) % len(designs[0].engine.cylinders) > 0
+        places = np.array(orders, dtype=np.intp) * per_turn
+        for channel, each in signals.items():
+            rest[channel], units[channel] = [], []
+            for at in range(len(problem.points)):
+                own = [_padded(signals_of[at], count) for signals_of in each]
+                unit = (own[1] - own[0])[places] / (sums[1] - sums[0])[:, None, None]
+                shared = own[0].copy()
+                shared[places] -= unit * sums[0][:, None, None]
+                third, size = shared.copy(), float(np.abs(own[0]).max(initial=0.0))
+                third[places] += unit * sums[2][:, None, None]
+                # nothing but couples has other orders than the firing's, and couples give the third star
+                if np.abs(third - own[2]).max() > _SAME * size or np.abs(shared[fired]).max(initial=0.0) > _SAME * size:
+                    return None
+                shared[places] = 0.0
+                used |= np.abs(unit).max(axis=(1, 2)) * float(np.abs(space.places).sum()) > _NEGLIGIBLE * size
+                rest[channel].append(each[0][at].holding(shared))
+                units[channel].append(unit)
+        selected = tuple(order for order, use in zip(orders, used, strict=True) if use)
+        return cls(problem, designs[0], selected, rest, {c: [u[used] for u in own] for c, own in units.items()})
+
+    def term(self, weight: float, measure: Measure) -> CoupleTerm:
+        """Return one term, its rows those of a result, means averaged about them (P7)."""
+        rest, norm = self.rest[measure.load], measure.norm
+        bends = bends_of(measure, rest, self.design.engine)
+        constant, grid = self._rows(measure, rest, bends)
+        per_turn = round(1 / self.design.engine.cycle.base_order)
+        rows = []
+        for place, order in enumerate(self.orders):
+            for turn in (1.0, 1j):
+                alone = []
+                for signal, units in zip(rest, self.units[measure.load], strict=True):
+                    coefficients = np.zeros((order * per_turn + 1, *units.shape[1:]), dtype=complex)
+                    coefficients[-1] = turn * units[place]
+                    alone.append(Spectrum(signal.base, coefficients))
+                rows.append(self._rows(measure, alone, bends)[0])
+        couples = np.array(rows).reshape(2 * len(self.orders), *constant.shape)
+        sizes = np.array([norm.value(grid, own) for own in couples[::2]])
+        if norm.is_euclidean:
+            root = np.sqrt(grid.weights)[:, None]
+            compressed = in_few_rows([constant * root, couples * root])
+            if compressed is not None:
+                (constant, couples), grid = compressed, Grid(np.ones(compressed[0].shape[0]), compressed[0].shape[0])
+        return CoupleTerm(weight, norm, grid, constant, couples, sizes)
+
+    def _rows(self, measure: Measure, signals: Sequence[Spectrum], bends: Sequence[Array]) -> tuple[Array, Grid]:
+        samples = self.design.samples * (1 if measure.norm.averages else measure.norm.refinement)
+        if measure.norm.averages:
+            signals = [signal.averaged(signal.period / samples) for signal in signals]
+        rows = load_rows(measure, self.problem.points, signals, self.design.engine, samples, bends)
+        return rows.vectors, rows.grid
+
+
+def _padded(signal: Spectrum, count: int) -> ComplexArray:
+    coefficients = np.zeros((count, *signal.coefficients.shape[1:]), dtype=complex)
+    coefficients[: len(signal.coefficients)] = signal.coefficients
+    return coefficients

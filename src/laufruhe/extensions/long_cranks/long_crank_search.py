@@ -1,0 +1,180 @@
+"""Search over even stars that are too many to be listed: by couples (S5, S46, S48), or exchanges of throws (S44)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from laufruhe.extensions.long_cranks.couple_objectives import StarAmplitudes, couple_norms, three_stars
+from laufruhe.extensions.long_cranks.couple_search import best_starts, search_stars
+from laufruhe.load_models.star_model import StarModel
+from laufruhe.numerics.budget import in_time, passed
+from laufruhe.numerics.norms import RMS
+from laufruhe.physics.crank_stars import Stars
+from laufruhe.problem.channels import ROCKING_COUPLE
+from laufruhe.problem.evaluation import evaluate, objective_value, with_fine_sampling
+from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.numerical_zero import numerical_zero
+from laufruhe.problem.phasing import Method
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.prove.certificate import gap_of
+from laufruhe.prove.throws.firing_average import firing_bound
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.stars.enumeration import enumerate_stars
+from laufruhe.solvers.stars.even_search import (
+    Answer,
+    EvenDesign,
+    amplitudes,
+    can_list,
+    listed_answer,
+    merge_answers,
+    search_even,
+)
+from laufruhe.solvers.stars.families import Family
+from laufruhe.solvers.stars.phasing_solver import solve_phasing
+from laufruhe.solvers.stars.star_program import coarse_value, shaft_owners, solve_design
+
+WORTH = 1e-6
+"""Share by which a star has to be better: few angles blur less."""
+_BY_HALVES = "stars by halves that meet in a window of couples"
+
+
+def solve_long_cranks(problem: Problem) -> Result:
+    """Decide open throws, firing orders, shafts and unbalances together, as `solve_phasing` does."""
+    return solve_phasing(problem, search_long)
+
+
+def search_long(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+    """Return the best designs of all even stars, by what suits objective and size (S18)."""
+    if can_list(problem, families):
+        return search_even(problem, phasing, families)
+    simple = [(family, objective) for family in families if (objective := _amplitudes(phasing, family)) is not None]
+    if len(simple) < len(families):
+        answer = _search_by_couples(problem, phasing, families)
+        return _search_by_exchanges(problem, phasing, families) if answer is None else answer
+    answers = []
+    for family, objective in simple:
+        space = replace(family.space, mirror=True, reflect=True)
+        if phasing.method is Method.ENUMERATION:
+            stars, method = enumerate_stars(space, objective, phasing.best), "every star looked at"
+        else:
+            stars, method = search_stars(space, objective, phasing.best, phasing.time_limit), _BY_HALVES
+        answers.append(listed_answer(phasing, family, stars, method))
+    return merge_answers(answers, phasing.best)
+
+
+def _amplitudes(phasing: Phasing, family: Family) -> StarAmplitudes | None:
+    objective = amplitudes(phasing, family)
+    return None if objective is None else StarAmplitudes(objective.orders, objective.terms)
+
+
+def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer | None:
+    """Evaluate stars with little couple, then all that may be better (S46, S48).
+
+    None where stars differ by more than their couples, or anything else is open.
+    """
+    if len(families) > 1 or problem.decisions or phasing.shafts.optional:
+        return None
+    (family,) = families
+    known = _with_least_couples(phasing, family)
+    stars, looked_at = [tuple(map(int, star)) for star in known], len(known)
+    answer = _evaluate_stars(problem, phasing, family, stars, 0.0)
+    if answer.complete:
+        return merge_answers([answer], phasing.best)
+    three = [phasing.realise(family.candidate(phasing, tuple(map(int, star)))) for star in three_stars(family.space)]
+    own = couple_norms(problem, family.space, three)
+    if own is None:
+        return None
+    every = search_stars(family.space, own, phasing.best, phasing.time_limit, known)
+    stars += [tuple(map(int, star)) for star in every.stars]
+    answer = _evaluate_stars(problem, phasing, family, stars, every.lower_bound)
+    answer = merge_answers([answer], phasing.best)
+    return replace(answer, complete=every.complete, looked_at=looked_at + every.nodes, method=_BY_HALVES)
+
+
+def _evaluate_stars(
+    problem: Problem, phasing: Phasing, family: Family, stars: Sequence[tuple[int, ...]], bound: float
+) -> Answer:  # fmt: skip
+    """Return stars with their values; complete if the best of them meets the bound of every even star (S40)."""
+    designs, complete = [], False
+    for steps in dict.fromkeys(stars):
+        realised = phasing.realise(family.candidate(phasing, steps))
+        design = evaluate(realised)
+        value, fine = objective_value(realised, design), with_fine_sampling(design)
+        # a search at more angles closes what these leave open of a mean (P7)
+        shared = firing_bound(problem, fine)
+        gap = gap_of(objective_value(problem, fine), max(bound, shared), numerical_zero(problem, design.engine))
+        bound = max(bound, firing_bound(problem, design))
+        is_proven = gap <= problem.tolerance
+        complete = complete or is_proven
+        designs.append(EvenDesign.of_steps(phasing, family, steps, (), value, bound, is_proven))
+    designs.sort(key=lambda design: design.value)
+    method = "star without couples, which leaves what every even one has"
+    return Answer(tuple(designs), bound, complete, len(designs), method)
+
+
+def _with_least_couples(phasing: Phasing, family: Family) -> Stars:
+    couple = (Term(Measure(ROCKING_COUPLE, RMS)),)
+    of_couples = replace(phasing, realise=lambda candidate: phasing.realise(candidate).changed(objective=couple))
+    own = _amplitudes(of_couples, family)
+    if own is None:
+        return np.zeros((0, family.space.throws), dtype=np.uint8)
+    return best_starts(replace(family.space, mirror=True, reflect=True), own, phasing.best).stars
+
+
+def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
+    """Return the best star that exchanges of throws lead to, bounded by its own dual rows over all stars (S44, S14)."""
+    nothing = numerical_zero(problem)
+    answers = []
+    for family in families:
+        is_simple = _amplitudes(phasing, family) is not None
+        space = replace(family.space, mirror=is_simple, reflect=is_simple)
+        model = family.model(phasing, space)
+        owners = shaft_owners(model)
+        starts = [tuple(map(int, star)) for star in _with_least_couples(phasing, family)]
+        engines = {star: phasing.realise(family.candidate(phasing, star)) for star in starts}
+        values = {star: objective_value(own, evaluate(own)) for star, own in engines.items()}
+        first = min(starts, key=values.__getitem__, default=family.first)
+        built = min(phasing.shafts.allowed, key=lambda some: coarse_value(model, first, some, owners))
+        star = improved(model, first, built, owners)
+        design, cut = solve_design(model, star, built, owners, problem.tolerance, nothing)
+        if design is None or cut is None:
+            answers.append(Answer((), 0.0, False, 1, "exchanges of throws"))
+            continue
+        bound = cut.minimum(space)
+        done = gap_of(design.value, bound, nothing) <= 2.0 * problem.tolerance
+        method = f"exchanges of throws at {model.samples} angles"
+        best = EvenDesign.of_steps(phasing, family, design.star, design.built, design.value, design.bound, done)
+        answers.append(Answer((best,), bound, done, 1, method))
+    return merge_answers(answers, phasing.best)
+
+
+def improved(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], owners: Sequence[int]) -> tuple[int, ...]:
+    """Return the best star that exchanges lead to, everything else at its optimum at few angles (S44)."""
+    value = coarse_value(model, star, built, owners)
+    while not passed():
+        least, best = min(
+            ((coarse_value(model, other, built, owners), other) for other in in_time(exchanges(star))),
+            default=(math.inf, star),
+        )
+        if not least < value * (1.0 - WORTH):
+            break
+        value, star = least, best
+    return star
+
+
+def exchanges(star: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
+    """Yield stars in which two or three throws, never the first, take each other's steps."""
+    seen = {star}
+    for i in range(1, len(star)):
+        for j in range(1, i):
+            for places in ((i, j), *((i, j, k) for k in range(1, j)), *((j, i, k) for k in range(1, j))):
+                other = list(star)
+                for place, source in zip(places, (*places[1:], places[0]), strict=True):
+                    other[place] = star[source]
+                if (exchanged := tuple(other)) not in seen:
+                    seen.add(exchanged)
+                    yield exchanged

@@ -1,0 +1,53 @@
+"""Lower bound of the degree of irregularity by the work that is stored at even speed (T11).
+
+With u = w^2 between its ends u_1 < u_2 and m = J_0 + J, F2 is m u / 2 - W = E, a constant. By the work S that is
+stored at even speed (T2), tight where the inertia is large,
+
+    u_2 - u_1 >= S / (m_max / 2 + (J_max - J_min) / 4),      delta >= (1 + (u_2 - u_1) / w_0^2)^(1/2) - 1,
+
+for half of m times u less its middle spans no more than m_max (u_2 - u_1) / 2, and w_0^2 lies between the ends.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.uneven_speed import moving_inertia
+
+SAMPLED = 1e-4
+"""Share by which a degree at angles may lie under the true one."""
+
+
+@dataclass(frozen=True)
+class StoredWorkBound:
+    """Relation between stored work and the degree of irregularity at one operating point (T11).
+
+    Attributes
+    ----------
+    energy
+        (m_max / 2 + (J_max - J_min) / 4) w_0^2 of cylinders in any phase [J].
+    """
+
+    energy: float
+
+    @classmethod
+    def from_engine(cls, engine: Engine, point: OperatingPoint, fidelity: Fidelity, inertia: float) -> StoredWorkBound:
+        """Return the relation for cylinders that fire at any angles, beside an inertia of all that turns [kg m2]."""
+        angles = math.tau * np.arange(fidelity.samples) / fidelity.samples
+        alone = [replace(engine, slider_cranks=(part,)) for part in engine.slider_cranks]
+        inertias = [moving_inertia(one, fidelity, angles)[0] for one in alone]
+        most, least = (float(sum(map(end, inertias))) for end in (np.max, np.min))
+        return cls((0.5 * (inertia + most) + 0.25 * (most - least)) * point.speed**2)
+
+    def degree(self, work: float) -> float:
+        """Return the least degree of irregularity with so much work stored [J]."""
+        return (1.0 - SAMPLED) * (math.sqrt(1.0 + work / self.energy) - 1.0)
+
+    def work(self, degree: float) -> float:
+        """Return the most stored work [J] that allows a degree of irregularity."""
+        return ((1.0 + degree / (1.0 - SAMPLED)) ** 2 - 1.0) * self.energy

@@ -1,0 +1,116 @@
+"""Bounds of all stars from the dual rows of one (S14)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from laufruhe.load_models.star_model import StarProblem
+from laufruhe.numerics.arrays import Array, Mask
+from laufruhe.physics.crank_stars import Stars
+from laufruhe.physics.star_space import StarSpace
+from laufruhe.problem.decision import Domain
+from laufruhe.prove.certificate import ROUNDING, Multipliers
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """c + sum_k A[k, p_k] + sum over decisions of min_x (g + sum_k G[k, p_k]) . x, below every objective (S14).
+
+    Attributes
+    ----------
+    constant, moves
+        c and A, shape (throws, steps).
+    gradient, turns
+        g and G, shapes (n,) and (throws, steps, n); G is None where g is the same for every star.
+    domains
+        Sets of the decisions.
+    rounding
+        Error that its sums may have.
+    """
+
+    constant: float
+    moves: Array
+    gradient: Array
+    turns: Array | None
+    domains: tuple[Domain, ...]
+    rounding: float
+
+    def bounds(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Array:
+        """Return lower bounds of stars with sets of shafts, shape (stars, sets); never under zero.
+
+        Parameters
+        ----------
+        sets
+            Numbers of the optional shafts that are built, in each set.
+        owners
+            Optional shaft that every decision belongs to, -1 for none.
+        """
+        return np.maximum(self._sums(stars, sets, owners), 0.0)
+
+    def excludes(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Mask:
+        """Return where no design keeps the limits, by dual rows of these alone (S45), shape (stars, sets)."""
+        return np.asarray(self._sums(stars, sets, owners) > self.rounding)
+
+    def _sums(self, stars: Stars, sets: Sequence[tuple[int, ...]], owners: Sequence[int]) -> Array:
+        total = np.full(len(stars), self.constant)
+        for k in range(stars.shape[1]):
+            total += self.moves[k, stars[:, k]]
+        # min g . x of every decision, shape (stars, decisions)
+        if self.turns is None:
+            minima = np.tile([domain.least(self.gradient) for domain in self.domains], (len(stars), 1))
+        else:
+            gradients = np.tile(self.gradient, (len(stars), 1))
+            for k in range(stars.shape[1]):
+                gradients += self.turns[k, stars[:, k]]
+            minima = np.array([[domain.least(g) for domain in self.domains] for g in gradients])
+        out = np.empty((len(stars), len(sets)))
+        for column, built in enumerate(sets):
+            chosen = [d for d, owner in enumerate(owners) if owner < 0 or owner in built]
+            out[:, column] = total + (minima[:, chosen].sum(axis=1) if chosen else 0.0)
+        return out
+
+    def minimum(self, space: StarSpace) -> float:
+        """Return a bound of every star of a space, by the best assignment of throws to steps; never under zero."""
+        from scipy.optimize import linear_sum_assignment
+
+        if self.turns is not None:
+            return 0.0
+        rest = sum(domain.least(self.gradient) for domain in self.domains)
+        values = []
+        for pattern in space.patterns:
+            # the first throw stands on step 0
+            places = np.repeat(np.arange(space.phases), pattern)[1:]
+            cost = self.moves[1:][:, places]
+            rows, columns = linear_sum_assignment(cost)
+            values.append(self.moves[0, 0] + float(cost[rows, columns].sum()))
+        return float(max(0.0, self.constant + rest + min(values)))
+
+
+def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
+    """Return the cut that dual rows of one star give (S14)."""
+    throws, steps = fine.terms[0][1].moves.shape[:2]
+    size = fine.terms[0][1].slope.shape[-1]
+    constant, moves, scale = 0.0, np.zeros((throws, steps)), 0.0
+    gradient, turns, is_turning = np.zeros(size), np.zeros((throws, steps, size)), False
+    parts = []
+    for (weight, norm), rows in zip(fine.terms, multipliers.terms, strict=True):
+        parts.append((weight * norm.norm.dual_feasible(norm.grid, rows), norm))
+    for (maximum, norm), rows in zip(fine.limits, multipliers.limits, strict=True):
+        z = norm.norm.balanced(norm.grid, rows)
+        most = norm.norm.dual_norm(norm.grid, z) * maximum
+        constant -= most
+        scale += most
+        parts.append((z, norm))
+    for z, norm in parts:
+        reach = np.abs(norm.constant) + np.abs(norm.moves).max(axis=1).sum(axis=0)
+        scale += float(np.vdot(np.abs(z), reach))
+        constant += float(np.vdot(z, norm.constant))
+        moves += np.einsum("kd,tpkd->tp", z, norm.moves)
+        gradient += np.einsum("kd,kdn->n", z, norm.slope)
+        if norm.turns is not None:
+            is_turning = True
+            turns += np.einsum("kd,tpkdn->tpn", z, norm.turns)
+    return Cut(constant, moves, gradient, turns if is_turning else None, fine.domains, ROUNDING * scale)

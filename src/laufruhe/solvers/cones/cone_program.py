@@ -1,0 +1,312 @@
+"""Second-order cone program in sparse arrays: assembly, the call of Clarabel, and what its answer means (P1, P2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.load_models.affine import AffineNorm, AffineProblem, reach
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.budget import left
+from laufruhe.numerics.norms import Cones
+from laufruhe.problem.decision import Domain
+from laufruhe.prove.certificate import Multipliers
+
+SMALLEST_SHARE = 1e-7
+"""Share under which a sum is no part of the largest."""
+SHORTEST = 0.05
+"""Seconds that one attempt has where time is over."""
+
+
+@dataclass(frozen=True, eq=False)
+class ConicSolution:
+    """Answer of the cone solver; nothing in it is believed before it is evaluated.
+
+    Attributes
+    ----------
+    x
+        Decision vector; None where the limits contradict each other.
+    multipliers
+        Dual rows of terms and limits.
+    solver_seconds
+        Time spent inside the cone solver [s].
+    shares
+        Share of every sum of terms in the largest of them, adding up to one; empty where there is one sum.
+    prices
+        Duals of the program's rows in the objective's unit, those of the equations first.
+    """
+
+    x: Array | None
+    multipliers: Multipliers
+    solver_seconds: float
+    shares: Array = field(default_factory=lambda: np.zeros(0))
+    prices: Array = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True, eq=False)
+class SparseMatrix:
+    """Matrix in compressed columns, as Clarabel takes it; importing `scipy.sparse` takes a tenth of a second.
+
+    Attributes
+    ----------
+    data, indices, indptr, shape
+        As in `scipy.sparse.csc_array`; each place once, row after row.
+    """
+
+    data: Array
+    indices: NDArray[np.int64]
+    indptr: NDArray[np.int64]
+    shape: tuple[int, int]
+    has_canonical_format: ClassVar[bool] = True
+
+    @classmethod
+    def from_entries(
+        cls, rows: NDArray[np.int64], columns: NDArray[np.int64], values: Array, shape: tuple[int, int]
+    ) -> SparseMatrix:
+        """Sort entries, and add up those of one place."""
+        used = values != 0.0
+        keys = (columns * shape[0] + rows)[used]
+        order = np.argsort(keys, kind="stable")
+        keys, data = keys[order], values[used][order]
+        first = np.flatnonzero(np.diff(keys, prepend=-1))
+        if len(first) < len(keys):
+            keys, data = keys[first], np.add.reduceat(data, first)
+        starts = np.searchsorted(keys, shape[0] * np.arange(shape[1] + 1))
+        return cls(data, keys % max(shape[0], 1), starts, shape)
+
+
+class ConeRows:
+    """Rows A x + s = b with s in a product of cones, added block by block."""
+
+    def __init__(self, columns: int) -> None:
+        self.columns = columns
+        self.entries: list[tuple[NDArray[np.int64], NDArray[np.int64], Array]] = []
+        self.right: list[Array] = []
+        self.cones: list[Any] = []
+        self.count = 0
+
+    def add(self, rows: Any, columns: Any, values: Any, right: Array) -> None:
+        """Add entries of A, their rows counted from the block's first, and the block's part of b."""
+        at, across, numbers = np.broadcast_arrays(rows, columns, values)
+        self.entries.append((at.ravel() + self.count, across.ravel(), numbers.ravel()))
+        self.right.append(right)
+        self.count += len(right)
+
+    def matrix(self) -> SparseMatrix:
+        """Return A."""
+        rows, columns, values = (np.concatenate([entry[k] for entry in self.entries]) for k in range(3))
+        return SparseMatrix.from_entries(rows, columns, values, (self.count, self.columns))
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Columns and rows of one norm in the program.
+
+    Attributes
+    ----------
+    unit
+        Size in which its rows are counted.
+    first
+        First column of its heads.
+    """
+
+    norm: AffineNorm
+    cones: Cones
+    unit: float
+    first: int
+
+    @property
+    def heads(self) -> slice:
+        """Columns of the heads."""
+        return slice(self.first, self.first + len(self.cones.value))
+
+    @property
+    def centres(self) -> NDArray[np.int64]:
+        """Column of the free vector that each number of the rows is counted from, shape (k, d), or (0, 0) for none."""
+        if not self.cones.centred:
+            return np.zeros((0, 0), dtype=int)
+        k, d = self.norm.constant.shape
+        signal = np.arange(k) // self.norm.grid.steps
+        return np.asarray(self.heads.stop + signal[:, None] * d + np.arange(d))
+
+
+def build_program(
+    problem: AffineProblem, equations: tuple[Array, Array] | None
+) -> tuple[list[Block], list[int], ConeRows, Array]:  # fmt: skip
+    """Assemble the cone program of a problem (P1).
+
+    Parameters
+    ----------
+    equations
+        A, shape (m, n), and b, shape (m,), of A x = b, which the decision vector is to keep as well.
+
+    Returns
+    -------
+    Blocks of the norms, their first rows, all rows, and the cost of every column.
+    """
+    import clarabel
+
+    unit = reach(problem, [norm for _, norm in problem.terms])
+    blocks: list[Block] = []
+    columns = problem.size
+    for norm, size in [
+        *((norm, unit) for _, norm in problem.terms),
+        *((norm, reach(problem, [norm])) for _, norm in problem.limits),
+    ]:
+        blocks.append(Block(norm, norm.norm.cones(norm.grid), size, columns))
+        columns = int(blocks[-1].centres.max(initial=blocks[-1].heads.stop - 1)) + 1
+    rows = ConeRows(columns)
+    if equations is not None:
+        matrix, right = equations
+        rows.add(np.arange(len(right))[:, None], np.arange(problem.size), matrix * problem.units, right)
+        rows.cones.append(clarabel.ZeroConeT(len(right)))
+    for domain in problem.domains:
+        _add_domain(rows, domain, float(problem.units[domain.start]))
+    for (maximum, _), block in zip(problem.limits, blocks[len(problem.terms) :], strict=True):
+        rows.add(0, np.arange(columns)[block.heads], block.cones.value, np.array([maximum / block.unit]))
+        rows.cones.append(clarabel.NonnegativeConeT(1))
+    for block in blocks:
+        if block.cones.under is not None:
+            at, heads, factors = block.cones.under
+            rows.add(at, block.first + heads, factors, np.zeros(int(at.max()) + 1))
+            rows.cones.append(clarabel.NonnegativeConeT(int(at.max()) + 1))
+        if block.cones.squares is not None:
+            # t_a^2 <= t_b t_c as |(t_b - t_c, 2 t_a)| <= t_b + t_c
+            square, left_factor, right_factor = (block.first + heads for heads in block.cones.squares)
+            top = 3 * np.arange(len(square))
+            rows.add(
+                np.concatenate([top, top, top + 1, top + 1, top + 2]),
+                np.concatenate([left_factor, right_factor, left_factor, right_factor, square]),
+                np.repeat([-1.0, -1.0, -1.0, 1.0, -2.0], len(square)),
+                np.zeros(3 * len(square)),
+            )
+            rows.cones += [clarabel.SecondOrderConeT(3)] * len(square)
+    starts = [_add_norm(rows, block, problem) for block in blocks]
+    return blocks, starts, rows, _add_cost(problem, blocks, rows)
+
+
+def _add_cost(problem: AffineProblem, blocks: Sequence[Block], rows: ConeRows) -> Array:
+    """Return the cost of every column; of several sums it is one more column that none of them exceeds."""
+    import clarabel
+
+    sums = np.zeros((max(problem.groups, default=0) + 1, rows.columns))
+    for k, ((weight, _), block) in enumerate(zip(problem.terms, blocks, strict=False)):
+        sums[problem.groups[k] if problem.groups else 0, block.heads] = weight * block.cones.value
+    if not problem.groups:
+        return np.asarray(sums[0])
+    group, column = np.nonzero(sums)
+    last = np.arange(len(sums))
+    rows.add(
+        np.concatenate([group, last]),
+        np.concatenate([column, np.full(len(sums), rows.columns)]),
+        np.concatenate([sums[group, column], np.full(len(sums), -1.0)]),
+        np.zeros(len(sums)),
+    )
+    rows.cones.append(clarabel.NonnegativeConeT(len(sums)))
+    rows.columns += 1
+    cost = np.zeros(rows.columns)
+    cost[-1] = 1.0
+    return cost
+
+
+def _add_domain(rows: ConeRows, domain: Domain, unit: float) -> None:
+    """Add the decision's own set, in units of a size (P4)."""
+    import clarabel
+
+    upper, lower = domain.set.upper / unit, domain.set.lower / unit
+    if domain.width == 1:
+        rows.add([0, 1], domain.start, [1.0, -1.0], np.array([upper, -lower]))
+        rows.cones.append(clarabel.NonnegativeConeT(2))
+        return
+    if len(domain.set.edges):
+        (ax, ay), (bx, by) = domain.set.edges
+        across = np.array([domain.start, domain.start + 1])
+        rows.add([[0], [1]], across, [[ay, -ax], [-by, bx]], np.zeros(2))
+        rows.cones.append(clarabel.NonnegativeConeT(2))
+    rows.add([1, 2], [domain.start, domain.start + 1], -1.0, np.array([upper, 0.0, 0.0]))
+    rows.cones.append(clarabel.SecondOrderConeT(3))
+
+
+def _add_norm(rows: ConeRows, block: Block, problem: AffineProblem) -> int:
+    """Add V0 + B x in a cone a row, or in one cone for a root mean square; return the first row."""
+    import clarabel
+
+    norm, cones, start = block.norm, block.cones, rows.count
+    k, d = norm.constant.shape
+    slope = norm.slope * (problem.units / block.unit) * cones.factors[:, None, None]
+    constant = norm.constant / block.unit * cones.factors[:, None]
+    # rows of the program in the order of its cones: a head, then what is under it
+    width = k * d + 1 if cones.whole else d + 1
+    heads = np.arange(len(cones.head)) * width
+    under = (1 + np.arange(k * d).reshape(k, d)) if cones.whole else heads[:, None] + 1 + np.arange(d)
+    right = np.zeros(width * len(heads))
+    right[under] = constant
+    places = np.broadcast_to(under[:, :, None], slope.shape)
+    across = np.broadcast_to(np.arange(problem.size), slope.shape)
+    centres = block.centres.ravel()
+    rows.add(
+        np.concatenate([heads, places.ravel(), under.ravel()[: len(centres)]]),
+        np.concatenate([block.first + cones.head, across.ravel(), centres]),
+        np.concatenate([np.full(len(heads), -1.0), -slope.ravel(), np.ones(len(centres))]),
+        right,
+    )
+    rows.cones += [clarabel.SecondOrderConeT(width)] * len(heads)
+    return start
+
+
+def run_clarabel(rows: ConeRows, cost: Array, options: Mapping[str, Any], quadratic: Array | None = None) -> Any:
+    """Minimise cost . x + x' quadratic x / 2 under the rows, and return the solution object of Clarabel."""
+    import clarabel
+
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    for name, value in options.items():
+        setattr(settings, name, value)
+    settings.time_limit = max(left(), SHORTEST)
+    squares = np.zeros((0, 0)) if quadratic is None else quadratic
+    at, across = np.nonzero(squares)
+    matrix = SparseMatrix.from_entries(at, across, squares[at, across], (rows.columns, rows.columns))
+    right = np.concatenate(rows.right)
+    return clarabel.DefaultSolver(matrix, cost, rows.matrix(), right, rows.cones, settings).solve()
+
+
+def read_solution(problem: AffineProblem, blocks: list[Block], starts: list[int], solution: Any) -> ConicSolution:
+    """Return decisions in their sets and dual rows [SI]; zeros where the solver has lost its numbers."""
+    primal, duals = (
+        np.nan_to_num(np.asarray(values, dtype=float), posinf=0.0, neginf=0.0) for values in (solution.x, solution.z)
+    )
+    x = project_on_sets(problem, primal[: problem.size] * problem.units)
+    unit = blocks[0].unit if problem.terms else 1.0
+    rows = []
+    for block, start in zip(blocks, starts, strict=True):
+        # mu Z of the rows (P2), in the objective's own unit
+        k, d = block.norm.constant.shape
+        if block.cones.whole:
+            z = -duals[start + 1 : start + 1 + k * d].reshape(k, d)
+        else:
+            z = -duals[start : start + k * (d + 1)].reshape(k, d + 1)[:, 1:]
+        rows.append(np.asarray(z * block.cones.factors[:, None] * (unit / block.unit)))
+    shares = np.zeros(0)
+    if problem.groups:
+        # the last rows of the program are those of the sums
+        shares = np.maximum(duals[len(duals) - max(problem.groups) - 1 :], 0.0)
+        shares = shares / shares.sum() if shares.any() else np.full(len(shares), 1.0 / len(shares))
+        shares = np.where(shares > SMALLEST_SHARE, shares, 0.0)
+        shares = shares / shares.sum()
+    by_term = [float(shares[group]) for group in problem.groups] or [1.0] * len(problem.terms)
+    terms = tuple(
+        z / (weight * share or 1.0) for z, (weight, _), share in zip(rows, problem.terms, by_term, strict=False)
+    )
+    multipliers = Multipliers(terms, tuple(rows[len(terms) :]))
+    return ConicSolution(x, multipliers, float(solution.solve_time), shares, unit * duals)
+
+
+def project_on_sets(problem: AffineProblem, x: Array) -> Array:
+    """Move every decision into its set, in place."""
+    for domain in problem.domains:
+        x[domain.columns] = domain.project(x)
+    return x

@@ -1,0 +1,94 @@
+"""Degree of irregularity beside open stars of even firing (S35)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+
+from laufruhe.problem.evaluation import evaluate, objective_value
+from laufruhe.problem.measure import Measure, Term
+from laufruhe.problem.numerical_zero import numerical_zero
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.prove.certificate import Reach, certified
+from laufruhe.solvers.accuracy import error_of
+from laufruhe.solvers.conclusion import broken_limits, quoted, with_limits
+from laufruhe.solvers.result import Result
+from laufruhe.solvers.stars.families import families_of
+from laufruhe.solvers.stars.ranking import ranked_star, ranking_result
+from laufruhe.solvers.stars.star_results import no_star, solve_fixed, with_star
+from laufruhe.solvers.values import ObjectiveValue
+
+_ALIKE = "every star that fires evenly turns the crank as evenly"
+
+
+def flywheel_measures(problem: Problem) -> list[Measure]:
+    """Return what is asked of the flywheel, and of how evenly it turns."""
+    return [measure for measure in problem.measures if measure.channel.is_flywheel]
+
+
+def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Problem], Result]) -> Result:
+    """Decide stars of even firing by all but the flywheel: alike cylinders on the same dead centres turn alike (S35).
+
+    Parameters
+    ----------
+    solve
+        Solver of the problem without what is asked of the flywheel.
+    """
+    initial = evaluate(problem)
+    wheel = [limit for limit in problem.limits if limit.measure.channel.is_flywheel]
+    broken = broken_limits(wheel, initial)
+    if broken:
+        why = f"no star keeps {quoted(broken)}: all that fire evenly turn the crank as evenly; give it more inertia"
+        return no_star(problem, why, conflict=broken)
+    limits = tuple(limit for limit in problem.limits if limit not in wheel)
+    terms = tuple(term for term in problem.objective if not term.measure.channel.is_flywheel)
+    limited = [Term(limit.measure) for limit in limits if not limit.measure.channel.is_number]
+    if not terms and not limited:
+        return _any_star(problem, phasing)
+    # where nothing else is minimised, any design within the limits is as good
+    others = terms or tuple(limited[:1])
+
+    def without_wheel(star_problem: Problem) -> Problem:
+        rest = tuple(x for x in star_problem.limits if not x.measure.channel.is_flywheel)
+        return star_problem.changed(objective=others, limits=rest)
+
+    inner = replace(phasing, realise=lambda candidate: without_wheel(phasing.realise(candidate)))
+    result = solve(replace(without_wheel(problem), phasing=inner))
+    result = with_limits(replace(result, problem=result.problem.changed(objective=problem.objective)), problem.limits)
+    result = replace(result, problem=replace(result.problem, phasing=phasing))
+    if result.objective is None or result.certificate is None:
+        return result
+    # what all stars share of the objective
+    wheel_terms = [term for term in problem.objective if term.measure.channel.is_flywheel]
+    shared = sum((term.weight * result.final.value(term.measure) for term in wheel_terms), 0.0)
+    value, proof = objective_value(problem, result.final), result.certificate
+    bound = shared + (proof.lower_bound if terms else 0.0)
+    nothing = numerical_zero(problem, result.final.engine)
+    details = result.phasing
+    if details is not None and terms:
+        ranking = (replace(s, value=s.value + shared, lower_bound=s.lower_bound + shared) for s in details.ranking)
+        details = replace(details, ranking=tuple(ranking))
+    method = f"{proof.method}; {_ALIKE}"
+    return replace(
+        result,
+        objective=ObjectiveValue.of(problem, value, objective_value(problem, initial)),
+        certificate=certified(value, bound, nothing, problem.tolerance, Reach.WHOLE, proof.kkt_residual, method),
+        phasing=details,
+        error=partial(error_of, result.problem, result.final),
+    )
+
+
+def _any_star(problem: Problem, phasing: Phasing) -> Result:
+    """Return one of the stars where all are worth the same."""
+    families, why = families_of(phasing)
+    if not families:
+        return no_star(problem, f"no star exists: {why}")
+    family = families[0]
+    candidate = family.candidate(phasing, family.first)
+    result = solve_fixed(replace(phasing.realise(candidate), phasing=None))
+    value = objective_value(result.problem, result.final)
+    proof = certified(value, value, numerical_zero(problem), problem.tolerance, Reach.WHOLE, 0.0, _ALIKE)
+    ranking = [ranked_star(phasing, candidate, family.first, value, value, True)]
+    details = ranking_result(phasing, candidate, ranking, sum(each.size for each in families), 1, _ALIKE)
+    return with_star(problem, phasing, result, candidate, proof, details)

@@ -1,0 +1,272 @@
+"""Decision of stars, firing orders and shafts together (S18)."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TypeAlias
+
+import numpy as np
+
+from laufruhe.errors import ModelError, SolverError, counted
+from laufruhe.load_models.lone_parts import gas_tells_apart
+from laufruhe.machine.firing import MOST_ORDERS
+from laufruhe.numerics.budget import limited, passed
+from laufruhe.numerics.progress import report_progress
+from laufruhe.problem.numerical_zero import numerical_zero
+from laufruhe.problem.phasing import Candidate, Intervals
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.prove.certificate import Reach, certified, room_of
+from laufruhe.prove.throws.firing_average import firing_bound
+from laufruhe.solvers.conclusion import quoted, result_under
+from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.stars.even_irregularity import flywheel_measures, solve_alike_stars
+from laufruhe.solvers.stars.even_search import Answer, EvenDesign, search_even
+from laufruhe.solvers.stars.families import Family, families_of
+from laufruhe.solvers.stars.ranking import ORDERS_LISTED, distinct_orders, ranked_orders, ranked_star, ranking_result
+from laufruhe.solvers.stars.star_program import shaft_owners, solve_design
+from laufruhe.solvers.stars.star_results import StarDesign, no_star, solve_fixed, with_star
+from laufruhe.solvers.throws.throw_starts import why_none_fires
+
+MOST_TIMES, ROUNDS = 16, 2
+"""Times as many angles at most for a search whose own are too few to prove its best star, and how often."""
+Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
+"""A star, and its steps where it fires evenly."""
+Decide: TypeAlias = Callable[[Problem, float], Result]
+Search: TypeAlias = Callable[[Problem, Phasing, Sequence[Family]], Answer]
+
+
+def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
+    """Decide open throws, firing orders, shafts and unbalances together.
+
+    Parameters
+    ----------
+    search
+        Search that returns the best designs of all even stars of some families.
+
+    Returns
+    -------
+    Result with a ranking. Its certificate is `global` if the search ended by itself,
+    `global within gap` if time ended it, and `local` where throws left the even steps.
+
+    Raises
+    ------
+    SolverError
+        If a solver stops without an answer.
+    """
+    phasing = problem.phasing
+    if phasing is None:
+        raise SolverError("nothing of the phasing is open")
+    has_wheel = bool(flywheel_measures(problem))
+    if phasing.throws is None and has_wheel and not phasing.continuous and not gas_tells_apart(problem):
+        return solve_alike_stars(problem, phasing, partial(solve_phasing, search=search))
+    started = time.perf_counter()
+    if phasing.throws is not None:
+        result = solve_each_order(problem, phasing, even_stars(phasing))
+    elif phasing.throw_bounds is not None:
+        result = _solve_uneven(problem, phasing, None)
+    else:
+        result = _solve_open_throws(problem, phasing, search)
+    return replace(result, timing={**result.timing, "phasing": time.perf_counter() - started})
+
+
+def _solve_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Result:
+    is_even = phasing.intervals.holds([phasing.even_interval])
+    is_unlike = gas_tells_apart(problem)
+    if flywheel_measures(problem) and not is_unlike:
+        even = replace(phasing, intervals=Intervals(phasing.even_interval, phasing.even_interval))
+        solve = partial(solve_phasing, search=search)
+        result = solve_alike_stars(problem, even, solve) if is_even and families_of(even)[0] else None
+        return _solve_uneven(problem, phasing, None if result is None or result.objective is None else result)
+    one_by_one = is_unlike or phasing.shares_throws or any(measure.is_cylinder_resolved for measure in problem.measures)
+    if (problem.feels_order or is_unlike) and is_even and one_by_one:
+        stars = even_stars(phasing)
+        result = solve_each_order(problem, phasing, stars) if stars else no_star(problem, why_none_fires(phasing)[0])
+        if not phasing.continuous:
+            return result
+        return _solve_uneven(problem, phasing, None if result.objective is None else result)
+    families = families_of(phasing, problem.feels_order)[0] if is_even else ()
+    if not families:
+        if phasing.continuous:
+            return _solve_uneven(problem, phasing, None)
+        return no_star(problem, why_none_fires(phasing)[0])
+    answer = search(_with_half_tolerance(problem), phasing, families)
+    if not answer.designs:
+        if phasing.continuous:
+            return _solve_uneven(problem, phasing, None)
+        names = tuple(limit.name for limit in problem.limits)
+        if answer.complete:
+            # one star may break some of the limits, and another the others
+            limits = (quoted(names) or "the bounds") + " together" * (len(names) > 1)
+            why = f"no star keeps {limits}, whatever else is decided ({counted(answer.infeasible, 'design')} tried)"
+            return no_star(problem, why, conflict=names)
+        cause = "the time limit" if passed() else f"phasing.time_limit = {phasing.time_limit:g} s"
+        why = f"no feasible design was found in {cause}; raise it"
+        return no_star(problem, why, Status.FAILED)
+    result = _best_of(problem, phasing, answer)
+    if answer.complete and problem.search.proves:
+        result = _with_more_angles(problem, families, result, search)
+    return _solve_uneven(problem, phasing, result) if phasing.continuous else result
+
+
+def _with_half_tolerance(problem: Problem) -> Problem:
+    # one half is for a design, the other for how much better another one has to be
+    return replace(problem, tolerance=0.5 * problem.tolerance)
+
+
+def _with_more_angles(problem: Problem, families: Sequence[Family], result: Result, search: Search) -> Result:
+    """Search again at more angles, while these are all that keeps a gap open (P7)."""
+    for _ in range(ROUNDS):
+        gap = result.certificate.gap if result.certificate else 0.0
+        if gap <= problem.tolerance or passed():
+            break
+        # averages about angles fall short of means by the square of their step
+        times = min(math.ceil(math.sqrt(2.0 * gap / problem.tolerance)), MOST_TIMES)
+        fidelity = problem.fidelity
+        # the gas keeps its steps: a design is worth the same at as many angles, whoever evaluates it
+        problem = problem.at(replace(fidelity, samples=times * fidelity.samples, gas_samples=fidelity.gas_steps))
+        assert problem.phasing is not None
+        answer = search(_with_half_tolerance(problem), problem.phasing, families)
+        again = _best_of(problem, problem.phasing, answer) if answer.designs else result
+        if again.certificate is None or again.certificate.gap >= gap or not answer.complete:
+            break
+        result = again
+    return result
+
+
+def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
+    """Solve the best even design once more as a problem of its own, with the bound of all designs (S17)."""
+    entries = [design.ranked(phasing) for design in answer.designs]
+    fired = [(design, entry) for design, entry in zip(answer.designs, entries, strict=True) if entry.firing_orders]
+    if not fired:
+        return no_star(problem, "no star has a firing order that keeps the firing intervals allowed")
+    left = iter(fired)
+    for best, first in left:
+        left_out = phasing.without(_needed_shafts(problem, phasing, best))
+        candidate = replace(best.candidate, firing_order=first.firing_orders[0].order, left_out=left_out)
+        result = solve_fixed(replace(_with_half_tolerance(phasing.realise(candidate)), phasing=None))
+        # a peak may stand between the angles at which the search looks
+        if StarDesign(candidate, result).is_met:
+            break
+    else:
+        why = f"each of the best {counted(len(fired), 'star')} breaks a limit between angles that the search looks at"
+        return no_star(problem, f"{why}; raise phasing.best or fidelity.samples", Status.FAILED)
+    shared = firing_bound(problem, result.final) if result.objective and not any(phasing.opened) else 0.0
+    bound, nothing = max(answer.bound, shared), numerical_zero(problem)
+    result, doubt = result_under(result, bound, nothing)
+    value = result.objective.value if result.objective else best.value
+    certificate = certified(
+        value, bound, nothing, problem.tolerance, Reach.WHOLE,
+        result.certificate.kkt_residual if result.certificate else 0.0, answer.method, doubt,
+    )  # fmt: skip
+    ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in left)]
+    count = sum(family.size for family in families_of(phasing, problem.feels_order)[0])
+    details = ranking_result(phasing, candidate, ranking, count, answer.looked_at, answer.method)
+    return with_star(problem, phasing, result, candidate, certificate, details)
+
+
+def _needed_shafts(problem: Problem, phasing: Phasing, best: EvenDesign) -> tuple[int, ...]:
+    """Return the sets of shafts without which the design would be worse: the others need not be built."""
+    needed = best.built
+    if not needed:
+        return needed
+    model = best.family.model(phasing)
+    owners = shaft_owners(model)
+    nothing, tolerance = numerical_zero(problem), 0.5 * problem.tolerance
+    for k in sorted(best.built, key=lambda k: -phasing.shafts.masses[k]):
+        fewer = tuple(j for j in needed if j != k)
+        again, _ = solve_design(model, best.steps, fewer, owners, tolerance, nothing)
+        if again is not None and again.value <= best.value + room_of(best.value, tolerance, nothing):
+            needed = fewer
+    return needed
+
+
+def even_stars(phasing: Phasing) -> list[Star]:
+    """Return throws as given, or all stars that fire evenly, images included."""
+    if phasing.throws is not None:
+        return [(Candidate(phasing.throws, None, *phasing.least_geometry), None)]
+    pairs = [(family, tuple(map(int, star))) for family in families_of(phasing)[0] for star in family.stars]
+    return [(replace(family.candidate(phasing, steps), firing_order=None), steps) for family, steps in pairs]
+
+
+def solve_each_order(
+    problem: Problem, phasing: Phasing, stars: Sequence[Star], decide: Decide = lambda own, _: solve_fixed(own),
+    most: int | None = None,
+) -> Result:  # fmt: skip
+    """Solve every firing order that loads tell apart, of every star with every set of shafts, each by itself.
+
+    Parameters
+    ----------
+    decide
+        Solver of all else that is open, given a problem and the least value so far.
+    most
+        Number of designs, drawn of all, that are decided where no bound is requested; None for every one, with its
+        bound.
+    """
+    orders = {star: ranked_orders(phasing, star, steps) for star, steps in stars}
+    if not any(orders.values()):
+        return no_star(problem, why_none_fires(phasing)[0])
+    # the small ones first: a shaft that buys nothing is not built
+    sets = sorted(phasing.shafts.allowed, key=lambda chosen: (len(chosen), chosen))
+    fired = [(star, order.order) for star, steps in stars for order in distinct_orders(problem, phasing, star, steps)]
+    if most is None and len(fired) * len(sets) >= MOST_ORDERS:
+        many = f"{MOST_ORDERS} and more firing orders and sets of shafts are too many to decide one by one"
+        raise ModelError(f"{many}; give a firing order, or throws")
+    designs = [replace(star, firing_order=o, left_out=phasing.without(built)) for built in sets for star, o in fired]
+    whole = len(designs)
+    if most is not None and whole > most:
+        drawn = np.random.default_rng(problem.search.seed).choice(whole, most, replace=False)
+        designs = [designs[k] for k in sorted({0, *drawn.tolist()})]
+    started, every = time.perf_counter(), list[StarDesign]()
+    for k, candidate in enumerate(designs):
+        least = min((one.value for one in every), default=math.inf)
+        report_progress("firing orders and sets of shafts", k, len(designs), least)
+        if every and (passed() or time.perf_counter() - started > phasing.time_limit):
+            break
+        every.append(StarDesign(candidate, decide(_with_half_tolerance(phasing.realise(candidate)), least)))
+    complete = len(every) == whole
+    solved = [design for design in every if design.is_met]
+    if not solved:
+        proven = complete and all(design.is_excluded for design in every)
+        why = f"no firing order and no set of shafts that may be built {'keeps' if proven else 'was found that keeps'}"
+        status, names = Status.INFEASIBLE if proven else Status.FAILED, [limit.name for limit in problem.limits]
+        return no_star(problem, f"{why} the limits", status, tuple(names) if proven else ())
+    nothing = numerical_zero(problem)
+    best = solved[0]
+    for design in solved[1:]:
+        if design.value < best.value - room_of(best.value, 0.5 * problem.tolerance, nothing):
+            best = design
+    bound = min(design.bound for design in every) if complete else 0.0
+    count = sum(map(len, orders.values()))
+    of_stars = f" of {len(stars)} stars" if len(stars) > 1 else ""
+    method = f"{len(fired)} of {counted(count, 'firing order')}{of_stars} seen at {counted(len(sets), 'set')} of shafts"
+    if not complete:
+        method += f", {len(every)} of all {whole} drawn and decided"
+    proof = best.result.certificate
+    how, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
+    reach = Reach.WHOLE if most is None else Reach.ASIDE
+    result, doubt = result_under(best.result, bound, nothing)
+    best = replace(best, result=result)
+    certificate = certified(best.value, bound, nothing, problem.tolerance, reach, residual, how, doubt)
+    # the first design of every star, its own firing order before the others of the star
+    firsts: dict[Candidate, StarDesign] = {}
+    for design in [best, *sorted(solved, key=lambda one: one.value)]:
+        firsts.setdefault(replace(design.candidate, firing_order=None, left_out=()), design)
+    ranking = []
+    for star, design in [*firsts.items()][: phasing.best]:
+        entry = ranked_star(phasing, design.candidate, None, design.value, bound, complete)
+        own = next(order for order in orders[star] if order.order == design.candidate.firing_order)
+        rest = tuple(order for order in orders[star] if order != own)
+        ranking.append(replace(entry, firing_orders=(own, *rest)[:ORDERS_LISTED], even=own.is_even))
+    details = ranking_result(phasing, best.candidate, ranking, count * len(sets), len(solved), method)
+    return with_star(problem, phasing, best.result, best.candidate, certificate, details)
+
+
+def _solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Result:
+    from laufruhe.solvers.throws.uneven_throws import solve_uneven
+
+    with limited(phasing.time_limit):
+        return solve_uneven(problem, phasing, even)

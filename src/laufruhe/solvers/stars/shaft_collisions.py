@@ -1,0 +1,47 @@
+"""Sets of optional shafts that collide where they stand: with the engine, or with each other."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+from laufruhe.problem.evaluation import Evaluation
+from laufruhe.problem.measure import Limit
+from laufruhe.problem.problem import Problem
+from laufruhe.solvers.conclusion import broken_limits
+
+
+def exclude_collisions(problem: Problem, limits: Sequence[Limit], initial: Evaluation) -> tuple[Problem, Evaluation]:
+    """Exclude sets of optional shafts that break limits on their places.
+
+    Parameters
+    ----------
+    limits
+        Limits that nothing open moves, but for the choice of shafts.
+    initial
+        Evaluation with all shafts.
+
+    Returns
+    -------
+    The problem, and the evaluation with as few shafts as may be: every design breaks the limits that it breaks.
+    """
+    placing = tuple(limit for limit in limits if limit.measure.channel.is_placing)
+    phasing = problem.phasing
+    if phasing is None or not (phasing.shafts.optional and placing):
+        return problem, initial
+
+    def with_built(sets: Sequence[int]) -> Evaluation:
+        left_out = phasing.without(sets)
+        rotors = tuple(rotor for rotor in initial.engine.rotors if rotor.shaft.name not in left_out)
+        return replace(initial, engine=replace(initial.engine, rotors=rotors))
+
+    clashes: list[tuple[int, ...]] = []
+    # every distance is that of one shaft, or of two
+    for count in (1, 2):
+        for sets in itertools.combinations(range(len(phasing.shafts.optional)), count):
+            is_known = any(set(clash) <= set(sets) for clash in clashes)
+            if not is_known and broken_limits(placing, with_built(sets)):
+                clashes.append(sets)
+    shafts = replace(phasing.shafts, clashes=tuple(clashes))
+    return replace(problem, phasing=replace(phasing, shafts=shafts)), with_built(())

@@ -1,0 +1,158 @@
+"""Firing windows of a problem: orders in which its throws may fire, and throws that keep one (S26)."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from laufruhe.load_models.amplitudes import amplitude_objective
+from laufruhe.load_models.uneven_model import rotor_states
+from laufruhe.machine.firing import from_one
+from laufruhe.machine.firing_windows import SLACK, FiringBounds, FiringWindow
+from laufruhe.numerics.arrays import Array
+from laufruhe.problem.measure import Term
+from laufruhe.problem.phasing import Candidate
+from laufruhe.problem.problem import Phasing, Problem
+from laufruhe.problem.sets import Sector
+from laufruhe.prove.witness import thin
+
+MOST_WINDOWS = 6_000
+
+
+def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
+    """Return every way to fire within the bounds, one of images that are worth the same; None if there are too many."""
+    layout, allowed = phasing.layout(*phasing.least_geometry), phasing.intervals
+    firing = firing_bounds(phasing)
+    is_free = allowed.least <= 0.0 and allowed.most >= phasing.cycle.angle
+    if phasing.throw_bounds is not None and is_free and phasing.firing_order is None and not problem.feels_gas:
+        # in which order they fire makes no difference
+        return [firing.anywhere]
+    # of four images one stays
+    images = 4 if _has_images(problem, phasing) else 1
+    windows = list(itertools.islice(firing.windows(), images * MOST_WINDOWS + 1))
+    if images > 1 and len(windows) <= images * MOST_WINDOWS:
+        last = len(layout.positions) + 1
+        windows = [
+            window
+            for window in windows
+            if window.order
+            == min(
+                from_one(order)
+                for numbers in (window.order, tuple(last - number for number in window.order))
+                for order in (numbers, numbers[::-1])
+            )
+        ]
+    if len(windows) > MOST_WINDOWS:
+        return [firing.anywhere] if phasing.throw_bounds is not None and not problem.feels_gas else None
+    return windows
+
+
+def _has_images(problem: Problem, phasing: Phasing) -> bool:
+    """Return True if swapping front and back, or turning the other way, changes nothing (S2)."""
+    if phasing.throw_bounds is not None or phasing.firing_order is not None or phasing.bank is not None:
+        return False
+    layout = phasing.layout(None, None)
+    places = sorted(layout.throw_positions)
+    if any(abs(a + b) > 1e-9 * places[-1] for a, b in zip(places, places[::-1], strict=True)):
+        return False
+    limited = [Term(limit.measure) for limit in problem.limits]
+    without_limits = replace(problem, phasing=None, objective=(*problem.objective, *limited), limits=())
+    return amplitude_objective(without_limits, phasing, layout) is not None
+
+
+def firing_bounds(phasing: Phasing) -> FiringBounds:
+    """Return the bounds that firing has to keep."""
+    layout, allowed = phasing.layout(*phasing.least_geometry), phasing.intervals
+    return FiringBounds(
+        phasing.cycle, layout, max(allowed.least, 0.0), allowed.most, phasing.throw_bounds, phasing.firing_order,
+        tuple(p for p, is_open in zip((phasing.bank, phasing.split), phasing.opened, strict=True) if p and is_open),
+    )  # fmt: skip
+
+
+def design_at(phasing: Phasing, angles: Array) -> Candidate:
+    """Return throws, bank angle and split pins at the throws and shared angles of a box, without a firing order."""
+    layout = phasing.layout(*phasing.least_geometry)
+    count = len(layout.throw_positions)
+    shared = iter(angles[count:])
+    geometry = [
+        float(np.clip(next(shared), *pair)) if is_open and pair is not None else (None if pair is None else pair[0])
+        for pair, is_open in zip((phasing.bank, phasing.split), phasing.opened, strict=True)
+    ]
+    # throws that are open are counted from cylinder 1 at its dead centre
+    turned = layout.side(0) * float(angles[count:].sum()) if phasing.throw_bounds is None else 0.0
+    throws = tuple(float(angle + turned) % math.tau for angle in angles[:count])
+    return Candidate(throws, None, geometry[0], geometry[1])
+
+
+def place_in(phasing: Phasing, window: FiringWindow, candidate: Candidate) -> Array | None:
+    """Return throws and shared angles of a design as boxes of a window have them; None if it does not keep that."""
+    if window.order and window.order != candidate.firing_order:
+        return None
+    layout = phasing.layout(*phasing.least_geometry)
+    geometry = (candidate.bank_angle, candidate.split_pin)
+    shared = [float(angle or 0.0) for angle, is_open in zip(geometry, phasing.opened, strict=True) if is_open]
+    turned = layout.side(0) * sum(shared) if phasing.throw_bounds is None else 0.0
+    low, high = window.box
+    throws = np.array(candidate.throws) - turned
+    # the same throw, at the turn that is nearest to the middle of its box
+    first = slice(0, len(throws))
+    throws = throws + math.tau * np.round((0.5 * (low[first] + high[first]) - throws) / math.tau)
+    place = np.append(throws, shared)
+    is_inside = np.all(place >= low - SLACK) and np.all(place <= high + SLACK)
+    return np.clip(place, low, high) if is_inside and window.within(*thin(place, low, high)) is not None else None
+
+
+def has_same_unbalances(phasing: Phasing, candidate: Candidate) -> bool:
+    """Return True if unbalances are the same at all open angles: a share of what turns on offset pins is not."""
+    ends = [(pair, 0.5 * (pair[0] + pair[1])) if pair else ((None,), None) for pair in (phasing.bank, phasing.split)]
+    every = [
+        rotor_states(
+            phasing.realise(replace(candidate, firing_order=None, bank_angle=b, split_pin=s, without_gas=True))
+        )
+        for b, s in product((*ends[0][0], ends[0][1]), (*ends[1][0], ends[1][1]))
+    ]
+    return all(states == every[0] for states in every)
+
+
+def turns_freely(phasing: Phasing, candidate: Candidate, rides: dict[str, int]) -> bool:
+    """Return True if all unbalances that ride on no throw follow where the crank stands when cylinder 1 fires.
+
+    Parameters
+    ----------
+    rides
+        Throw that every rotor turns with.
+    """
+    problem = phasing.realise(replace(candidate, firing_order=None, without_gas=True))
+    free = {rotor.name for rotor in problem.engine.rotors if rotor.name not in rides}
+    if any(rotor.unbalance for rotor in problem.engine.rotors if rotor.name in free):
+        return False
+    return all(
+        len(decision.rotor_drives) == 1 and isinstance(decision.set, Sector) and decision.set.free_angle
+        for decision in problem.unbalances
+        if any(drive.rotor in free for drive in decision.rotor_drives)
+    )
+
+
+def middle_of(window: FiringWindow) -> Array:
+    """Return throws inside a window, each in the middle of what those before it leave to it [rad]."""
+    low, high = window.box
+    for k in range(len(low)):
+        low, high = _fix(window, low, high, k, 0.5 * (low[k] + high[k]))
+    return np.asarray(0.5 * (low + high))
+
+
+def nearest(window: FiringWindow, throws: Array) -> Array:
+    """Return throws that keep a window, each as near to the given ones as those before it allow [rad]."""
+    low, high = window.box
+    for k, angle in enumerate(throws):
+        low, high = _fix(window, low, high, k, float(np.clip(angle, low[k], high[k])))
+    return np.asarray(0.5 * (low + high))
+
+
+def _fix(window: FiringWindow, low: Array, high: Array, throw: int, angle: float) -> tuple[Array, Array]:
+    here = np.arange(len(low)) == throw
+    return window.within(np.where(here, angle, low), np.where(here, angle, high)) or (low, high)
