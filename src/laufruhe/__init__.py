@@ -149,8 +149,8 @@ def _engine_problem(design: Engine, points: Sequence[OperatingPoint]) -> Problem
     from laufruhe.problem.measure import Measure, Term
     from laufruhe.problem.problem import Problem
 
-    given: Sequence[object] = points
-    strange = next((point for point in given if not isinstance(point, OperatingPoint)), None)
+    listed: Sequence[object] = points
+    strange = next((point for point in listed if not isinstance(point, OperatingPoint)), None)
     if strange is not None:
         raise wrong_call("points", strange, "is no operating point", "give a list of laufruhe.machine.OperatingPoint")
     if not points:
@@ -176,19 +176,19 @@ def study(source: Source, jobs: int = 1) -> dict[str, xr.Dataset]:
     """
     from tempfile import TemporaryDirectory
 
-    from laufruhe.files.reader import given
+    from laufruhe.files.reader import tables_and_path
     from laufruhe.studies.kept_points import KEPT
     from laufruhe.studies.reader import load_study
     from laufruhe.studies.runner import run
 
     check_whole("jobs", jobs, 1)
-    _, path = given(source)
+    _, path = tables_and_path(source)
     with TemporaryDirectory() as folder:
         datasets, _ = run(load_study(source), path.parent, Path(folder) / KEPT, jobs=jobs)
     return datasets
 
 
-def _problem(given: Problem | Source) -> Problem:
+def _problem(problem: Problem | Source) -> Problem:
     from laufruhe.problem.problem import Problem
 
-    return given if isinstance(given, Problem) else load(given)
+    return problem if isinstance(problem, Problem) else load(problem)

@@ -123,13 +123,13 @@ def refused(where: str, value: str, rule: str, remedy: str, source: object = "la
     return InputError(str(source), (Complaint(where, value, rule, remedy),))
 
 
-def wrong_call(where: str, given: object, rule: str, remedy: str) -> InputError:
+def wrong_call(where: str, argument: object, rule: str, remedy: str) -> InputError:
     """Return the error of a wrong argument of a Python call."""
-    return refused(where, printed(repr(given), 60), rule, remedy)
+    return refused(where, printed(repr(argument), 60), rule, remedy)
 
 
-def check_whole(where: str, given: object, least: int, most: float = math.inf) -> None:
+def check_whole(where: str, argument: object, lower: int, upper: float = math.inf) -> None:
     """Refuse an argument that is no whole number between two bounds."""
-    if isinstance(given, bool) or not isinstance(given, Integral) or not least <= int(given) <= most:
-        span = f"{least} or more" if most == math.inf else f"{least} to {most}"
-        raise wrong_call(where, given, f"must be a whole number, {span}", "give one")
+    if isinstance(argument, bool) or not isinstance(argument, Integral) or not lower <= int(argument) <= upper:
+        span = f"{lower} or more" if upper == math.inf else f"{lower} to {upper}"
+        raise wrong_call(where, argument, f"must be a whole number, {span}", "give one")

@@ -30,8 +30,8 @@ def run_study(
     study = load_study(path)
     folder = out if out is not None else Path("results") / shown_as(path).stem
     points = folder / KEPT
-    option, names = "--out" if out is not None else "results", file_names(study)
-    with files.staged(files.Set(folder, option, "study", names, beside=[KEPT])) as stage:
+    option, file_list = "--out" if out is not None else "results", file_names(study)
+    with files.staged(files.Set(folder, option, "study", file_list, beside=[KEPT])) as stage:
         datasets, seconds = run(study, path.parent, points, _Progress(say), jobs or processors())
         command = typed("laufruhe", "study", str(path))
 

@@ -46,18 +46,18 @@ class CatalogueEngine:
     note: str
     engine: Mapping[str, Any]
 
-    def assumption(self, own: Mapping[str, Any]) -> str:
+    def assumption(self, table: Mapping[str, Any]) -> str:
         """Return the sentence about assumed values that a problem does not give; empty if it gives all."""
-        left = [f"{key.replace('_', ' ')} {shown(self.engine[key])}" for key in self.assumed if key not in own]
+        left = [f"{key.replace('_', ' ')} {shown(self.engine[key])}" for key in self.assumed if key not in table]
         return f"{self.name}: assumed, not published: {', '.join(left)}." if left else ""
 
-    def under(self, own: Mapping[str, Any]) -> dict[str, Any]:
+    def under(self, table: Mapping[str, Any]) -> dict[str, Any]:
         """Return [engine] with the figures of the catalogue as defaults."""
-        dropped = {KEY, *(key for pair in _EITHER if any(one in own for one in pair) for key in pair)}
-        if any(own.get(key) == "open" for key in _PHASES):
+        dropped = {KEY, *(key for pair in _EITHER if any(one in table for one in pair) for key in pair)}
+        if any(table.get(key) == "open" for key in _PHASES):
             dropped |= {*_PHASES}
         defaults = {key: value for key, value in self.engine.items() if key not in dropped}
-        return {**defaults, **{key: value for key, value in own.items() if key != KEY}}
+        return {**defaults, **{key: value for key, value in table.items() if key != KEY}}
 
 
 @cache
@@ -81,15 +81,15 @@ def engine_named(name: object, where: str) -> CatalogueEngine:
 
 def with_catalogue(tables: dict[str, Any]) -> dict[str, Any]:
     """Return tables with the catalogue engine written out, with its source and assumptions."""
-    given = tables.get("engine")
-    own = given if isinstance(given, dict) else {KEY: given} if isinstance(given, str) else {}
-    if KEY not in own:
+    value = tables.get("engine")
+    table = value if isinstance(value, dict) else {KEY: value} if isinstance(value, str) else {}
+    if KEY not in table:
         return tables
-    engine = engine_named(own[KEY], "engine" if isinstance(given, str) else f"engine.{KEY}")
+    engine = engine_named(table[KEY], "engine" if isinstance(value, str) else f"engine.{KEY}")
     assumptions, source = tables.get("assumptions", []), tables.get("source", "")
-    whole = {**tables, "engine": engine.under(own)}
+    whole = {**tables, "engine": engine.under(table)}
     if isinstance(assumptions, list):
-        whole["assumptions"] = [*assumptions, *filter(None, (engine.assumption(own),))]
+        whole["assumptions"] = [*assumptions, *filter(None, (engine.assumption(table),))]
     if isinstance(source, str):
         whole["source"] = f"{source}; engine: {engine.source}" if source else engine.source
     return whole

@@ -179,7 +179,7 @@ class Refused(LaufruheError):
         super().__init__(str(self.complaint))
 
 
-def number_read(number: Number, place: Sequence[str | int], given: Any) -> float | Open:
+def number_read(number: Number, place: Sequence[str | int], raw: Any) -> float | Open:
     """Read the number at a place of a file.
 
     Raises
@@ -188,10 +188,10 @@ def number_read(number: Number, place: Sequence[str | int], given: Any) -> float
         If it is no such number.
     """
     try:
-        return number.read(given)
+        return number.read(raw)
     except PydanticCustomError as error:
         rule, _, remedy = error.message().partition("; ")
-        raise Refused(key_path(place), given, rule, remedy) from None
+        raise Refused(key_path(place), raw, rule, remedy) from None
 
 
 @contextmanager
@@ -203,15 +203,15 @@ def in_file(source: object) -> Iterator[None]:
         raise InputError(str(source), (refused.complaint,)) from None
 
 
-def measured(text: str | float, unit: str, where: str, given: str | None = None) -> float:
+def measured(text: str | float, unit: str, where: str, unit_text: str | None = None) -> float:
     """Return the SI value of a text such as '120 mm' or of a number; `given` is the unit alone at a key for units."""
     try:
         return units.parse(str(text), unit)
     except units.UnitError as error:
         complaint = Complaint.from_error(error, where)
         # a key for units has no number
-        remedy = f"use {units.usual(unit)} ..." if given else complaint.remedy
-        raise Refused(where, given or text, complaint.rule, remedy) from None
+        remedy = f"use {units.usual(unit)} ..." if unit_text else complaint.remedy
+        raise Refused(where, unit_text or text, complaint.rule, remedy) from None
 
 
 @contextmanager
@@ -226,9 +226,9 @@ def blamed_on(where: str, value: str = "") -> Iterator[None]:
 
 def one_of(table: BaseModel, where: str, key: str, other: str, shown: Any = None, named: str = "") -> None:
     """Refuse both or none of two keys; `named` is the name of the other in the remedy."""
-    given = [getattr(table, k) not in (None, []) for k in (key, other)]
-    if given[0] == given[1]:
-        state = f"is given twice, also as {other}" if given[0] else "is missing"
+    present = [getattr(table, k) not in (None, []) for k in (key, other)]
+    if present[0] == present[1]:
+        state = f"is given twice, also as {other}" if present[0] else "is missing"
         raise Refused(f"{where}.{key}", shown, state, f"give {key} or {named or other}, one of them")
 
 

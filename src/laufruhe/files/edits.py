@@ -30,11 +30,11 @@ def with_values(tables: Mapping[str, Any], values: Mapping[str, Any]) -> dict[st
     star = {int(throw[1]): name for name in values if (throw := _THROW.fullmatch(name))}
     done: set[str] = set()
     if engine.get("throws") == "open" and star and sorted(star) == list(range(1, len(star) + 1)):
-        own = {key: values[name] for key in PHASES if (name := key.replace("_", " ")) in values}
-        own["throws"] = [values[star[k]] for k in sorted(star)]
+        phases = {key: values[name] for key in PHASES if (name := key.replace("_", " ")) in values}
+        phases["throws"] = [values[star[k]] for k in sorted(star)]
         built = {name: name.removesuffix(_BUILT) for name in values if name.endswith(_BUILT)}
-        edited = with_star(tables, own, [shaft for name, shaft in built.items() if not float(values[name])])
-        done = {*star.values(), *built, *(key.replace("_", " ") for key in own)}
+        edited = with_star(tables, phases, [shaft for name, shaft in built.items() if not float(values[name])])
+        done = {*star.values(), *built, *(key.replace("_", " ") for key in phases)}
     for name, value in values.items():
         edited = edited if name in done else with_value(edited, name, value)
     return edited

@@ -235,11 +235,11 @@ def layout_of(table: EngineTable) -> Layout:
 
 def _layout_input(table: EngineTable, gas: bool = False) -> Asked:
     """Return the input of the layout."""
-    given = {key.name: table.own(key.name) for key in table.kind.keys}
+    values = {key.name: table.own(key.name) for key in table.kind.keys}
     masses = [key.name for key in table.kind.keys if key.kind in ("open mass", "open lead")]
     own = {
         name: value if not isinstance(value, Open) else value.start if name in masses else None
-        for name, value in given.items()
+        for name, value in values.items()
     }
     rods = {name: value.model_dump() for name, value in own.items() if isinstance(value, RodTable)}
     order = None if table.given_order is None else tuple(table.given_order)
@@ -286,11 +286,11 @@ def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
         return even_throws(cycle_of(table), layout, table.given_order)
 
 
-def _mechanism(table: EngineTable, own: Mapping[str, Any] | None = None) -> tuple[Mechanism, Rod | None]:
+def _mechanism(table: EngineTable, values: Mapping[str, Any] | None = None) -> tuple[Mechanism, Rod | None]:
     """Return masses and lengths of one cylinder, and its rod if that is a rigid body."""
     big_end = None if table.big_end is None else table.big_end.size
     if not table.kind.has_pistons:
-        return table.kind.mechanism(own or {}, rotating_mass=table.rotating_mass, big_end=big_end), None
+        return table.kind.mechanism(values or {}, rotating_mass=table.rotating_mass, big_end=big_end), None
     radius, rod_length = _radius_and_rod(table)
     rod = None
     if table.rod is not None:
@@ -384,7 +384,7 @@ def piston_masses(
         own = [getattr(row, key, None) for row in table.slider_cranks] or [
             second if part.shaft != CRANKSHAFT and key == _RECIPROCATING else None for part in parts
         ]
-        names = [part.name for part, given in zip(parts, own, strict=True) if given is None]
+        names = [part.name for part, mass_of in zip(parts, own, strict=True) if mass_of is None]
         decide(key.replace("_", " "), mass, names, key)
     if isinstance(second, Open):
         names = [part.name for part in parts if part.shaft != CRANKSHAFT]

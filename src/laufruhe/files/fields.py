@@ -124,21 +124,21 @@ class Number:
         text = {"type": "string", "pattern": units.pattern(self.unit)[:-1] + _BEHIND, **about}
         return {"anyOf": [text, {"type": "number"}]} if self.plain is not None else text
 
-    def read(self, given: Any) -> float | Open:
+    def read(self, raw: Any) -> float | Open:
         """Return a number [SI], or an open one."""
-        return self._open(given) if isinstance(given, dict) else self._bounded(self._number(given))
+        return self._open(raw) if isinstance(raw, dict) else self._bounded(self._number(raw))
 
-    def _number(self, given: Any) -> float:
-        if isinstance(given, bool) or not isinstance(given, int | float | str):
+    def _number(self, raw: Any) -> float:
+        if isinstance(raw, bool) or not isinstance(raw, int | float | str):
             raise refusal(f"is no {'number' if not self.unit else 'number with a unit'}; {units.advice(self.unit)}")
-        if isinstance(given, str):
+        if isinstance(raw, str):
             try:
-                return units.parse(given, self.unit)
+                return units.parse(raw, self.unit)
             except units.UnitError as error:
-                raise refusal(_without_note(given) or str(error)) from None
+                raise refusal(_without_note(raw) or str(error)) from None
         if self.unit and self.plain is None:
             raise refusal(f"has no unit, {units.dimension_name(self.unit)} needs one; {units.advice(self.unit)}")
-        value = given * (1.0 if self.plain is None else self.plain)
+        value = raw * (1.0 if self.plain is None else self.plain)
         if not math.isfinite(value):
             raise refusal("is not finite; give a number")
         return value
@@ -160,30 +160,30 @@ class Number:
             raise refusal(f"must be at most {units.shown(self.most, self.unit)}; give a smaller value{or_share}")
         return value
 
-    def _open(self, given: dict[str, Any]) -> Open:
+    def _open(self, raw: dict[str, Any]) -> Open:
         if not self.openable:
             raise refusal("cannot be left open here; give a number")
-        if unknown := set(given) - {"between", "start"}:
+        if unknown := set(raw) - {"between", "start"}:
             rule = f"has an unknown key '{min(unknown)}'"
             raise refusal(
                 _without_note(min(unknown)) or f"{rule}; write {{ between = [low, high] }}, start = ... is optional"
             )
-        pair = given.get("between")
+        pair = raw.get("between")
         if not isinstance(pair, list) or len(pair) != 2:
             raise refusal("needs two bounds; write { between = [low, high] }")
         low, high = (self._part(bound, "bound") for bound in pair)
         if low > high:
             raise refusal("has its bounds reversed; write the smaller one first")
-        start = self._part(given["start"], "start") if "start" in given else min(max(0.0, low), high)
+        start = self._part(raw["start"], "start") if "start" in raw else min(max(0.0, low), high)
         if not low <= start <= high:
             raise refusal("starts outside its bounds; move start or the bounds")
         return Open(low, high, start)
 
-    def _part(self, given: Any, what: str) -> float:
+    def _part(self, raw: Any, what: str) -> float:
         try:
-            return self._bounded(self._number(given))
+            return self._bounded(self._number(raw))
         except PydanticCustomError as error:
-            shown = f'"{given}"' if isinstance(given, str) else given
+            shown = f'"{raw}"' if isinstance(raw, str) else raw
             raise refusal(f"{what} {shown}: {error.message()}") from None
 
 
@@ -209,16 +209,16 @@ class OrOpen:
     ) -> dict[str, Any]:
         return {"anyOf": [handler(schema), {"enum": ["open", *dict(self.named)]} if self.named else {"const": "open"}]}
 
-    def _read(self, given: Any, inner: Callable[[Any], Any]) -> Any:
-        if isinstance(given, str):
-            if given == "open":
-                return given
-            if given in dict(self.named):
-                return inner(list(dict(self.named)[given]))
+    def _read(self, raw: Any, inner: Callable[[Any], Any]) -> Any:
+        if isinstance(raw, str):
+            if raw == "open":
+                return raw
+            if raw in dict(self.named):
+                return inner(list(dict(self.named)[raw]))
             names = ", ".join(f'"{name}"' for name, _ in self.named)
             others = f', "open" or a name: {names}' if names else ' or "open"'
             raise refusal(f'is neither a list nor "open"; write for example {self.example}{others}')
-        return inner(given)
+        return inner(raw)
 
 
 @dataclass(frozen=True)
@@ -237,11 +237,11 @@ class OneOrEach:
         many = handler(schema)
         return {"anyOf": [many["items"], many]}
 
-    def _read(self, given: Any, inner: Callable[[Any], Any]) -> Any:
-        if not isinstance(given, list) and isinstance(self.inner, type) and issubclass(self.inner, BaseModel):
+    def _read(self, raw: Any, inner: Callable[[Any], Any]) -> Any:
+        if not isinstance(raw, list) and isinstance(self.inner, type) and issubclass(self.inner, BaseModel):
             # a complaint about a single table has no index
-            return [self.inner.model_validate(given)]
-        return inner(given if isinstance(given, list) else [given])
+            return [self.inner.model_validate(raw)]
+        return inner(raw if isinstance(raw, list) else [raw])
 
 
 def refusal(text: str) -> PydanticCustomError:
@@ -256,11 +256,11 @@ def _turning(ratio: float) -> float:
     return ratio
 
 
-def _side(given: Any) -> str | float:
+def _side(raw: Any) -> str | float:
     # the unit is checked with the quantity
-    if isinstance(given, bool) or not isinstance(given, int | float | str):
+    if isinstance(raw, bool) or not isinstance(raw, int | float | str):
         raise refusal("must be text in quotes")
-    return given
+    return raw
 
 
 _DEG = math.radians(1.0)

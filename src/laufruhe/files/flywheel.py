@@ -91,8 +91,8 @@ def _rim(table: RimTable) -> Rim:
         if table.arms.hub_diameter >= hole:
             shown, rule = units.shown(table.arms.hub_diameter, "m"), "does not fit into the rim"
             raise Refused("flywheel.rim.arms.hub_diameter", shown, rule, "make it smaller")
-        own = table.arms
-        arms = Arms(own.count, (own.at_rim[0], own.at_rim[1]), (own.at_hub[0], own.at_hub[1]), own.hub_diameter)
+        (rim_width, rim_depth), (hub_width, hub_depth) = table.arms.at_rim, table.arms.at_hub
+        arms = Arms(table.arms.count, (rim_width, rim_depth), (hub_width, hub_depth), table.arms.hub_diameter)
     return Rim(diameter.start, width.start, height.start, table.density, table.whole, arms)
 
 

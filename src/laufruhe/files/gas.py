@@ -170,11 +170,11 @@ def _chambers(table: ChambersTable, folder: Path, cycle: Cycle, parts: Sequence[
 
 def _chamber(table: ChamberTable, k: int, folder: Path, parts: Sequence[SliderCrank]) -> Chamber:
     where = f"gas.chambers[{k}]"
-    given = {key: own for key in ("steam", "pump", "trace") if (own := getattr(table, key)) is not None}
-    if len(given) != 1:
-        rule = "says nothing of its pressure" if not given else f"is said to be {' and '.join(given)}"
+    diagrams = {key: table_of for key in ("steam", "pump", "trace") if (table_of := getattr(table, key)) is not None}
+    if len(diagrams) != 1:
+        rule = "says nothing of its pressure" if not diagrams else f"is said to be {' and '.join(diagrams)}"
         raise Refused(where, None, rule, "give one of steam, pump and trace")
-    ((key, diagram),) = given.items()
+    ((key, diagram),) = diagrams.items()
     numbers = table.cylinders if table.cylinders is not None else range(1, len(parts) + 1)
     for number in numbers:
         if number > len(parts):

@@ -288,10 +288,10 @@ def limits_of(tables: Sequence[ConstraintTable], scene: Scene) -> tuple[Limit, .
     for low in numbers:
         for high in numbers:
             if low.measure == high.measure and low.minimum > high.maximum:
-                least, most = (units.shown(value, low.measure.unit) for value in (low.minimum, high.maximum))
+                lower, upper = (units.shown(value, low.measure.unit) for value in (low.minimum, high.maximum))
                 both = f"'{low.name}' and '{high.name}' contradict each other"
                 said = both if low is not high else f"'{low.name}' contradicts itself"
-                rule = f"{said}: at least {least} and at most {most}"
+                rule = f"{said}: at least {lower} and at most {upper}"
                 raise Refused("constraints", None, rule, "let the limits leave room")
     return tuple(limits)
 
@@ -318,8 +318,8 @@ def _limit(table: ConstraintTable, where: str, scene: Scene) -> Limit:
         if not first < last:
             raise Refused(f"{where}.outside", table.outside, "is no band", "write the smaller one first")
         band = first, last
-    largest, least = math.inf if high is None else high, -math.inf if low is None else low
-    return Limit(table.name or measure.name, measure, largest, least, band)
+    upper, lower = math.inf if high is None else high, -math.inf if low is None else low
+    return Limit(table.name or measure.name, measure, upper, lower, band)
 
 
 def _bound(text: str | float, measure: Measure, where: str) -> float:

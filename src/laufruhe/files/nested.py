@@ -48,13 +48,13 @@ def texts_in(tables: Any) -> Iterator[tuple[Place, str]]:
     return ((place, node) for place, node in inside(tables) if isinstance(node, str))
 
 
-def plain(given: Any, depth: int) -> Any:
+def plain(raw: Any, depth: int) -> Any:
     """Return a copy with lists for tuples and arrays and numbers for NumPy's, down to a depth."""
-    if isinstance(given, Mapping) and depth:
-        return {key: plain(value, depth - 1) for key, value in given.items()}
-    if isinstance(given, list | tuple) and depth:
-        return [plain(value, depth - 1) for value in given]
-    return given.tolist() if isinstance(given, np.ndarray | np.generic) else given
+    if isinstance(raw, Mapping) and depth:
+        return {key: plain(value, depth - 1) for key, value in raw.items()}
+    if isinstance(raw, list | tuple) and depth:
+        return [plain(value, depth - 1) for value in raw]
+    return raw.tolist() if isinstance(raw, np.ndarray | np.generic) else raw
 
 
 def number_at(model: type[BaseModel], path: Sequence[str | int]) -> f.Number | None:

@@ -109,9 +109,9 @@ class Brake:
             raise Refused(
                 "friction", units.shown(friction.mean, "Pa"), rule, "measure more points, or fewer deviations"
             )
-        least, middle, most, loss, off = (f"{1e-5 * p:.4g}" for p in (*pressures, friction.mean, friction.deviation))
+        lowest, middle, most, loss, off = (f"{1e-5 * p:.4g}" for p in (*pressures, friction.mean, friction.deviation))
         self.said.append(
-            f"Indicated mean pressure at {where} {middle} bar, {least} to {most} bar: {1e-5 * brake:.4g} bar at the "
+            f"Indicated mean pressure at {where} {middle} bar, {lowest} to {most} bar: {1e-5 * brake:.4g} bar at the "
             f"brake and {loss} bar of friction, {self.table.deviations:g} deviations of {off} bar to either side."
         )
         if self._rows:
@@ -185,20 +185,20 @@ def _loads(
     table: OperatingPointTable, speed: float, brake: Brake | None, where: str, name: str
 ) -> list[tuple[str, float | None]]:  # fmt: skip
     """Return suffixes of the name with indicated mean pressures [Pa]: three of a load at the brake."""
-    given = [key for key in ("imep", "bmep", "brake_torque") if getattr(table, key) is not None]
-    if len(given) > 1 or (table.motored and given[1:]):
-        raise Refused(f"{where}.{given[0]}", None, f"is given beside {given[1]}", "keep one")
+    keys = [key for key in ("imep", "bmep", "brake_torque") if getattr(table, key) is not None]
+    if len(keys) > 1 or (table.motored and keys[1:]):
+        raise Refused(f"{where}.{keys[0]}", None, f"is given beside {keys[1]}", "keep one")
     if table.bmep is None and table.brake_torque is None:
         return [("", table.imep)]
     if brake is None:
-        raise Refused(f"{where}.{given[0]}", None, "needs [friction]", "say what is lost between gas and brake")
+        raise Refused(f"{where}.{keys[0]}", None, "needs [friction]", "say what is lost between gas and brake")
     if table.motored or not table.gas:
-        raise Refused(f"{where}.{given[0]}", None, "is for engines that burn fuel", "leave it out")
+        raise Refused(f"{where}.{keys[0]}", None, "is for engines that burn fuel", "leave it out")
     bmep = table.bmep if table.bmep is not None else brake.pressure(table.brake_torque or 0.0)
-    least, middle, largest = brake.indicated(bmep, speed, name)
-    if least == largest:
+    lowest, middle, largest = brake.indicated(bmep, speed, name)
+    if lowest == largest:
         return [("", middle)]
-    return [(", least load", least), (", mean load", middle), (", most load", largest)]
+    return [(", least load", lowest), (", mean load", middle), (", most load", largest)]
 
 
 def _loaded(gas: GasModel | None, table: OperatingPointTable, cycle: Cycle, where: str) -> GasModel | None:

@@ -93,7 +93,7 @@ def opened(
         bounds = tuple(Open.from_value(angle).bounds for angle in engine.throws)
     # a layout that leaves its throws no choice
     fixed = None if engine.kind.is_free or engine.kind.takes("throws") else layout_of(_closed(engine, count))
-    given = fixed.throws if fixed else engine.given_throws
+    throws = fixed.throws if fixed else engine.given_throws
 
     def realise(candidate: Candidate) -> Problem:
         built = engine
@@ -112,7 +112,7 @@ def opened(
         cycle=cycle,
         layout=lambda bank, split: layout_of(_closed(engine, count, bank, split)),
         cylinders=count,
-        throws=None if given is None else tuple(given),
+        throws=None if throws is None else tuple(throws),
         throw_bounds=bounds,
         firing_order=_order_of(engine, cycle, count),
         bank=_bounds(engine.own("bank_angle")),
@@ -164,16 +164,16 @@ def _order_of(engine: EngineTable, cycle: Cycle, count: int) -> tuple[int, ...] 
     return order if order is not None and max(firing_turns(layout, throws, order)) < 1.0 else None
 
 
-def _intervals(given: IntervalsTable | None, engine: EngineTable, cycle: Cycle, count: int, spread: float) -> Intervals:
+def _intervals(table: IntervalsTable | None, engine: EngineTable, cycle: Cycle, count: int, spread: float) -> Intervals:
     even = cycle.angle / count
-    if given is None:
+    if table is None:
         # throws with angles or bounds of their own need no limits of intervals
         is_free = isinstance(engine.throws, list) and (_has_open(engine.throws) or engine.firing_order != "open")
         return Intervals(0.0, cycle.angle) if is_free else Intervals(even - spread, even + spread)
-    low = given.min if given.min is not None else 0.0
-    high = given.max if given.max is not None else cycle.angle
-    away = given.largest_deviation
-    if given.min is None and given.max is None and away is None:
+    low = table.min if table.min is not None else 0.0
+    high = table.max if table.max is not None else cycle.angle
+    away = table.largest_deviation
+    if table.min is None and table.max is None and away is None:
         raise Refused("phasing.intervals", None, "says nothing", "give min, max or largest_deviation")
     if away is not None:
         if away < 0.0:
@@ -226,8 +226,8 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
             rule = "is open beside throws that are given, and is decided with open ones only"
             remedy = f'write throws = "open" and cylinders = {count}, or fix the angle'
             raise Refused(f"engine.{angle}", None, rule, remedy)
-    both = all(isinstance(engine.own(key), Open) for key in ("bank_angle", "split_pin_angle"))
-    if not phasing.continuous and both:
+    both_open = all(isinstance(engine.own(key), Open) for key in ("bank_angle", "split_pin_angle"))
+    if not phasing.continuous and both_open:
         rule = "is open beside bank_angle, and even firing binds only their sum"
         uneven = 'intervals = { min = "...", max = "..." } in [phasing]'
         remedy = f"fix one of the two, or let the firing be uneven: {uneven}"

@@ -57,10 +57,10 @@ def load(source: str | Path | Mapping[str, Any]) -> Problem:
     InputError
         With one line for everything wrong: file, key, value, rule, remedy.
     """
-    return load_tables(*given(source))
+    return load_tables(*tables_and_path(source))
 
 
-def given(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Path]:
+def tables_and_path(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, Any], Path]:
     """Return the tables of a file or text, and the path that messages name."""
     if isinstance(source, Mapping):
         return _whole(plain(source, DEEPEST + 1), UNNAMED), UNNAMED

@@ -86,10 +86,10 @@ def changed(tables: dict[str, Any], where: str, value: Any) -> dict[str, Any]:
     return nested.put(tables, keys_of(tables, where), value)
 
 
-def joined(tables: dict[str, Any], own: dict[str, Any]) -> dict[str, Any]:
+def joined(tables: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
     """Return tables updated by others: nested tables are joined in turn, anything else is replaced."""
-    both = [key for key, one in own.items() if isinstance(one, dict) and isinstance(tables.get(key), dict)]
-    return {**tables, **own, **{key: joined(tables[key], own[key]) for key in both}}
+    both = [key for key, one in changes.items() if isinstance(one, dict) and isinstance(tables.get(key), dict)]
+    return {**tables, **changes, **{key: joined(tables[key], changes[key]) for key in both}}
 
 
 def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:

@@ -13,7 +13,7 @@ from laufruhe.errors import InputError
 from laufruhe.files import edits
 from laufruhe.files.complaints import Refused
 from laufruhe.files.nested import texts_in
-from laufruhe.files.reader import given, load_tables
+from laufruhe.files.reader import load_tables, tables_and_path
 from laufruhe.files.toml_text import toml_text
 from laufruhe.machine import Engine
 from laufruhe.problem.decision import Decision
@@ -61,7 +61,7 @@ def saved(problem: Problem, result: Result, moving: Problem, values: Mapping[str
             tables = edits.fixed(tables, name, mark)
         text = toml_text({key: table for key, table in tables.items() if key not in SEARCHED})
         filled = _filled(text, marks, moving)
-        read = load_tables(given(filled)[0], path)
+        read = load_tables(tables_and_path(filled)[0], path)
     except (Refused, InputError) as error:
         return Saved(note=f"This design cannot be written as a problem file: {error}.")
     if not _equal_engines(read.engine, moving.engine) or read.fidelity != moving.fidelity:

@@ -112,8 +112,8 @@ def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
     """Return the loads on the block, the mounts and the bearings, and the mount travel, over the cycle (C7)."""
     check_whole("steps", steps, 1, MOST_STEPS)
     first = next(iter(designs.values()))
-    whole = first.engine.cycle.angle
-    angles = Axis("angle", tuple(float(k) for k in np.degrees(whole) * np.arange(steps) / steps), "deg")
+    turn = first.engine.cycle.angle
+    angles = Axis("angle", tuple(float(k) for k in np.degrees(turn) * np.arange(steps) / steps), "deg")
     axes, names = ("x", "y", "z"), [loads.point.name for loads in first.loads]
 
     def sampled(signals: list[list[Spectrum]]) -> Array:

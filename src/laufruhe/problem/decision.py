@@ -128,21 +128,21 @@ class Numbers:
         places: dict[str, list[Any]] = {rotor.name: list(rotor.place) for rotor in engine.rotors}
         return cls(unbalances, places, [list(row) for row in mounts])
 
-    def engine(self, given: Engine) -> Engine:
+    def engine(self, base: Engine) -> Engine:
         """Return an engine with these numbers."""
         rotors = []
-        for rotor in given.rotors:
+        for rotor in base.rotors:
             unbalance, place = self.unbalances[rotor.name], tuple(self.places[rotor.name])
             moved = rotor if unbalance == rotor.unbalance else replace(rotor, unbalance=unbalance)
             rotors.append(moved if place == rotor.place else moved.placed(*place))
-        mounts = given.mounts
+        mounts = base.mounts
         if self.mounts:
             rows = iter(self.mounts)
-            mounts = tuple(mount.each(lambda spring: mount_of(spring, next(rows))) for mount in given.mounts)
-        shares = self._of_kind(Kind.SHARE, {geared.name: geared.share for geared in given.geared})
+            mounts = tuple(mount.each(lambda spring: mount_of(spring, next(rows))) for mount in base.mounts)
+        shares = self._of_kind(Kind.SHARE, {geared.name: geared.share for geared in base.geared})
         # a sum of changes may leave a bound by a rounding
-        geared = tuple(replace(g, share=min(max(shares[g.name], 0.0), 1.0)) for g in given.geared)
-        parts = list(given.slider_cranks)
+        geared = tuple(replace(g, share=min(max(shares[g.name], 0.0), 1.0)) for g in base.geared)
+        parts = list(base.slider_cranks)
         # the inertia that a rod lacks may be negative
         lower = {"rod_inertia_deficit": -math.inf}
         for k, part in enumerate(parts):
@@ -150,24 +150,24 @@ class Numbers:
             moves = {mass: change for (name, mass), change in pistons.items() if name == part.name}
             masses = {mass: max(getattr(part, mass) + change, lower.get(mass, 0.0)) for mass, change in moves.items()}
             parts[k] = replace(part, **masses) if masses else part
-        flywheel = given.flywheel and self.flywheel(given.flywheel)
+        flywheel = base.flywheel and self.flywheel(base.flywheel)
         engine = replace(
-            given, slider_cranks=tuple(parts), rotors=tuple(rotors), mounts=mounts, flywheel=flywheel, geared=geared
+            base, slider_cranks=tuple(parts), rotors=tuple(rotors), mounts=mounts, flywheel=flywheel, geared=geared
         )
-        for extra in given.extras:
+        for extra in base.extras:
             changes = {key: change for (kind, key), change in self.changes.items() if kind.name == extra.name}
-            engine = extra.move(engine, changes, given.slider_cranks)
+            engine = extra.move(engine, changes, base.slider_cranks)
         leads = {shaft: change for (kind, shaft), change in self.changes.items() if kind is Kind.LEAD}
         return led(engine, leads) if leads else engine
 
-    def flywheel(self, given: Flywheel) -> Flywheel:
+    def flywheel(self, base: Flywheel) -> Flywheel:
         """Return a flywheel with these numbers."""
-        return given.moved(self._of_kind(Kind.FLYWHEEL, dict(enumerate(given.numbers))).values())
+        return base.moved(self._of_kind(Kind.FLYWHEEL, dict(enumerate(base.numbers))).values())
 
-    def _of_kind(self, kind: Kind, given: Mapping[Any, Any]) -> dict[Any, Any]:
+    def _of_kind(self, kind: Kind, numbers: Mapping[Any, Any]) -> dict[Any, Any]:
         # a number that no change moves may be None
         changes = {key: change for (other, key), change in self.changes.items() if other is kind}
-        return {key: value + changes[key] if key in changes else value for key, value in given.items()}
+        return {key: value + changes[key] if key in changes else value for key, value in numbers.items()}
 
 
 class Drive(Protocol):

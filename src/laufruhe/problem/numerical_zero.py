@@ -34,11 +34,11 @@ def numerical_zero(problem: Problem, engine: Engine | None = None) -> float:
         Engine on its mounts; by default that of the problem as given.
     """
     engine = problem.engine if engine is None else engine
-    return _nothing(Problem("", "", engine, problem.points, objective=problem.objective, fidelity=problem.fidelity))
+    return _cached_zero(Problem("", "", engine, problem.points, objective=problem.objective, fidelity=problem.fidelity))
 
 
 @lru_cache(maxsize=32)
-def _nothing(problem: Problem) -> float:
+def _cached_zero(problem: Problem) -> float:
     # mounts that damp all modes: a resonance would make a size of its own
     springs = [
         mount.each(lambda spring: replace(spring, loss_factor=max(spring.loss_factor, 1.0)))
@@ -48,15 +48,15 @@ def _nothing(problem: Problem) -> float:
     # at an even speed: the effect of one part on the speed does not count
     even = replace(problem, engine=engine, fidelity=replace(problem.fidelity, crank_inertia=math.inf))
     total = _sum_of_parts(even)
-    whole = replace(
+    all_orders = replace(
         even,
         objective=tuple(
             replace(term, measure=term.measure.of_all_orders if term.measure.is_load else term.measure)
             for term in even.objective
         ),
     )
-    if whole.objective != even.objective:
-        total += OF_ORDERS / ROUNDING * _sum_of_parts(whole)
+    if all_orders.objective != even.objective:
+        total += OF_ORDERS / ROUNDING * _sum_of_parts(all_orders)
     for term in problem.objective:
         if term.measure.is_mass:
             moving = sum(part.reciprocating_mass + part.rotating_mass for part in engine.slider_cranks)

@@ -433,8 +433,8 @@ class Problem:
         """Return the numbers of the engine with decisions at these values, which may be symbols."""
         moved = self.decisions if decisions is None else decisions
         on_mounts = any(decision.mount_drives for decision in moved)
-        given = Numbers.from_engine(self.engine, self.mount_numbers if on_mounts else ())
-        return moved_numbers(given, moved, values)
+        start = Numbers.from_engine(self.engine, self.mount_numbers if on_mounts else ())
+        return moved_numbers(start, moved, values)
 
 
 def _check_name(name: object) -> None:

@@ -14,7 +14,7 @@ from laufruhe.errors import Complaint, InputError, refused
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, complaints_of
 from laufruhe.files.fields import Table
-from laufruhe.files.reader import given
+from laufruhe.files.reader import tables_and_path
 from laufruhe.files.study_tables import MOST_POINTS, joined
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.part import Part
@@ -70,7 +70,7 @@ def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
 
     `InputError` with one line for everything wrong: file, key, value, rule, remedy.
     """
-    tables, path = given(source)
+    tables, path = tables_and_path(source)
     if "study" not in tables:
         raise refused("study", "", "is missing, so this is no study file", "use laufruhe solve for a problem", path)
     try:
