@@ -51,7 +51,7 @@ def test_init_leaves_what_is_there(here: Path) -> None:
     (here / "problem.toml").write_text("mine", encoding="utf-8")
     found = run.invoke(app, ["init", "--from", "bmw-b48"])
     assert found.exit_code == 2
-    assert "problem.toml: exists already and is another" in found.output
+    assert "problem.toml: exists with other contents" in found.output
     assert [path.name for path in here.iterdir()] == ["problem.toml"]
 
 

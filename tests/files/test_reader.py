@@ -122,7 +122,7 @@ BAD = [
         "engine.throws[2] = nan: is not finite; give a number"),
     bad("lambda too large", "0.26", "1.0",
         'engine.rod_ratio = "1": does not let the crank turn, (crank radius + |offset|) / rod length = '
-        "1 must be under 1; lengthen the rod"),
+        "1 must be under 1; give crank radius over rod length, for example 0.27, or a length as rod_length"),
     bad("rod too short", "rod_ratio = 0.26", 'rod_length = "55 mm"',
         'engine.rod_length = "55 mm": does not let the crank turn'),
     bad("offset too large", "0.26", "0.26\noffset = \"200 mm\"",
@@ -216,7 +216,7 @@ BAD = [
     bad("limit of another dimension", '"4 kg"', '"4 N"',
         """constraints[1].max = "4 N": 'N' is not a unit of a mass; write for example"""),
     bad("negative limit", '"4 kg"', '"-4 kg"',
-        'constraints[1].max = "-4 kg": is negative, and no norm is; give'),
+        'constraints[1].max = "-4 kg": is negative, and a norm never is; give'),
     bad("key of another table", "title =", 'stroke = "90 mm"\ntitle =',
         'stroke = "90 mm": is not a key here; it stands in [engine]'),
     bad("a capital letter", "stroke =", "Stroke =", 'engine.Stroke = "120 mm": is not a key here; did you mean'),

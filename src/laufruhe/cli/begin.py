@@ -18,7 +18,7 @@ from laufruhe.files.complaints import in_file, nearest
 from laufruhe.files.toml_text import toml_value
 from laufruhe.report import files
 
-_TAKEN = ("exists already and is another", "name another place")
+_TAKEN = ("exists with other contents", "choose another name")
 
 
 def write_draft(file: Path, name: str | None) -> str:

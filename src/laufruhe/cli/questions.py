@@ -50,7 +50,7 @@ _QUESTIONS = (
     _Question("bank_angle", "Angle between the banks [deg]", "90"),
     _Question("split_pin_angle", "Split pins: angle by which the right bank's pin leads [deg]", "0"),
     _Question("bank_stagger", "Distance between opposed cylinders along the crank", "40 mm"),
-    _Question("firing_order", "Firing order, or - to give the throws in its place"),
+    _Question("firing_order", "Firing order (or - to enter the angles of the throws)"),
     _Question("throws", "Angles of the throws from front to rear [deg], as in 0, 180, 180, 0"),
     _Question("firing_order", "Firing order of these throws, or - for each cylinder at its first dead centre"),
     _Question("bore", "Bore", "80 mm"),

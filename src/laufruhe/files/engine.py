@@ -335,7 +335,10 @@ def _radius_and_rod(table: EngineTable) -> tuple[float, float]:
     if turning >= 1.0:
         key, value = ("rod_length", units.shown(rod, "m")) if length is not None else ("rod_ratio", f"{ratio:g}")
         rule = f"does not let the crank turn, (crank radius + |offset|) / rod length = {turning:.4g} must be under 1"
-        raise Refused(f"engine.{key}", value, rule, "lengthen the rod")
+        remedy = "lengthen the rod"
+        if ratio is not None and ratio >= 1.0:
+            remedy = "give crank radius over rod length, for example 0.27, or a length as rod_length"
+        raise Refused(f"engine.{key}", value, rule, remedy)
     return radius, rod
 
 

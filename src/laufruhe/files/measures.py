@@ -325,7 +325,7 @@ def _limit(table: ConstraintTable, where: str, scene: Scene) -> Limit:
 def _bound(text: str | float, measure: Measure, where: str) -> float:
     value = measured(text, measure.unit, where)
     if value < 0.0:
-        rule = "is negative" if measure.channel.is_number else "is negative, and no norm is"
+        rule = "is negative" if measure.channel.is_number else "is negative, and a norm never is"
         raise Refused(where, text, rule, "give a value of zero or more")
     return value
 
