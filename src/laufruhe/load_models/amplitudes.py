@@ -18,12 +18,15 @@ from laufruhe.physics.crank_stars import Stars, star_sums
 from laufruhe.physics.order_coefficients import orders_needed
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.star_space import StarSpace
+from laufruhe.problem.channels import ROCKING_COUPLE, SHAKING_FORCE, SURGING_FORCE, SWAYING_COUPLE, Channel
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Term
 from laufruhe.problem.problem import Phasing, Problem
 
 NEGLIGIBLE = 1e-13
 DIRECTIONS = 400
+_LEVERS: dict[Channel, int] = {SHAKING_FORCE: 0, SURGING_FORCE: 0, ROCKING_COUPLE: 1, SWAYING_COUPLE: 1}
+"""Powers of a throw's position that loads grow with, for loads that add up by positions alone."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +118,10 @@ def _limits_idle(problem: Problem, phasing: Phasing, layout: Layout) -> bool:
     """Whether only forces are limited, and met: of even stars the counts on the steps fix them."""
     if not problem.limits:
         return True
-    if any(limit.measure.lever != 0 for limit in problem.limits) or len(even_patterns(phasing.cycle, layout)) > 1:
+    if (
+        any(_LEVERS.get(limit.measure.channel) != 0 for limit in problem.limits)
+        or len(even_patterns(phasing.cycle, layout)) > 1
+    ):
         return False
     given = evaluate(problem)
     return all(given.value(limit.measure) <= limit.maximum for limit in problem.limits)
@@ -123,7 +129,7 @@ def _limits_idle(problem: Problem, phasing: Phasing, layout: Layout) -> bool:
 
 def _is_amplitude(term: Term) -> bool:
     q = term.measure
-    if q.lever is None:
+    if q.channel not in _LEVERS:
         return False
     return q.norm.is_euclidean or (q.orders is not None and len(q.orders) == 1)
 
@@ -157,7 +163,7 @@ def _factors(term: Term, alone: Evaluation, orders: Sequence[int], x: float) -> 
         counts = counted is None or any(float(h) == order for order in counted)
         values.append(alone.value(replace(term.measure, orders=(float(h),))) if counts else 0.0)
     none = (0.0,) * len(orders)
-    if term.measure.lever == 0:
+    if _LEVERS[term.measure.channel] == 0:
         return AmplitudeTerm(term.weight, tuple(values), none)
     return AmplitudeTerm(term.weight, none, tuple(v / x for v in values))
 

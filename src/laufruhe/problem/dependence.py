@@ -169,6 +169,11 @@ def dependence(channel: Channel, kind: Kind, problem: Problem) -> Dependence:
     return entry
 
 
+def falls_with_flywheel(channel: Channel) -> bool:
+    """Return True if a channel never rises with a number of the flywheel."""
+    return TABLE[channel.name].get(Kind.FLYWHEEL) is Dependence.MONOTONE_DOWN
+
+
 def kinds_of(problem: Problem) -> frozenset[Kind]:
     """Return the kinds of open numbers and choices."""
     stars = [Kind.STAR] if problem.phasing is not None else []

@@ -98,11 +98,6 @@ class Measure(MeasureQuery):
         """True for a number of the crankshaft's twist, which no sum over the cylinders gives."""
         return self.channel.of_loads and self.channel.is_number and not self.is_mounting
 
-    @property
-    def lever(self) -> int | None:
-        """Power of a throw's position that its loads grow with; None if loads do not add up by positions alone."""
-        return self.load.lever if self.is_load else None
-
     def shares(self, points: Sequence[OperatingPoint]) -> Array:
         """Return the weight of every operating point, shape (points,); they add up to one, zero does not count."""
         weights = [p.weight if self.counts_point(p) else 0.0 for p in points]

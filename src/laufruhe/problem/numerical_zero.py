@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
+from laufruhe.physics.mount_numbers import torque_roll_answer
+from laufruhe.problem.channels import DECOUPLING_SHORTFALL, RAW_TORQUE_ROLL, TORQUE_ROLL, Channel, mounting_in
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 
@@ -18,6 +21,14 @@ OF_ORDERS = 1e-12
 """Fraction of all orders of a part below which one order counts as zero: they come from one signal."""
 SAMPLES = 96
 """Number of samples over the cycle for these sizes."""
+
+
+_SIZES: Mapping[Channel, Callable[[Engine], float]] = {
+    DECOUPLING_SHORTFALL: lambda _: 1.0,
+    TORQUE_ROLL: lambda _: 1.0,
+    RAW_TORQUE_ROLL: lambda engine: torque_roll_answer(mounting_in(engine)),
+}
+"""Sizes of the parts that cancel in residuals [SI]; all other numbers have none."""
 
 
 def numerical_zero(problem: Problem, engine: Engine | None = None) -> float:
@@ -61,8 +72,8 @@ def _cached_zero(problem: Problem) -> float:
         if term.measure.is_mass:
             moving = sum(part.reciprocating_mass + part.rotating_mass for part in engine.slider_cranks)
             total += term.weight * moving
-        else:
-            total += term.weight * term.measure.channel.size(engine)
+        elif term.measure.channel in _SIZES:
+            total += term.weight * _SIZES[term.measure.channel](engine)
     return ROUNDING * total
 
 

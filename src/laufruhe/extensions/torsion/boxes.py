@@ -25,7 +25,7 @@ from laufruhe.extensions.torsion.physics import Resonance, dynamic_stiffness, in
 from laufruhe.machine import Flywheel
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 from laufruhe.physics.reduced_inertia import turning_inertia
-from laufruhe.problem.dependence import depends
+from laufruhe.problem.dependence import depends, falls_with_flywheel
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
@@ -76,7 +76,8 @@ class _OfInertia:
     def __init__(self, measure: Measure, evaluation: Evaluation) -> None:
         if measure.channel.of_wheel is None:
             raise TypeError(f"{measure.name} is not of the flywheel")
-        self._number, self._rises = measure.channel.of_wheel(measure, evaluation), measure.channel.rises
+        self._number = measure.channel.of_wheel(measure, evaluation)
+        self._rises = not falls_with_flywheel(measure.channel)
         self._engine, self._fidelity = evaluation.engine, evaluation.fidelity
 
     def least(self, chains: Sequence[Torsion]) -> float:

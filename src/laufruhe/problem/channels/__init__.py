@@ -1,9 +1,7 @@
-"""What can be asked of a design: loads over the cycle, masses, and what a block on its mounts is (M1-M5, E6-E15).
+"""Channels: quantities of a design that measures are taken of (M1-M5, E6-E15).
 
-A channel of a load is a function from the loads at an operating point to a signal; one of
-a block on its mounts is a function to numbers. The table at the end names them all. Every
-channel says which keys narrow it and which sides of it may be limited, so that who reads
-a file asks no names.
+A channel of a load is a function from the loads at an operating point to a signal, one of a block on its mounts a
+function to numbers. Each channel has the keys that narrow it and the sides that may be limited.
 """
 
 from __future__ import annotations
@@ -105,21 +103,21 @@ __all__ = [
 ]
 
 
-def _on_block(name: str, unit: str, part: slice, lever: int | None = None) -> LoadChannel:
+def _on_block(name: str, unit: str, part: slice, feels_gas: bool = False) -> LoadChannel:
     def signal(loads: PointLoads) -> Spectrum:
         return loads.wrench.each(lambda wrench: wrench[:, None, part])
 
-    return LoadChannel(name, unit, signal=signal, part=part, feels_gas=lever is None, lever=lever, of_wrench=True)
+    return LoadChannel(name, unit, signal=signal, part=part, feels_gas=feels_gas, of_wrench=True)
 
 
 def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads], Spectrum | None]) -> LoadChannel:
-    def found(loads: PointLoads) -> Spectrum:
+    def known(loads: PointLoads) -> Spectrum:
         spectrum = signal(loads)
         if spectrum is None:
             raise ValueError(f"this mounting has no {name}")
         return spectrum
 
-    return LoadChannel(name, unit, AT_MOUNTS, needs, signal=found, places=_names_of_mounts, of_wrench=True)
+    return LoadChannel(name, unit, AT_MOUNTS, needs, signal=known, places=_names_of_mounts, of_wrench=True)
 
 
 def _resultant(loads: PointLoads) -> Spectrum:
@@ -147,7 +145,7 @@ def _of_places(
     name: str, sides: tuple[str, ...], span: Callable[[MeasureQuery, Engine, Engine], Sequence[Span]]
 ) -> Channel:
     def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
-        return [least for least, _ in span(measure, evaluation.engine, evaluation.engine)]
+        return [lower for lower, _ in span(measure, evaluation.engine, evaluation.engine)]
 
     return PlaceChannel(name, "m", sides=sides, values=values, span=span)
 
@@ -156,18 +154,18 @@ MOUNT_FORCE = _on_mounts("mount force", "N", Needs.MOUNTS, lambda loads: loads.m
 RESULTANT_MOUNT_FORCE = LoadChannel("resultant mount force", "N", ON_BLOCK, Needs.MOUNTS, signal=_resultant)
 MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: loads.mount_travel)
 AT_EACH_MOUNT = frozenset({MOUNT_FORCE, MOUNT_TRAVEL})
-"""What bounds of mounts have formulas for, of the loads."""
-SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3), lever=0)
-ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6), lever=1)
-ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4))
-SURGING_FORCE = _on_block("surging force", "N", slice(1, 2), lever=0)
-SWAYING_COUPLE = _on_block("swaying couple", "N m", slice(5, 6), lever=1)
+"""Loads for which bounds of mounts have formulas."""
+SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3))
+ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6))
+ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4), feels_gas=True)
+SURGING_FORCE = _on_block("surging force", "N", slice(1, 2))
+SWAYING_COUPLE = _on_block("swaying couple", "N m", slice(5, 6))
 OF_BLOCK = (SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT, SURGING_FORCE, SWAYING_COUPLE)
 MAIN_BEARING_FORCE = inside("main-bearing force", "N", AT_EACH_BEARING, main_bearing_forces)
 MAIN_BEARING_PRESSURE = inside("main-bearing pressure", "Pa", AT_EACH_BEARING, main_bearing_forces, bearing_factors)
 HAMMER_BLOW = inside("hammer blow", "N", OF_EACH_BEARING, hammer_blows)
 CRANK_TORQUE = inside("crank torque", "N m", _ON_CRANK, _crank_torque)
-STORED_WORK = inside("stored work", "J", _ON_CRANK, lambda *asked: _crank_torque(*asked).integral)
+STORED_WORK = inside("stored work", "J", _ON_CRANK, lambda *at: _crank_torque(*at).integral)
 CRANK_PIN_FORCE = inside("crank-pin force", "N", AT_EACH_CRANK_PIN, pin_forces)
 CRANK_PIN_PRESSURE = inside("crank-pin pressure", "Pa", AT_EACH_CRANK_PIN, pin_forces, crank_pin_factors)
 SIDE_FORCE = inside("side force", "N", IN_EACH_CYLINDER, _side_forces)
@@ -188,7 +186,7 @@ OF_SHAFT_PLACES = frozenset({SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS})
 
 
 def is_at_mounts(channel: Channel) -> bool:
-    """Return whether a channel is the force or the travel of each mount."""
+    """Return True for the force and the travel of each mount."""
     return channel in AT_EACH_MOUNT
 
 

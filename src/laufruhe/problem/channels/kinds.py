@@ -1,4 +1,4 @@
-"""Kinds of channels: what keys narrow them, which sides of them may be limited, and what moves them (M1-M5, E6-E15)."""
+"""Kinds of channels: their keys, sides that may be limited, and dependences (M1-M5, E6-E15)."""
 
 from __future__ import annotations
 
@@ -31,26 +31,26 @@ OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
 
 
 def of_what_moves(name: str, signal: Callable[[Engine, PointLoads], Spectrum]) -> Callable[[PointLoads], Spectrum]:
-    """A load inside the crankcase: of what moves, whatever the block stands on."""
+    """Return the function of a load inside the crankcase, which depends on the moving parts alone."""
 
-    def found(loads: PointLoads) -> Spectrum:
+    def inside_load(loads: PointLoads) -> Spectrum:
         if loads.moving is None:
             raise ValueError(f"of a wrench alone there is no {name}")
         return signal(loads.moving, loads)
 
-    return found
+    return inside_load
 
 
 @dataclass(frozen=True, eq=False)
 class Need:
-    """A part that an engine must have before a channel means anything.
+    """Part that an engine must have for a channel.
 
     Attributes
     ----------
     of
-        Return this part of an engine; what is false is not there.
+        Function that returns this part of an engine, false if it is missing.
     what, remedy
-        As a file without it is told.
+        Texts of the complaint about a file without it.
     """
 
     of: Callable[[Engine], object]
@@ -82,55 +82,51 @@ class Needs:
 _KNOWN: dict[str, Channel] = {}
 
 
-def known(name: str) -> Channel:
-    """Return the channel of a name; those of extensions are imported where they are not yet."""
-    found: Channel = _KNOWN.get(name) or import_module("laufruhe.problem.channels").CHANNELS[name]
-    return found
+def channel_named(name: str) -> Channel:
+    """Return a channel by name, imported from its extension if needed."""
+    channel: Channel = _KNOWN.get(name) or import_module("laufruhe.problem.channels").CHANNELS[name]
+    return channel
 
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One thing that is measured.
+    """Quantity of a design.
 
     Attributes
     ----------
     name, unit
-        As files and reports say it; SI.
+        Name in files and reports; SI unit.
     keys
-        That narrow it in a file.
+        Keys that narrow it in a file.
     needs
-        What the engine must have.
+        Part that the engine must have.
     sides
-        That a limit may have.
+        Sides that a limit may have.
     minimised
-        Whether it may be an objective.
+        True if it may be an objective.
     of_loads
-        Whether a number may depend on what excites the block, as it does where nobody says that it does not.
-    size
-        Size of the parts of an engine that cancel if it is zero [SI]; zero if there are none.
-    rises
-        Whether it never falls where a number of the flywheel grows; else it never rises.
+        True unless a number is known not to depend on the excitation of the block.
     of_wheel
-        The value as a function of the flywheel of an engine, if it is of that.
+        Function of measure and design that returns the value as a function of the flywheel, for channels of it.
     of_torque
-        Whether the torque of the crank is in it, which other decisions than the flywheel move too.
+        True if it contains the torque of the crank, which depends on other decisions than the flywheel too.
     of_engine
-        The value as a function of an engine, if it is of its sizes alone and goes one way with each of them.
+        Value as a function of an engine, for channels of its sizes alone, monotone in each size.
     of_cases
-        Of a block under a held load what it is the largest length of, shape (mounts, 3), if it is of that.
+        Function of a block in static balance, shape (mounts, 3), whose largest length is a channel of load cases.
     simulation
-        Module that simulates it, where no expression has it: `peaks` for searches of mounts, `boxes` for bounds.
+        Module that simulates it if there is no expression: `peaks` for searches of mounts, `boxes` for bounds.
     missed
-        Share of its value that may stand between the steps of a simulation.
+        Relative error of peaks between the steps of a simulation, as a function of the engine.
     of_axis
-        What turning about the torque-roll axis lacks to be a mode, if it is of that.
+        Residual of turning about the torque-roll axis as a mode, for channels of it.
     places
-        Names of the places that it is measured at, by which a file may narrow it; none where that is the block.
+        Function that returns the names of its places, by which a file may narrow it; empty for the block.
     title, place
-        Of a load: of the table in which every report shows it where the engine has what it needs and turns evenly, and
-        of a place there; none where it is shown only if it is asked.
+        Titles of the table and its column of places that every report shows for a load at even speed; empty if it is
+        shown on request only.
     span
-        Least and largest of its numbers while shafts stand between their places in two engines, if it is of these.
+        Function that returns the smallest and largest values while shafts move between their places in two engines.
     """
 
     name: str
@@ -139,9 +135,7 @@ class Channel:
     needs: Need = Needs.NOTHING
     sides: tuple[str, ...] = ("max",)
     minimised: bool = True
-    size: Callable[[Engine], float] = lambda _: 0.0
     of_loads: bool = True
-    rises: bool = True
     of_wheel: Callable[[MeasureQuery, EvaluatedDesign], OfWheel] | None = None
     of_engine: Callable[[Engine], float] | None = None
     of_torque: bool = False
@@ -164,19 +158,19 @@ class Channel:
 
     def __reduce__(self) -> tuple[Callable[[str], Channel], tuple[str]]:
         # a channel is one and the same in every process
-        return known, (self.name,)
+        return channel_named, (self.name,)
 
     def __str__(self) -> str:
         return self.name
 
     @property
     def norms(self) -> Collection[str]:
-        """Names of those that it may be asked in; none where it is a number."""
+        """Names of the norms that apply to it; empty for a number."""
         return ()
 
     @property
     def is_flywheel(self) -> bool:
-        """Whether it goes one way with every number of the flywheel."""
+        """True if it is monotone in every number of the flywheel."""
         return self.of_wheel is not None
 
     @property
@@ -185,46 +179,37 @@ class Channel:
         return self.is_flywheel and self.needs is Needs.FLYWHEEL
 
     def check_sizes(self, engine: Engine, _: OperatingPoint) -> None:
-        """Ask for the sizes that are in it, if there are such.
-
-        Raises
-        ------
-        ModelError
-            If one of them is not given.
-        """
+        """Raise `ModelError` if a size that it needs is missing."""
         if self.of_engine is not None:
             self.of_engine(engine)
 
 
 @dataclass(frozen=True, eq=False)
 class LoadChannel(Channel):
-    """A signal over the cycle, linear in the loads; it has a norm.
+    """Signal over the cycle, linear in the loads; measures are norms of it.
 
     Attributes
     ----------
     signal
-        Coefficients of shape (n, places, d) from the loads at an operating point.
+        Function that returns its spectrum, shape (n, places, d), from the loads at an operating point.
     part
-        Components of the wrench where its one place is the block; None where its places are the mounts.
+        Components of the wrench for a load of the block; None for loads at mounts.
     feels_gas
-        Whether the roll moment is in it: gas gives no force (eq. 1).
-    lever
-        Power of a throw's place that its load grows with; None where loads do not add up by places alone.
+        True if it contains the roll moment: gas gives no force (eq. 1).
     of_wrench
-        Whether it follows from the wrench on the block alone; what does not say so counts as a load inside.
+        True if it follows from the wrench on the block alone; else it is a load inside the crankcase.
     feels_unbalances
-        Whether rotors load it, and the loads of each throw add up; else it is of cylinders and what they twist.
+        True if rotors load it and the loads of the throws add up; else it depends on cylinders and their twist.
     adds_up
-        Whether its places are added up, so that no norm but the mean over the cycle has a meaning.
+        True if its places add up, so that only the mean over the cycle has a meaning.
     of_sizes
-        Factors of sizes that it is a load inside the crankcase times, of each place or component (Z1).
+        Factors of sizes of each place or component, by which a load inside the crankcase is multiplied (Z1).
     """
 
     keys: tuple[str, ...] = ON_BLOCK
     signal: Callable[[PointLoads], Spectrum] = field(kw_only=True)
     part: slice | None = None
     feels_gas: bool = True
-    lever: int | None = None
     of_wrench: bool = False
     feels_unbalances: bool = True
     adds_up: bool = False
@@ -232,25 +217,25 @@ class LoadChannel(Channel):
     is_load: ClassVar[bool] = True
 
     def factors_of(self, engine: Engine, point: OperatingPoint) -> NDArray[np.float64] | None:
-        """Its factors at every place and component; None where sizes move it by their masses alone."""
+        """Return its factors of sizes, shape (places, d or 1); None without such factors."""
         if self.of_sizes is None:
             return None
-        found = self.of_sizes(engine, point)
-        return found if found.ndim > 1 else found[:, None]
+        factors = self.of_sizes(engine, point)
+        return factors if factors.ndim > 1 else factors[:, None]
 
     def check_sizes(self, engine: Engine, point: OperatingPoint) -> None:
-        """Of its places, at an operating point."""
+        """Raise `ModelError` if a size of its places is missing."""
         self.factors_of(engine, point)
 
     @property
     def norms(self) -> Collection[str]:
-        """All, or the mean where places are added up."""
+        """Names of the norms that apply to it."""
         return (MEAN.name,) if self.adds_up else tuple(NORMS)
 
 
 @dataclass(frozen=True, eq=False)
 class MassChannel(Channel):
-    """Masses of the rotors of some roles, added up."""
+    """Sum of the masses of rotors with some roles."""
 
     keys: tuple[str, ...] = ("of",)
     roles: tuple[Role, ...] = field(kw_only=True)
@@ -259,12 +244,12 @@ class MassChannel(Channel):
 
 @dataclass(frozen=True, eq=False)
 class NumberChannel(Channel):
-    """Numbers of a design, and no signal.
+    """Numbers of a design without a signal.
 
     Attributes
     ----------
     values
-        The first is the one that is shown, all of them keep a limit.
+        Function that returns its numbers: the first is shown, limits apply to all.
     """
 
     values: Callable[[MeasureQuery, EvaluatedDesign], Sequence[float]] = field(kw_only=True)
@@ -273,14 +258,14 @@ class NumberChannel(Channel):
 
 @dataclass(frozen=True, eq=False)
 class SizeChannel(NumberChannel):
-    """A number of sizes alone."""
+    """Number that depends on sizes alone."""
 
     of_loads: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class MountChannel(NumberChannel):
-    """A block on its mounts."""
+    """Number of a block on its mounts."""
 
     needs: Need = Needs.ELASTIC
     is_mounting: ClassVar[bool] = True
@@ -288,7 +273,7 @@ class MountChannel(NumberChannel):
 
 @dataclass(frozen=True, eq=False)
 class PlaceChannel(NumberChannel):
-    """Where balancer shafts stand."""
+    """Distance between places of balancer shafts."""
 
     keys: tuple[str, ...] = ("of",)
     of_loads: bool = False

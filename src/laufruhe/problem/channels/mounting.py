@@ -1,4 +1,4 @@
-"""Numbers of a block on its mounts (E7, E9, E11, E14, E46, E47)."""
+"""Channels of a block on its mounts (E7, E9, E11, E14, E46, E47)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery
 
 
 def mounting_in(engine: Engine) -> ElasticMounting:
-    """The elastic mounting of an engine that has one."""
+    """Return the elastic mounting of an engine with a block."""
     if engine.block is None:
         raise ValueError("this engine has no block, so its mounts are rigid")
     return elastic_mounting(engine.block, engine.mounts)
@@ -29,8 +29,8 @@ def _of_mounting(number: Callable[[ElasticMounting, MeasureQuery], float | Seque
     [MeasureQuery, EvaluatedDesign], Sequence[float]
 ]:  # fmt: skip
     def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
-        found = number(mounting_in(evaluation.engine), measure)
-        return (found,) if isinstance(found, float) else found
+        numbers = number(mounting_in(evaluation.engine), measure)
+        return (numbers,) if isinstance(numbers, float) else numbers
 
     return values
 
@@ -40,44 +40,41 @@ def _transmissibility(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Seq
     ratios = [
         mount_numbers.transmitted(loads.mount_forces, firm.forces(loads.wrench), measure.orders)
         for loads in evaluation.loads
-        if (measure.points is None or loads.point.name in measure.points) and loads.mount_forces is not None
+        if measure.counts_point(loads.point) and loads.mount_forces is not None
     ]
     return (max(ratios, default=0.0),)
 
 
 def motion_indices(measure: MeasureQuery) -> tuple[int, ...]:
-    """Of the motions that are to have a mode of their own."""
+    """Return the indices of the motions that should each have a mode of their own."""
     return tuple(MOTIONS.index(name) for name in measure.motions or MOTIONS)
 
 
 def _of_axis(
-    name: str, unit: str, residual: Callable[[Block, mount_numbers.Band], mount_numbers.AxisResidual],
-    size: Callable[[Engine], float],
-) -> MountChannel:  # fmt: skip
-    """What is least where turning about the torque-roll axis is a mode."""
-
+    name: str, unit: str, residual: Callable[[Block, mount_numbers.Band], mount_numbers.AxisResidual]
+) -> MountChannel:
+    # zero if turning about the torque-roll axis is a mode
     def value(mounting: ElasticMounting, measure: MeasureQuery) -> float:
         return mount_numbers.residual_of(mounting, residual(mounting.block, measure.frequency))
 
-    return MountChannel(
-        name, unit, ("frequency",), values=_of_mounting(value), size=size, of_axis=residual, of_loads=False
-    )
+    return MountChannel(name, unit, ("frequency",), values=_of_mounting(value), of_axis=residual, of_loads=False)
 
 
 def counted_cases(measure: MeasureQuery, engine: Engine) -> list[LoadCase]:
-    """Load cases that count."""
+    """Return the load cases that count."""
     return [case for case in engine.load_cases if measure.cases is None or case.name in measure.cases]
 
 
 def _of_cases(name: str, unit: str, part: Callable[[Any], Any]) -> MountChannel:
-    """The largest at any mount that counts, under any load case that counts."""
+    """Return the channel of the largest length over the mounts and load cases that count."""
 
     def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         mounting = mounting_in(evaluation.engine)
         chosen = measure.places([mount.name for mount in mounting.mounts])
         weights = np.array(measure.direction_weights or (1.0, 1.0, 1.0))
-        found = [part(settled(mounting, case))[chosen] * weights for case in counted_cases(measure, evaluation.engine)]
-        return (max((float(np.linalg.norm(rows, axis=1).max()) for rows in found), default=0.0),)
+        cases = counted_cases(measure, evaluation.engine)
+        vectors = [part(settled(mounting, case))[chosen] * weights for case in cases]
+        return (max((float(np.linalg.norm(rows, axis=1).max()) for rows in vectors), default=0.0),)
 
     keys = ("load_cases", "mounts", "direction_weights")
     return MountChannel(
@@ -86,8 +83,8 @@ def _of_cases(name: str, unit: str, part: Callable[[Any], Any]) -> MountChannel:
     )  # fmt: skip
 
 
-STATIC_TRAVEL = _of_cases("static travel", "m", lambda found: found.travel)
-STATIC_FORCE = _of_cases("static mount force", "N", lambda found: found.force)
+STATIC_TRAVEL = _of_cases("static travel", "m", lambda balance: balance.travel)
+STATIC_FORCE = _of_cases("static mount force", "N", lambda balance: balance.force)
 TRANSMISSIBILITY = MountChannel("transmissibility", "", ("operating_points", "orders"), values=_transmissibility)
 SAG = MountChannel(
     "static sag",
@@ -105,16 +102,13 @@ DECOUPLING = MountChannel(
     values=_of_mounting(lambda mounting, m: mount_numbers.decoupling(mounting.modes.energy, motion_indices(m))),
 )  # fmt: skip
 DECOUPLING_SHORTFALL = MountChannel(
-    "decoupling shortfall", "", ("motions", "wanted"), size=lambda _: 1.0, of_loads=False,
+    "decoupling shortfall", "", ("motions", "wanted"), of_loads=False,
     values=_of_mounting(
         lambda mounting, m: mount_numbers.decoupling_shortfall(mounting.modes.energy, motion_indices(m), m.wanted)
     ),
 )  # fmt: skip
-TORQUE_ROLL = _of_axis("torque-roll residual", "", mount_numbers.relative_residual, lambda _: 1.0)
-RAW_TORQUE_ROLL = _of_axis(
-    "raw torque-roll residual", "N m/rad", mount_numbers.raw_residual,
-    lambda engine: mount_numbers.torque_roll_answer(mounting_in(engine)),
-)  # fmt: skip
+TORQUE_ROLL = _of_axis("torque-roll residual", "", mount_numbers.relative_residual)
+RAW_TORQUE_ROLL = _of_axis("raw torque-roll residual", "N m/rad", mount_numbers.raw_residual)
 TOTAL_STIFFNESS = MountChannel(
     "total stiffness", "N/m", sides=("min", "max"), of_loads=False,
     values=_of_mounting(lambda mounting, _: mount_numbers.total_stiffness(mounting.mounts)),

@@ -12,6 +12,7 @@ import numpy as np
 from laufruhe.machine import Flywheel
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Numbers, moved_numbers, sides_of
+from laufruhe.problem.dependence import falls_with_flywheel
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
@@ -107,7 +108,7 @@ class _Coordinates:
             if measure.channel.of_wheel is None:
                 raise TypeError(f"{measure.name} is not of the flywheel")
             of_wheel = measure.channel.of_wheel(measure, initial)
-            sign = 1.0 if measure.channel.rises else -1.0
+            sign = -1.0 if falls_with_flywheel(measure.channel) else 1.0
             return Monotone(lambda x: of_wheel(self.wheel(x)), np.full(len(lower), sign))
 
         return MonotoneProblem(
