@@ -6,10 +6,10 @@ import os
 import re
 import sys
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
+from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +37,7 @@ from laufruhe.files.toml_text import line_deeper_than, toml_complaint
 from laufruhe.machine import Cycle, Engine, SliderCrank
 from laufruhe.machine.layouts import throw_rotors
 from laufruhe.problem.phasing import Candidate
-from laufruhe.problem.problem import Drawing, Problem, Search
+from laufruhe.problem.problem import Drawing, Origin, Problem, Search
 from laufruhe.problem.problem import Path as Place
 
 DEEPEST, MOST_ENTRIES, MOST_BYTES = 16, 1000, 1_000_000
@@ -89,7 +89,7 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
             problem = _of_file(file, path)
 
             def finished(own: Problem, candidate: Candidate | None) -> Problem:
-                own = replace(own, rebuild=_Rebuilt(closed, path, candidate))
+                own = replace(own, rebuild=partial(_rebuilt, closed, path, candidate))
                 for note in notes():
                     own = note.put(parts[note], own, file, closed) if parts[note] else own
                 return own
@@ -98,10 +98,11 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
                 phasing = problem.phasing
                 problem = finished(problem, None)
                 if phasing is not None:
-                    realise = partial(_finished_star, finished, phasing.realise)
-                    problem = replace(problem, phasing=replace(phasing, realise=realise))
+                    realise = phasing.realise
+                    stars = replace(phasing, realise=lambda star: finished(realise(star), star))
+                    problem = replace(problem, phasing=stars)
             _check_decisions(problem)
-            return replace(problem, origin=_Origin(tables, path))
+            return replace(problem, origin=Origin(tables, path, _edited))
     except ValidationError as error:
         raise InputError(str(path), complaints_of(error, file_model())) from None
     except ModelError as error:
@@ -112,12 +113,6 @@ def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
 def notes() -> tuple[Note, ...]:
     """Return the notes that numbers of a file may have, in the order in which they are applied."""
     return tuple(extended("notes", Note, (open_numbers.NOTE,)).values())
-
-
-def _finished_star(
-    finished: Callable[[Problem, Candidate | None], Problem], realise: Callable[[Candidate], Problem], star: Candidate
-) -> Problem:
-    return finished(realise(star), star)
 
 
 def shown_as(path: Path) -> Path:
@@ -135,66 +130,33 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
     return opened(file.engine, file.balancer_shafts, file.phasing, closed)
 
 
-@dataclass(frozen=True)
-class _Origin:
-    """File of a problem, for problems with other numbers."""
-
-    tables: Mapping[str, Any]
-    path: Path
-
-    @property
-    def file(self) -> tuple[Mapping[str, Any], Path]:
-        """Tables as they were read, and the path of the file."""
-        return self.tables, self.path
-
-    def with_values(self, values: Mapping[str, Any]) -> Problem:
-        """Return the problem with numbers at other values."""
-        return self._edited(edits.with_values, plain(values, DEEPEST))
-
-    def opened(self, name: str, low: Any, high: Any, start: Any) -> Problem:
-        """Return the problem with a number left open."""
-        return self._edited(edits.opened, name, *plain([low, high, start], DEEPEST))
-
-    def fixed(self, name: str, value: Any) -> Problem:
-        """Return the problem with a number fixed."""
-        return self._edited(edits.fixed, name, plain(value, DEEPEST))
-
-    def _edited(self, edit: Callable[..., dict[str, Any]], *arguments: Any) -> Problem:
-        with in_file(self.path):
-            tables = edit(self.tables, *arguments)
-        return load_tables(tables, self.path)
+def _edited(origin: Origin, edit: str, *arguments: Any) -> Problem:
+    """Return the problem of a file after one of the functions of `edits`."""
+    with in_file(origin.path):
+        tables = getattr(edits, edit)(origin.tables, *plain(arguments, DEEPEST))
+    return load_tables(tables, origin.path)
 
 
-@dataclass(frozen=True)
-class _Rebuilt:
-    """Function that draws a file with other numbers, of one star where stars are open."""
-
-    tables: Mapping[str, Any]
-    path: Path
-    candidate: Candidate | None = None
-
-    def __call__(self, changes: Mapping[Place, str | float]) -> Drawing:
-        """Return the drawing with these numbers."""
-        tables = self._without_auto
-        for place, value in changes.items():
-            tables = put(tables, place, value)
-        try:
-            built = _of_file(file_model().model_validate(followed(tables)), self.path)
-            if self.candidate is not None and built.phasing is not None:
-                built = built.phasing.realise(self.candidate)
-        except (ValidationError, Refused, ModelError) as error:
-            values = ", ".join(f"{key_path(place)} = {value}" for place, value in changes.items())
-            faults = complaints_of(error, file_model()) if isinstance(error, ValidationError) else (error,)
-            why = " and ".join(map(str, faults))
-            raise ModelError(f"this engine cannot be built, {values}: {why}; narrow its bounds or tolerances") from None
-        return Drawing(built.engine, built.points, built.decisions, built.mount_numbers)
-
-    @cached_property
-    def _without_auto(self) -> Mapping[str, Any]:
-        if self.tables.get("fidelity", {}).get("kinematics") != "auto":
-            return self.tables
-        own = {key: value for key, value in self.tables["fidelity"].items() if key not in ("kinematics", "tolerance")}
-        return {**self.tables, "fidelity": own}
+def _rebuilt(
+    tables: Mapping[str, Any], path: Path, candidate: Candidate | None, changes: Mapping[Place, str | float]
+) -> Drawing:
+    """Return the drawing of a file with other numbers, of one star if stars are open."""
+    fidelity = tables.get("fidelity", {})
+    if fidelity.get("kinematics") == "auto":
+        options = {key: value for key, value in fidelity.items() if key not in ("kinematics", "tolerance")}
+        tables = {**tables, "fidelity": options}
+    for place, value in changes.items():
+        tables = put(tables, place, value)
+    try:
+        built = _of_file(file_model().model_validate(followed(tables)), path)
+        if candidate is not None and built.phasing is not None:
+            built = built.phasing.realise(candidate)
+    except (ValidationError, Refused, ModelError) as error:
+        values = ", ".join(f"{key_path(place)} = {value}" for place, value in changes.items())
+        faults = complaints_of(error, file_model()) if isinstance(error, ValidationError) else (error,)
+        why = " and ".join(map(str, faults))
+        raise ModelError(f"this engine cannot be built, {values}: {why}; narrow its bounds or tolerances") from None
+    return Drawing(built.engine, built.points, built.decisions, built.mount_numbers)
 
 
 def tables_of(path: Path) -> dict[str, Any]:

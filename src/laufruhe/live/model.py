@@ -193,7 +193,7 @@ def _slider(domain: Domain, problem: Problem) -> Slider:
 def _unit(problem: Problem, decision: Decision) -> tuple[str, float]:
     if problem.origin is not None:
         with suppress(Refused, units.UnitError):
-            unit = edits.unit_of_bounds(problem.origin.file[0], decision.name)
+            unit = edits.unit_of_bounds(problem.origin.tables, decision.name)
             if unit:
                 return unit, 1.0 / units.parse(f"1 {unit}", decision.unit)
     return units.readable(decision.unit)

@@ -53,7 +53,7 @@ def saved(problem: Problem, result: Result, moving: Problem, values: Mapping[str
     """Return the file of a design with placeholders for moving decisions; empty if it would not read back."""
     if problem.origin is None:
         return NOT_SAVED
-    tables, path = problem.origin.file
+    tables, path = problem.origin.tables, problem.origin.path
     marks = _marks(moving.decisions)
     try:
         tables = _fixed(dict(tables), result, values)

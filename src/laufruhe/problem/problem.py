@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path as FilePath
-from typing import Any, ClassVar, Protocol, TypeAlias, TypeVar
+from typing import Any, ClassVar, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,21 +99,21 @@ class Search:
         return usual if self.boxes is None else self.boxes
 
 
-class Origin(Protocol):
-    """File of a problem, in which numbers may be changed by name."""
+@dataclass(frozen=True, eq=False)
+class Origin:
+    """File of a problem.
 
-    @property
-    def file(self) -> tuple[Mapping[str, Any], FilePath]:
-        """Tables as they were read, and the path of the file."""
+    Attributes
+    ----------
+    tables, path
+        Tables as they were read, and path of the file.
+    edited
+        Function of this, an edit ("with_values", "opened" or "fixed") and its arguments, that returns the new problem.
+    """
 
-    def with_values(self, values: Mapping[str, Any]) -> Problem:
-        """Return the problem with numbers at other values."""
-
-    def opened(self, name: str, low: Any, high: Any, start: Any) -> Problem:
-        """Return the problem with a number left open."""
-
-    def fixed(self, name: str, value: Any) -> Problem:
-        """Return the problem with a number fixed."""
+    tables: Mapping[str, Any]
+    path: FilePath
+    edited: Callable[..., Problem]
 
 
 @dataclass(frozen=True, eq=False)
@@ -348,23 +348,22 @@ class Problem:
             raise wrong_call("values", values, "is no table of names and values", 'write {"engine.rod_ratio": 0.28}')
         for name in values:
             _check_name(name)
-        return self._origin.with_values(values)
+        return self._edited("with_values", values)
 
     def open(self, name: str, low: Any, high: Any, start: Any = None) -> Problem:
         """Return the problem with one more open number; it starts at its present value unless `start` is given."""
         _check_name(name)
-        return self._origin.opened(name, low, high, start)
+        return self._edited("opened", name, low, high, start)
 
     def fix(self, name: str, value: Any = None) -> Problem:
         """Return the problem with one number fixed, at `value` or at its start."""
         _check_name(name)
-        return self._origin.fixed(name, value)
+        return self._edited("fixed", name, value)
 
-    @property
-    def _origin(self) -> Origin:
+    def _edited(self, edit: str, *arguments: Any) -> Problem:
         if self.origin is None:
             raise ModelError(f"{self.name} was made or changed in code; change numbers of what was loaded, before that")
-        return self.origin
+        return self.origin.edited(self.origin, edit, *arguments)
 
     def changed(self, **changes: Any) -> Problem:
         """Return the problem with other attributes, for every design of an open star too."""
