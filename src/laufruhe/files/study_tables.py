@@ -224,13 +224,26 @@ class Span:
 
 def span_of(drawn: DrawnTable) -> Span:
     """Return the range from which a quantity is drawn; `Refused` if its ends do not fit."""
-    unit, (low, high) = _ends(drawn.quantity, drawn.first, drawn.last)
+    return _span(drawn.quantity, drawn.first, drawn.last, drawn.spacing)
+
+
+def _span(quantity: str, first: Value, last: Value, spacing: str | None) -> Span:
+    for key, end in (("from", first), ("to", last)):
+        # one by one, so that the wrong one is named
+        _measured(quantity, (end,), key)
+    unit, numbers = _measured(quantity, (first, last), "from")
+    if numbers is None and isinstance(first, str) and units.dimension_of(first) is not None:
+        remedy = "write its whole path, such as operating_points.1.speed"
+        raise Refused("quantity", quantity, "is no number of a problem file", remedy)
+    if numbers is None:
+        raise Refused("from", first, "is no number", "list the labels under values")
+    low, high = numbers
     if low >= high:
-        raise Refused("from", drawn.first, "does not lie below to", "write the smaller end first")
-    if drawn.spacing == "log" and low <= 0.0:
-        raise Refused("from", drawn.first, "is not above zero, so it has no logarithm", 'leave spacing = "log" out')
-    is_text = isinstance(drawn.first, str) and (unit != "1" or _is_limit(drawn.quantity))
-    return Span(drawn.quantity, unit, low, high, drawn.spacing == "log", is_text)
+        raise Refused("from", first, "does not lie below to", "write the smaller end first")
+    if spacing == "log" and low <= 0.0:
+        raise Refused("from", first, "is not above zero, so it has no logarithm", 'leave spacing = "log" out')
+    is_text = isinstance(first, str) and (unit != "1" or _is_limit(quantity))
+    return Span(quantity, unit, low, high, spacing == "log", is_text)
 
 
 def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
@@ -244,36 +257,15 @@ def _spaced(sweep: SweepTable) -> tuple[Value, ...]:
         raise Refused("points", sweep.points, "makes no sweep", "give two points or more")
     if sweep.points > MOST_POINTS:
         raise Refused("points", sweep.points, f"is more than {MOST_POINTS}", "give fewer")
-    unit, (low, high) = _ends(sweep.quantity, sweep.first, sweep.last)
-    if low >= high:
-        rule = "equals to, which is no sweep" if low == high else "lies above to"
-        raise Refused("from", sweep.first, rule, "write the smaller end first")
-    if sweep.spacing == "log":
-        if low <= 0.0:
-            raise Refused("from", sweep.first, "is not above zero, so it has no logarithm", 'leave spacing = "log" out')
-        numbers = np.geomspace(low, high, sweep.points)
-    else:
-        with np.errstate(all="ignore"):
-            numbers = np.linspace(low, high, sweep.points)
+    span = _span(sweep.quantity, sweep.first, sweep.last, sweep.spacing)
+    with np.errstate(all="ignore"):
+        numbers = (np.geomspace if span.is_log else np.linspace)(span.low, span.high, sweep.points)
     if not np.isfinite(numbers).all():
         raise Refused("to", sweep.last, "is too far from the other end", "narrow the sweep")
     texts = [f"{number:.{_DIGITS}g}" for number in numbers]
-    if not isinstance(sweep.first, str) or (unit == "1" and not _is_limit(sweep.quantity)):
-        return tuple(float(text) for text in texts)
-    return tuple(texts) if unit == "1" else tuple(f"{text} {unit}" for text in texts)
-
-
-def _ends(quantity: str, first: Value, last: Value) -> tuple[str, tuple[float, ...]]:
-    for key, end in (("from", first), ("to", last)):
-        # one by one, so that the wrong one is named
-        _measured(quantity, (end,), key)
-    unit, numbers = _measured(quantity, (first, last), "from")
-    if numbers is None and isinstance(first, str) and units.dimension_of(first) is not None:
-        remedy = "write its whole path, such as operating_points.1.speed"
-        raise Refused("quantity", quantity, "is no number of a problem file", remedy)
-    if numbers is None:
-        raise Refused("from", first, "is no number", "list the labels under values")
-    return unit, numbers
+    if not span.is_text:
+        return tuple(map(float, texts))
+    return tuple(texts) if span.unit == "1" else tuple(f"{text} {span.unit}" for text in texts)
 
 
 def _measured(quantity: str, values: tuple[Value, ...], given: str) -> tuple[str, tuple[float, ...] | None]:
