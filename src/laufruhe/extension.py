@@ -36,7 +36,7 @@ class Extension:
     norms
         Subclasses of `laufruhe.numerics.norms.Norm`.
     channels
-        Objects of `laufruhe.problem.channels.kinds.Channel`.
+        Objects of `laufruhe.problem.channels.Channel`.
     dependences
         Lines of the table in `laufruhe.problem.dependence`, about these channels and kinds; a channel without one is
         unknown to every bound, and decided locally.

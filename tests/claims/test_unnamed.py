@@ -14,8 +14,7 @@ from laufruhe.numerics.norms import NORMS, Grid, Norm
 from laufruhe.numerics.norms.norm import lengths, only
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem import dependence, measure
-from laufruhe.problem.channels import CHANNELS, MOUNT_FORCE, Needs, kinds
-from laufruhe.problem.channels.kinds import ON_BLOCK, LoadChannel
+from laufruhe.problem.channels import _KNOWN, CHANNELS, MOUNT_FORCE, ON_BLOCK, LoadChannel, Needs
 from laufruhe.problem.decision import KINDS, Kind
 from laufruhe.problem.dependence import Dependence, depends
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -117,7 +116,7 @@ def test_unknown_is_neither_constant_nor_affine(resultant: LoadChannel, monkeypa
         assert dependence.dependence(resultant, kind, problem) is Dependence.UNKNOWN
         assert depends(resultant, {kind}, problem)
     # of the same name, and not the channel that the table is of
-    monkeypatch.setitem(kinds._KNOWN, MOUNT_FORCE.name, MOUNT_FORCE)
+    monkeypatch.setitem(_KNOWN, MOUNT_FORCE.name, MOUNT_FORCE)
     other = replace(MOUNT_FORCE, signal=_resultant)
     assert dependence.dependence(other, Kind.FLYWHEEL, problem) is Dependence.UNKNOWN
     assert [method.name for method in METHODS if method.suits(problem)] == [METHODS[-1].name]

@@ -24,9 +24,9 @@ from laufruhe.problem.channels import (
     MAIN_BEARING_FORCE,
     MOUNT_FORCE,
     MOUNT_TRAVEL,
+    LoadChannel,
     mounting_in,
 )
-from laufruhe.problem.channels.kinds import LoadChannel
 from laufruhe.problem.evaluation import Evaluation, over
 from laufruhe.problem.loads import PointLoads
 

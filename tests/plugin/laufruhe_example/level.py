@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.problem.channels.kinds import AT_MOUNTS, LoadChannel, Needs
+from laufruhe.problem.channels import AT_MOUNTS, LoadChannel, Needs
 from laufruhe.problem.loads import PointLoads
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from laufruhe.extensions.rotary.unit import RotaryUnit
-from laufruhe.problem.channels.kinds import Need, NumberChannel
+from laufruhe.problem.channels import Need, NumberChannel
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery
 
 ROTORS = Need(

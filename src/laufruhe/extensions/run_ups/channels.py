@@ -10,7 +10,7 @@ from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.extensions.run_ups.runs import RunUp, missed_share, point_of, runs_of
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
-from laufruhe.problem.channels.kinds import Need, NumberChannel
+from laufruhe.problem.channels import Need, NumberChannel
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery
 
 RUN = Need(

@@ -9,8 +9,18 @@ from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.bearing_loads import main_bearing_forces, piston_pin_forces
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.channels.inside import AT_EACH_BEARING, IN_EACH_CYLINDER, Where, inside, names_of_cylinders
-from laufruhe.problem.channels.kinds import AT_CYLINDERS, AT_WEBS, Need, Needs, SizeChannel
+from laufruhe.problem.channels import (
+    AT_CYLINDERS,
+    AT_EACH_BEARING,
+    AT_WEBS,
+    IN_EACH_CYLINDER,
+    Need,
+    Needs,
+    SizeChannel,
+    Where,
+    inside,
+    names_of_cylinders,
+)
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery
 
 

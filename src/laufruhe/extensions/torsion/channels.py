@@ -10,7 +10,7 @@ from laufruhe.extensions.torsion.machine import Torsion
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.problem.channels.kinds import ON_BLOCK, Channel, LoadChannel, Need, NumberChannel, of_what_moves
+from laufruhe.problem.channels import ON_BLOCK, Channel, LoadChannel, Need, NumberChannel, of_what_moves
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
 Resonances: TypeAlias = Callable[[MeasureQuery, EvaluatedDesign], Sequence[physics.Resonance]]

@@ -1,0 +1,566 @@
+"""Channels: quantities of a design that measures are taken of (M1-M5, E6-E15).
+
+A channel of a load is a function from the loads at an operating point to a signal, one of a block on its mounts a
+function to numbers. Each channel has the keys that narrow it and the sides that may be limited.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.extension import extended
+from laufruhe.machine import Block, Engine, Flywheel, OperatingPoint, Role
+from laufruhe.machine.clearances import Span, distances, reaches
+from laufruhe.machine.load_case import LoadCase
+from laufruhe.numerics.norms import MEAN, NORMS
+from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.physics import bearing_loads as bearings
+from laufruhe.physics import mount_numbers
+from laufruhe.physics.crank_torque import crank_torque
+from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
+from laufruhe.physics.fidelity import Fidelity
+from laufruhe.physics.irregularity import Swing, swing_of
+from laufruhe.physics.modes import MOTIONS
+from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.physics.reduced_inertia import turning_inertia
+from laufruhe.physics.static_cases import settled
+from laufruhe.problem.decision import Kind
+from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
+
+Factor: TypeAlias = Callable[[Engine, OperatingPoint], NDArray[np.float64]]
+"""One over the sizes that bear a load, shape (places,) or (places, d)."""
+OfWheel: TypeAlias = Callable[[Flywheel], float]
+OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
+ON_BLOCK = ("operating_points", "orders", "alternating")
+AT_WEBS = (*ON_BLOCK, "webs")
+AT_MOUNTS, AT_BEARINGS, AT_CYLINDERS = (
+    (*ON_BLOCK, "direction_weights", at) for at in ("mounts", "bearings", "cylinders")
+)
+OF_BEARINGS, IN_CYLINDERS = (*ON_BLOCK, "bearings"), (*ON_BLOCK, "cylinders")
+
+
+def of_what_moves(name: str, signal: Callable[[Engine, PointLoads], Spectrum]) -> Callable[[PointLoads], Spectrum]:
+    """Return the function of a load inside the crankcase, which depends on the moving parts alone."""
+
+    def inside_load(loads: PointLoads) -> Spectrum:
+        if loads.moving is None:
+            raise ValueError(f"of a wrench alone there is no {name}")
+        return signal(loads.moving, loads)
+
+    return inside_load
+
+
+@dataclass(frozen=True, eq=False)
+class Need:
+    """Part that an engine must have for a channel.
+
+    Attributes
+    ----------
+    of
+        Function that returns this part of an engine, false if it is missing.
+    what, remedy
+        Texts of the complaint about a file without it.
+    """
+
+    of: Callable[[Engine], object]
+    what: str
+    remedy: str
+
+
+class Needs:
+    """Needs of the channels of the core."""
+
+    NOTHING = Need(lambda _: True, "", "")
+    MOUNTS = Need(lambda e: e.mounts, "mounts", "add [mounts], or ask for a shaking force")
+    ELASTIC = Need(lambda e: e.block, "elastic mounts", 'add [mounts] with kind = "elastic", and [block]')
+    BEARINGS = Need(lambda e: e.bearings, "main bearings", "list them in [[main_bearings]]")
+    FLYWHEEL = Need(
+        lambda e: e.flywheel or any(extra.turning_inertia(e.slider_cranks) is not None for extra in e.extras),
+        "a flywheel",
+        "add [flywheel] with an inertia or a rim, [torsion], or fidelity.crank_inertia",
+    )
+    RIM = Need(lambda e: e.flywheel and e.flywheel.rim, "the rim of a flywheel", "add [flywheel.rim]")
+    ARMS = Need(
+        lambda e: e.flywheel and e.flywheel.rim and e.flywheel.rim.arms,
+        "the arms of a flywheel",
+        "add [flywheel.rim.arms]",
+    )
+    CASES = Need(lambda e: e.load_cases, "load cases", "add [[load_cases]], and [mounts] of kind elastic")
+
+
+_KNOWN: dict[str, Channel] = {}
+
+
+def channel_named(name: str) -> Channel:
+    """Return a channel by name, imported from its extension if needed."""
+    return _KNOWN.get(name) or CHANNELS[name]
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """Quantity of a design.
+
+    Attributes
+    ----------
+    name, unit
+        Name in files and reports; SI unit.
+    keys
+        Keys that narrow it in a file.
+    needs
+        Part that the engine must have.
+    sides
+        Sides that a limit may have.
+    minimised
+        True if it may be an objective.
+    of_loads
+        True unless a number is known not to depend on the excitation of the block.
+    of_wheel
+        Function of measure and design that returns the value as a function of the flywheel, for channels of it.
+    of_torque
+        True if it contains the torque of the crank, which depends on other decisions than the flywheel too.
+    of_engine
+        Value as a function of an engine, for channels of its sizes alone, monotone in each size.
+    of_cases
+        Function of a block in static balance, shape (mounts, 3), whose largest length is a channel of load cases.
+    simulation
+        Module that simulates it if there is no expression: `peaks` for searches of mounts, `boxes` for bounds.
+    missed
+        Relative error of peaks between the steps of a simulation, as a function of the engine.
+    of_axis
+        Residual of turning about the torque-roll axis as a mode, for channels of it.
+    places
+        Function that returns the names of its places, by which a file may narrow it; empty for the block.
+    title, place
+        Titles of the table and its column of places that every report shows for a load at even speed; empty if it is
+        shown on request only.
+    span
+        Function that returns the smallest and largest values while shafts move between their places in two engines.
+    """
+
+    name: str
+    unit: str
+    keys: tuple[str, ...] = ()
+    needs: Need = Needs.NOTHING
+    sides: tuple[str, ...] = ("max",)
+    minimised: bool = True
+    of_loads: bool = True
+    of_wheel: Callable[[MeasureQuery, EvaluatedDesign], OfWheel] | None = None
+    of_engine: Callable[[Engine], float] | None = None
+    of_torque: bool = False
+    of_cases: Callable[[Any], Any] | None = None
+    of_axis: Callable[[Block, mount_numbers.Band], mount_numbers.AxisResidual] | None = None
+    simulation: str = ""
+    missed: Callable[[Engine], float] = lambda _: 0.0
+    places: Callable[[Engine], Sequence[str]] = lambda _: ()
+    title: str = ""
+    place: str = ""
+    span: Callable[[MeasureQuery, Engine, Engine], Sequence[Span]] = lambda *_: ()
+    is_load: ClassVar[bool] = False
+    is_mass: ClassVar[bool] = False
+    is_number: ClassVar[bool] = False
+    is_mounting: ClassVar[bool] = False
+    is_placing: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        _KNOWN[self.name] = self
+
+    def __reduce__(self) -> tuple[Callable[[str], Channel], tuple[str]]:
+        # a channel is one and the same in every process
+        return channel_named, (self.name,)
+
+    def __str__(self) -> str:
+        return self.name
+
+    @property
+    def norms(self) -> Collection[str]:
+        """Names of the norms that apply to it; empty for a number."""
+        return ()
+
+    @property
+    def is_flywheel(self) -> bool:
+        """True if it is monotone in every number of the flywheel."""
+        return self.of_wheel is not None
+
+    @property
+    def of_inertia(self) -> bool:
+        """True if it is monotone in the inertia of all that turns."""
+        return self.is_flywheel and self.needs is Needs.FLYWHEEL
+
+    def check_sizes(self, engine: Engine, _: OperatingPoint) -> None:
+        """Raise `ModelError` if a size that it needs is missing."""
+        if self.of_engine is not None:
+            self.of_engine(engine)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadChannel(Channel):
+    """Signal over the cycle, linear in the loads; measures are norms of it.
+
+    Attributes
+    ----------
+    signal
+        Function that returns its spectrum, shape (n, places, d), from the loads at an operating point.
+    part
+        Components of the wrench for a load of the block; None for loads at mounts.
+    feels_gas
+        True if it contains the roll moment: gas gives no force (eq. 1).
+    of_wrench
+        True if it follows from the wrench on the block alone; else it is a load inside the crankcase.
+    feels_unbalances
+        True if rotors load it and the loads of the throws add up; else it depends on cylinders and their twist.
+    adds_up
+        True if its places add up, so that only the mean over the cycle has a meaning.
+    of_sizes
+        Factors of sizes of each place or component, by which a load inside the crankcase is multiplied (Z1).
+    """
+
+    keys: tuple[str, ...] = ON_BLOCK
+    signal: Callable[[PointLoads], Spectrum] = field(kw_only=True)
+    part: slice | None = None
+    feels_gas: bool = True
+    of_wrench: bool = False
+    feels_unbalances: bool = True
+    adds_up: bool = False
+    of_sizes: Factor | None = None
+    is_load: ClassVar[bool] = True
+
+    def factors_of(self, engine: Engine, point: OperatingPoint) -> NDArray[np.float64] | None:
+        """Return its factors of sizes, shape (places, d or 1); None without such factors."""
+        if self.of_sizes is None:
+            return None
+        factors = self.of_sizes(engine, point)
+        return factors if factors.ndim > 1 else factors[:, None]
+
+    def check_sizes(self, engine: Engine, point: OperatingPoint) -> None:
+        """Raise `ModelError` if a size of its places is missing."""
+        self.factors_of(engine, point)
+
+    @property
+    def norms(self) -> Collection[str]:
+        """Names of the norms that apply to it."""
+        return (MEAN.name,) if self.adds_up else tuple(NORMS)
+
+
+@dataclass(frozen=True, eq=False)
+class MassChannel(Channel):
+    """Sum of the masses of rotors with some roles."""
+
+    keys: tuple[str, ...] = ("of",)
+    roles: tuple[Role, ...] = field(kw_only=True)
+    is_mass: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, eq=False)
+class NumberChannel(Channel):
+    """Numbers of a design without a signal.
+
+    Attributes
+    ----------
+    values
+        Function that returns its numbers: the first is shown, limits apply to all.
+    """
+
+    values: Callable[[MeasureQuery, EvaluatedDesign], Sequence[float]] = field(kw_only=True)
+    is_number: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, eq=False)
+class SizeChannel(NumberChannel):
+    """Number that depends on sizes alone."""
+
+    of_loads: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class MountChannel(NumberChannel):
+    """Number of a block on its mounts."""
+
+    needs: Need = Needs.ELASTIC
+    is_mounting: ClassVar[bool] = True
+
+
+@dataclass(frozen=True, eq=False)
+class PlaceChannel(NumberChannel):
+    """Distance between places of balancer shafts."""
+
+    keys: tuple[str, ...] = ("of",)
+    of_loads: bool = False
+    minimised: bool = False
+    is_placing: ClassVar[bool] = True
+
+
+def _names_of_mounts(engine: Engine) -> Sequence[str]:
+    return [mount.name for mount in engine.mounts]
+
+
+def _names_of_bearings(engine: Engine) -> Sequence[str]:
+    return [bearing.name for bearing in engine.bearings]
+
+
+def names_of_cylinders(engine: Engine) -> Sequence[str]:
+    """Return the names of the places of loads of cylinders."""
+    return [part.name for part in engine.slider_cranks]
+
+
+Where: TypeAlias = tuple[tuple[str, ...], Need, Callable[[Engine], Sequence[str]]]
+"""Keys that narrow a load, part that it needs, and function that returns the names of its places."""
+IN_EACH_CYLINDER: Where = (IN_CYLINDERS, Needs.NOTHING, names_of_cylinders)
+AT_EACH_CRANK_PIN: Where = (AT_CYLINDERS, Needs.NOTHING, names_of_cylinders)
+AT_EACH_BEARING: Where = (AT_BEARINGS, Needs.BEARINGS, _names_of_bearings)
+OF_EACH_BEARING: Where = (OF_BEARINGS, Needs.BEARINGS, _names_of_bearings)
+Load: TypeAlias = Callable[[Engine, OperatingPoint, Fidelity], Spectrum]
+
+
+def inside(name: str, unit: str, where: Where, load: Load, factor: Factor | None = None) -> LoadChannel:
+    """Return the channel of a load inside the crankcase, multiplied by factors of sizes if there are any (Z1)."""
+
+    def signal(moving: Engine, loads: PointLoads) -> Spectrum:
+        spectrum = load(moving, loads.point, loads.fidelity)
+        if factor is None:
+            return spectrum
+        factors = factor(moving, loads.point)
+        columns = factors if factors.ndim > 1 else factors[:, None]
+        return spectrum.each(lambda values: values * columns)
+
+    keys, needs, places = where
+    return LoadChannel(name, unit, keys, needs, signal=of_what_moves(name, signal), places=places, of_sizes=factor)
+
+
+@dataclass(frozen=True, eq=False)
+class FlywheelChannel(NumberChannel):
+    """Number that is monotone in every number of the flywheel."""
+
+    of_loads: bool = False
+
+
+def _of_wheel(
+    name: str, unit: str, number: Callable[[Flywheel, Swing], float], keys: tuple[str, ...] = (),
+    needs: Need = Needs.FLYWHEEL, of_torque: bool = False,
+) -> FlywheelChannel:  # fmt: skip
+    """Return the channel of the largest value of a number over the operating points that count."""
+
+    def of_wheel(measure: MeasureQuery, evaluation: EvaluatedDesign) -> OfWheel:
+        counted = [loads.point for loads in evaluation.loads if measure.counts_point(loads.point)]
+        swings = [swing_of(evaluation.engine, point, evaluation.fidelity) for point in counted]
+        return lambda wheel: max((number(wheel, swing) for swing in swings), default=0.0)
+
+    def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
+        inertia, wheel = turning_inertia(evaluation.engine, evaluation.fidelity), evaluation.engine.flywheel
+        # an uneven speed needs an inertia only
+        return () if inertia is None else (of_wheel(measure, evaluation)(wheel or Flywheel(inertia)),)
+
+    return FlywheelChannel(name, unit, keys, needs, values=values, of_wheel=of_wheel, of_torque=of_torque)
+
+
+_AT_POINTS = ("operating_points",)
+IRREGULARITY = _of_wheel(
+    "degree of irregularity", "", lambda wheel, swing: swing.irregularity(wheel.inertia), _AT_POINTS, of_torque=True
+)
+FLYWHEEL_INERTIA = _of_wheel("flywheel inertia", "kg m^2", lambda wheel, _: wheel.inertia)
+FLYWHEEL_MASS = _of_wheel("flywheel mass", "kg", lambda wheel, _: wheel.ring.whole * wheel.ring.mass, needs=Needs.RIM)
+RIM_STRESS = _of_wheel("rim stress", "Pa", lambda wheel, swing: wheel.ring.stress(swing.speed), _AT_POINTS, Needs.RIM)
+ARM_STRESS = _of_wheel(
+    "arm stress", "Pa", lambda wheel, swing: wheel.ring.arm_stress(swing.speed, swing.torque), _AT_POINTS, Needs.ARMS
+)  # fmt: skip
+OF_FLYWHEEL = (IRREGULARITY, FLYWHEEL_INERTIA, FLYWHEEL_MASS, RIM_STRESS, ARM_STRESS)
+
+
+def mounting_in(engine: Engine) -> ElasticMounting:
+    """Return the elastic mounting of an engine with a block."""
+    if engine.block is None:
+        raise ValueError("this engine has no block, so its mounts are rigid")
+    return elastic_mounting(engine.block, engine.mounts)
+
+
+def _of_mounting(number: Callable[[ElasticMounting, MeasureQuery], float | Sequence[float]]) -> Callable[
+    [MeasureQuery, EvaluatedDesign], Sequence[float]
+]:  # fmt: skip
+    def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
+        numbers = number(mounting_in(evaluation.engine), measure)
+        return (numbers,) if isinstance(numbers, float) else numbers
+
+    return values
+
+
+def _transmissibility(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
+    firm = rigid_mounting(evaluation.engine.mounts)
+    ratios = [
+        mount_numbers.transmitted(loads.mount_forces, firm.forces(loads.wrench), measure.orders)
+        for loads in evaluation.loads
+        if measure.counts_point(loads.point) and loads.mount_forces is not None
+    ]
+    return (max(ratios, default=0.0),)
+
+
+def motion_indices(measure: MeasureQuery) -> tuple[int, ...]:
+    """Return the indices of the motions that should each have a mode of their own."""
+    return tuple(MOTIONS.index(name) for name in measure.motions or MOTIONS)
+
+
+def _of_axis(
+    name: str, unit: str, residual: Callable[[Block, mount_numbers.Band], mount_numbers.AxisResidual]
+) -> MountChannel:
+    # zero if turning about the torque-roll axis is a mode
+    def value(mounting: ElasticMounting, measure: MeasureQuery) -> float:
+        return mount_numbers.residual_of(mounting, residual(mounting.block, measure.frequency))
+
+    return MountChannel(name, unit, ("frequency",), values=_of_mounting(value), of_axis=residual, of_loads=False)
+
+
+def counted_cases(measure: MeasureQuery, engine: Engine) -> list[LoadCase]:
+    """Return the load cases that count."""
+    return [case for case in engine.load_cases if measure.cases is None or case.name in measure.cases]
+
+
+def _of_cases(name: str, unit: str, part: Callable[[Any], Any]) -> MountChannel:
+    """Return the channel of the largest length over the mounts and load cases that count."""
+
+    def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
+        mounting = mounting_in(evaluation.engine)
+        chosen = measure.places([mount.name for mount in mounting.mounts])
+        weights = np.array(measure.direction_weights or (1.0, 1.0, 1.0))
+        cases = counted_cases(measure, evaluation.engine)
+        vectors = [part(settled(mounting, case))[chosen] * weights for case in cases]
+        return (max((float(np.linalg.norm(rows, axis=1).max()) for rows in vectors), default=0.0),)
+
+    keys = ("load_cases", "mounts", "direction_weights")
+    return MountChannel(
+        name, unit, keys, Needs.CASES, values=values, of_cases=part, of_loads=False,
+        places=_names_of_mounts,
+    )  # fmt: skip
+
+
+STATIC_TRAVEL = _of_cases("static travel", "m", lambda balance: balance.travel)
+STATIC_FORCE = _of_cases("static mount force", "N", lambda balance: balance.force)
+TRANSMISSIBILITY = MountChannel("transmissibility", "", ("operating_points", "orders"), values=_transmissibility)
+SAG = MountChannel(
+    "static sag",
+    "m",
+    sides=("min", "max"),
+    of_loads=False,
+    values=_of_mounting(lambda mounting, _: mount_numbers.sag(mounting)),
+)
+FREQUENCIES = MountChannel(
+    "natural frequencies", "Hz", sides=("min", "max", "outside"), minimised=False, of_loads=False,
+    values=_of_mounting(lambda mounting, _: [float(f) for f in mounting.modes.frequencies]),
+)  # fmt: skip
+DECOUPLING = MountChannel(
+    "kinetic-energy decoupling", "", ("motions",), sides=("min",), minimised=False, of_loads=False,
+    values=_of_mounting(lambda mounting, m: mount_numbers.decoupling(mounting.modes.energy, motion_indices(m))),
+)  # fmt: skip
+DECOUPLING_SHORTFALL = MountChannel(
+    "decoupling shortfall", "", ("motions", "wanted"), of_loads=False,
+    values=_of_mounting(
+        lambda mounting, m: mount_numbers.decoupling_shortfall(mounting.modes.energy, motion_indices(m), m.wanted)
+    ),
+)  # fmt: skip
+TORQUE_ROLL = _of_axis("torque-roll residual", "", mount_numbers.relative_residual)
+RAW_TORQUE_ROLL = _of_axis("raw torque-roll residual", "N m/rad", mount_numbers.raw_residual)
+TOTAL_STIFFNESS = MountChannel(
+    "total stiffness", "N/m", sides=("min", "max"), of_loads=False,
+    values=_of_mounting(lambda mounting, _: mount_numbers.total_stiffness(mounting.mounts)),
+)  # fmt: skip
+OF_MOUNTING = (
+    TRANSMISSIBILITY, SAG, FREQUENCIES, DECOUPLING, DECOUPLING_SHORTFALL, TORQUE_ROLL, RAW_TORQUE_ROLL, TOTAL_STIFFNESS,
+    STATIC_TRAVEL, STATIC_FORCE,
+)  # fmt: skip
+
+
+def _on_block(name: str, unit: str, part: slice, feels_gas: bool = False) -> LoadChannel:
+    def signal(loads: PointLoads) -> Spectrum:
+        return loads.wrench.each(lambda wrench: wrench[:, None, part])
+
+    return LoadChannel(name, unit, signal=signal, part=part, feels_gas=feels_gas, of_wrench=True)
+
+
+def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads], Spectrum | None]) -> LoadChannel:
+    def known(loads: PointLoads) -> Spectrum:
+        spectrum = signal(loads)
+        if spectrum is None:
+            raise ValueError(f"this mounting has no {name}")
+        return spectrum
+
+    return LoadChannel(name, unit, AT_MOUNTS, needs, signal=known, places=_names_of_mounts, of_wrench=True)
+
+
+def _resultant(loads: PointLoads) -> Spectrum:
+    if loads.mount_forces is None:
+        raise ValueError("this mounting has no resultant mount force")
+    return loads.mount_forces.each(lambda values: values.sum(axis=1, keepdims=True))
+
+
+_ON_CRANK: Where = (ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",))
+
+
+def _crank_torque(moving: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    return crank_torque(moving, point, fidelity).each(lambda values: values[:, None, None])
+
+
+def _side_forces(moving: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
+    return bearings.piston_pin_forces(moving, point, fidelity).each(lambda values: values[..., 1:])
+
+
+def _of_places(
+    name: str, sides: tuple[str, ...], span: Callable[[MeasureQuery, Engine, Engine], Sequence[Span]]
+) -> Channel:
+    def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
+        return [lower for lower, _ in span(measure, evaluation.engine, evaluation.engine)]
+
+    return PlaceChannel(name, "m", sides=sides, values=values, span=span)
+
+
+MOUNT_FORCE = _on_mounts("mount force", "N", Needs.MOUNTS, lambda loads: loads.mount_forces)
+RESULTANT_MOUNT_FORCE = LoadChannel("resultant mount force", "N", ON_BLOCK, Needs.MOUNTS, signal=_resultant)
+MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: loads.mount_travel)
+AT_EACH_MOUNT = frozenset({MOUNT_FORCE, MOUNT_TRAVEL})
+"""Loads for which bounds of mounts have formulas."""
+SHAKING_FORCE = _on_block("shaking force", "N", slice(0, 3))
+ROCKING_COUPLE = _on_block("rocking couple", "N m", slice(4, 6))
+ROLL_MOMENT = _on_block("roll moment", "N m", slice(3, 4), feels_gas=True)
+SURGING_FORCE = _on_block("surging force", "N", slice(1, 2))
+SWAYING_COUPLE = _on_block("swaying couple", "N m", slice(5, 6))
+OF_BLOCK = (SHAKING_FORCE, ROCKING_COUPLE, ROLL_MOMENT, SURGING_FORCE, SWAYING_COUPLE)
+MAIN_BEARING_FORCE = inside("main-bearing force", "N", AT_EACH_BEARING, bearings.main_bearing_forces)
+MAIN_BEARING_PRESSURE = inside(
+    "main-bearing pressure", "Pa", AT_EACH_BEARING, bearings.main_bearing_forces, bearings.bearing_factors
+)
+HAMMER_BLOW = inside("hammer blow", "N", OF_EACH_BEARING, bearings.hammer_blows)
+CRANK_TORQUE = inside("crank torque", "N m", _ON_CRANK, _crank_torque)
+STORED_WORK = inside("stored work", "J", _ON_CRANK, lambda *at: _crank_torque(*at).integral)
+CRANK_PIN_FORCE = inside("crank-pin force", "N", AT_EACH_CRANK_PIN, bearings.pin_forces)
+CRANK_PIN_PRESSURE = inside(
+    "crank-pin pressure", "Pa", AT_EACH_CRANK_PIN, bearings.pin_forces, bearings.crank_pin_factors
+)
+SIDE_FORCE = inside("side force", "N", IN_EACH_CYLINDER, _side_forces)
+ROD_FORCE = inside("rod force", "N", IN_EACH_CYLINDER, bearings.piston_pin_forces)
+FRICTION_POWER = replace(
+    inside("friction power", "W", OF_EACH_BEARING, bearings.main_bearing_forces, bearings.drag_factors),
+    adds_up=True, keys=("operating_points", "orders", "bearings"),
+)  # fmt: skip
+
+COUNTERWEIGHT_MASS = MassChannel("counterweight mass", "kg", roles=(Role.COUNTERWEIGHT,))
+BALANCER_MASS = MassChannel("balancer mass", "kg", roles=(Role.BALANCER,))
+ADDED_MASS = MassChannel("added mass", "kg", roles=(Role.COUNTERWEIGHT, Role.BALANCER))
+
+SHAFT_DISTANCE = _of_places("shaft distance", ("min", "max"), lambda m, a, b: distances(m.rotors, a, b, False))
+SHAFT_CLEARANCE = _of_places("shaft clearance", ("min",), lambda m, a, b: distances(m.rotors, a, b, True))
+ENVELOPE_RADIUS = _of_places("envelope radius", ("max",), lambda m, a, b: reaches(m.rotors, a, b))
+OF_SHAFT_PLACES = frozenset({SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS})
+
+
+def is_at_mounts(channel: Channel) -> bool:
+    """Return True for the force and the travel of each mount."""
+    return channel in AT_EACH_MOUNT
+
+
+CHANNELS: Mapping[str, Channel] = extended("channels", Channel, (
+    MOUNT_FORCE, RESULTANT_MOUNT_FORCE, MOUNT_TRAVEL, *OF_BLOCK,
+    HAMMER_BLOW, MAIN_BEARING_FORCE, MAIN_BEARING_PRESSURE, CRANK_PIN_FORCE, CRANK_PIN_PRESSURE, ROD_FORCE,
+    SIDE_FORCE, FRICTION_POWER, CRANK_TORQUE, STORED_WORK, *OF_FLYWHEEL, COUNTERWEIGHT_MASS, BALANCER_MASS,
+    ADDED_MASS, *OF_MOUNTING, SHAFT_DISTANCE, SHAFT_CLEARANCE, ENVELOPE_RADIUS,
+))  # fmt: skip
