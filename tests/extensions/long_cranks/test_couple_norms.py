@@ -72,8 +72,8 @@ def test_couples_say_what_the_exact_model_says(cylinders, cycle, name, gas, tmp_
     low = own.values(family.space, stars)
     assert (low <= exact * (1.0 + 1e-9)).all()
     assert low == pytest.approx(exact, rel=5e-3)
-    assert own.least(family.space) <= low.min() * (1.0 + 1e-9)
-    assert low.max() <= own.largest(family.space)
+    assert own.lower_bound(family.space) <= low.min() * (1.0 + 1e-9)
+    assert low.max() <= own.upper_bound(family.space)
     for most in np.quantile(exact, (0.0, 0.1, 0.5, 0.9)):
         window = own.window(family.space, family.space.patterns[0], most)
         couples = star_sums(stars, family.space.phases, family.space.places, (window.order,))[:, 0, 1]

@@ -204,4 +204,4 @@ def test_a_piece_without_an_answer_leaves_the_search_open(monkeypatch):
     monkeypatch.setattr(star_search, "unordered_map", all_but_one)
     found = search_stars(space, objective)
     assert not found.complete
-    assert found.lower_bound == objective.least(space)
+    assert found.lower_bound == objective.lower_bound(space)

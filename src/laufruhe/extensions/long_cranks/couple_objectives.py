@@ -42,7 +42,7 @@ _AT_ONCE = 1 << 22
 class StarAmplitudes(AmplitudeObjective):
     """Sum of norms of forces and couples of single orders, with the window of better stars (S3)."""
 
-    def largest(self, space: StarSpace) -> float:
+    def upper_bound(self, space: StarSpace) -> float:
         """Return an upper bound of all stars: all throws on the side of their places [SI]."""
         levers = float(np.abs(space.places).sum())
         return sum(
@@ -50,7 +50,7 @@ class StarAmplitudes(AmplitudeObjective):
             for term in self.terms
         )
 
-    def least(self, space: StarSpace) -> float:
+    def lower_bound(self, space: StarSpace) -> float:
         """Return a lower bound of all stars: forces alone, which the pattern fixes [SI]."""
         return min(self._forces(space, pattern) for pattern in space.patterns)
 
@@ -152,12 +152,12 @@ class CoupleNorms:
         constants = np.array([sum(constant for constant, _ in parts) for parts in grouped])
         return constants, np.array([sum(slope for _, slope in parts) for parts in grouped])
 
-    def largest(self, space: StarSpace) -> float:
+    def upper_bound(self, space: StarSpace) -> float:
         """Return an upper bound of all stars [SI]."""
         levers = float(np.abs(space.places).sum())
-        return self.least(space) + levers * sum(term.weight * float(term.alone.sum()) for term in self.terms)
+        return self.lower_bound(space) + levers * sum(term.weight * float(term.alone.sum()) for term in self.terms)
 
-    def least(self, space: StarSpace) -> float:
+    def lower_bound(self, space: StarSpace) -> float:
         """Return a lower bound of all stars: the value without couples (S40) [SI]."""
         del space
         return float(sum(term.values(np.zeros((1, len(term.couples))))[0] for term in self.terms))
@@ -165,8 +165,8 @@ class CoupleNorms:
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
         """Return the window of the order that weighs most, by what that order alone leaves (S48)."""
         del pattern
-        least = self.least(space)
-        if value < least:
+        minimum = self.lower_bound(space)
+        if value < minimum:
             return None
         shares = np.asarray(sum(term.shares for term in self.terms))
         if not len(shares) or not shares.max() > 0.0 or value == math.inf:
@@ -174,7 +174,7 @@ class CoupleNorms:
         place = int(np.argmax(shares))
         if len(self.terms) == 1 and self.terms[0].norm.is_euclidean:
             # squares of orders add up, so that what no couple changes leaves less room
-            value = math.sqrt((value - least) * (value + least))
+            value = math.sqrt((value - minimum) * (value + minimum))
         most = value / float(shares[place])
         return Window(self.orders[place], complex(-most, -most), complex(most, most))
 
@@ -232,7 +232,7 @@ class _Spread:
         base = designs[0].engine.cycle.base_order
         channels = {term.measure.load for term in problem.objective}
         signals = {channel: [over(base, design.signals(channel)) for design in designs] for channel in channels}
-        every = [signal for each in signals.values() for own in each for signal in own]
+        every = [signal for by_design in signals.values() for star_loads in by_design for signal in star_loads]
         if any(signal.base != base for signal in every):
             return None
         count, per_turn = max(len(signal.coefficients) for signal in every), round(1 / base)
@@ -244,24 +244,27 @@ class _Spread:
         # what shifts by firing intervals change
         fired = np.arange(count) % len(designs[0].engine.cylinders) > 0
         places = np.array(orders, dtype=np.intp) * per_turn
-        for channel, each in signals.items():
+        for channel, by_design in signals.items():
             rest[channel], units[channel] = [], []
             for at in range(len(problem.points)):
-                own = [_padded(signals_of[at], count) for signals_of in each]
-                unit = (own[1] - own[0])[places] / (sums[1] - sums[0])[:, None, None]
-                shared = own[0].copy()
+                star_loads = [_padded(signals_of[at], count) for signals_of in by_design]
+                unit = (star_loads[1] - star_loads[0])[places] / (sums[1] - sums[0])[:, None, None]
+                shared = star_loads[0].copy()
                 shared[places] -= unit * sums[0][:, None, None]
-                third, size = shared.copy(), float(np.abs(own[0]).max(initial=0.0))
+                third, size = shared.copy(), float(np.abs(star_loads[0]).max(initial=0.0))
                 third[places] += unit * sums[2][:, None, None]
                 # nothing but couples has other orders than the firing's, and couples give the third star
-                if np.abs(third - own[2]).max() > _SAME * size or np.abs(shared[fired]).max(initial=0.0) > _SAME * size:
+                if (
+                    np.abs(third - star_loads[2]).max() > _SAME * size
+                    or np.abs(shared[fired]).max(initial=0.0) > _SAME * size
+                ):
                     return None
                 shared[places] = 0.0
                 used |= np.abs(unit).max(axis=(1, 2)) * float(np.abs(space.places).sum()) > _NEGLIGIBLE * size
-                rest[channel].append(each[0][at].holding(shared))
+                rest[channel].append(by_design[0][at].holding(shared))
                 units[channel].append(unit)
         selected = tuple(order for order, use in zip(orders, used, strict=True) if use)
-        return cls(problem, designs[0], selected, rest, {c: [u[used] for u in own] for c, own in units.items()})
+        return cls(problem, designs[0], selected, rest, {c: [u[used] for u in values] for c, values in units.items()})
 
     def term(self, weight: float, measure: Measure) -> CoupleTerm:
         """Return one term, its rows those of a result, means averaged about them (P7)."""

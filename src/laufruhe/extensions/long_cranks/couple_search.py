@@ -46,10 +46,10 @@ class CoupleObjective(Protocol):
     def values(self, space: StarSpace, stars: Stars, most: float = math.inf) -> Array:
         """Return values of many stars, shape (n,); over `most` any number between it and the value."""
 
-    def largest(self, space: StarSpace) -> float:
+    def upper_bound(self, space: StarSpace) -> float:
         """Return an upper bound of all stars [SI]."""
 
-    def least(self, space: StarSpace) -> float:
+    def lower_bound(self, space: StarSpace) -> float:
         """Return a lower bound of all stars, whatever their couples [SI]."""
 
     def window(self, space: StarSpace, pattern: tuple[int, ...], value: float) -> Window | None:
@@ -80,7 +80,7 @@ def search_stars(
         search = _Search(space, objective, best)
         search.run()
     minimum = float(best.values[0]) if len(best.values) else float("inf")
-    bound = objective.least(space) if search.ended else minimum
+    bound = objective.lower_bound(space) if search.ended else minimum
     return StarSearchResult(best.stars, best.values, bound, not search.ended, search.looked_at)
 
 
@@ -111,7 +111,7 @@ class _Search:
 
     def __init__(self, space: StarSpace, objective: CoupleObjective, best: BestStars) -> None:
         self.space, self.objective, self.best = space, objective, best
-        self.nothing = NEGLIGIBLE * objective.largest(space)
+        self.nothing = NEGLIGIBLE * objective.upper_bound(space)
         self.looked_at, self.ended = 0, False
 
     def run(self) -> None:
@@ -187,7 +187,7 @@ def good_starts(space: StarSpace, objective: CoupleObjective) -> Stars:
     improved = np.array([_swapped(space, objective, star) for star in drawn])
     values = objective.values(space, improved)
     best = improved[np.argmin(values)]
-    if space.throws < LONG or values.min() <= NEGLIGIBLE * objective.largest(space):
+    if space.throws < LONG or values.min() <= NEGLIGIBLE * objective.upper_bound(space):
         return improved
     for count in TOGETHER:
         best = _arranged(space, objective, best, sorted(map(int, 1 + rng.permutation(space.throws - 1)[:count])))

@@ -101,7 +101,7 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
     bound = optimum.bound
     prices, bounds = affine_prices(optimum.problem, limits, optimum.x, bound)
     unit = design.value if design.value > optimum.nothing else optimum.nothing / ROUNDING
-    shown = Shown(
+    proof = Shown(
         bound=bound.value,
         reach=Reach.WHOLE,
         kkt_residual=kkt_residual(optimum.problem, optimum.x, bound, unit),
@@ -109,7 +109,7 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
         prices=dict.fromkeys([(limit, "at most") for limit in fixed], Price(0.0, math.inf)) | prices,
         bounds=bounds,
     )
-    return concluded(design, initial, shown, timing)
+    return concluded(design, initial, proof, timing)
 
 
 def _fixed_limits(problem: Problem, model: AffineModel) -> tuple[list[Limit], tuple[str, ...]]:

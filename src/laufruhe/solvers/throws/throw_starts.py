@@ -90,8 +90,8 @@ def why_none_fires(phasing: Phasing) -> tuple[str, bool]:
     patterns, complete = _firing_patterns(phasing)
     if not patterns or patterns[0].broken <= _ROUNDING:
         return text, False
-    shown = interval_range(patterns[0].intervals(phasing.cycle))
-    text += f"; the most even crank {'' if complete else 'found '}has intervals {shown}"
+    intervals = interval_range(patterns[0].intervals(phasing.cycle))
+    text += f"; the most even crank {'' if complete else 'found '}has intervals {intervals}"
     if phasing.bank is not None:
         step = 360.0 / (phasing.cylinders // math.gcd(phasing.cycle.turns, phasing.cylinders))
         text += (
