@@ -117,7 +117,7 @@ class _Search:
     def run(self) -> None:
         """Search all stars in pieces and rounds: each piece knows the best of the rounds before it.
 
-        Pieces and rounds are the same whoever works, so what is found is too.
+        Pieces and rounds do not depend on the workers, so the result does not either.
         """
         if self.best.cut <= self.nothing:
             return
@@ -163,7 +163,7 @@ def _explored(piece: _Piece) -> tuple[BestStars, int, bool]:
         if passed():
             return best, seen, True
         if best.cut != cut:
-            # stars equal to the last one wanted are kept out: any of them will do
+            # stars equal to the last of the best are left out: any of them will do
             cut = best.cut
             window = objective.window(space, piece.pattern, cut * (1.0 - SLACK))
         if window is None:

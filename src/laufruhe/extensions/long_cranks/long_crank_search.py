@@ -85,10 +85,10 @@ def _search_by_couples(problem: Problem, phasing: Phasing, families: Sequence[Fa
     if answer.complete:
         return merge_answers([answer], phasing.best)
     three = [phasing.realise(family.candidate(phasing, tuple(map(int, star)))) for star in three_stars(family.space)]
-    own = couple_norms(problem, family.space, three)
-    if own is None:
+    objective = couple_norms(problem, family.space, three)
+    if objective is None:
         return None
-    every = search_stars(family.space, own, phasing.best, phasing.time_limit, known)
+    every = search_stars(family.space, objective, phasing.best, phasing.time_limit, known)
     stars += [tuple(map(int, star)) for star in every.stars]
     answer = _evaluate_stars(problem, phasing, family, stars, every.lower_bound)
     answer = merge_answers([answer], phasing.best)
@@ -119,10 +119,10 @@ def _evaluate_stars(
 def _with_least_couples(phasing: Phasing, family: Family) -> Stars:
     couple = (Term(Measure(ROCKING_COUPLE, RMS)),)
     of_couples = replace(phasing, realise=lambda candidate: phasing.realise(candidate).changed(objective=couple))
-    own = _amplitudes(of_couples, family)
-    if own is None:
+    objective = _amplitudes(of_couples, family)
+    if objective is None:
         return np.zeros((0, family.space.throws), dtype=np.uint8)
-    return best_starts(replace(family.space, mirror=True, reflect=True), own, phasing.best).stars
+    return best_starts(replace(family.space, mirror=True, reflect=True), objective, phasing.best).stars
 
 
 def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[Family]) -> Answer:
@@ -136,7 +136,7 @@ def _search_by_exchanges(problem: Problem, phasing: Phasing, families: Sequence[
         owners = shaft_owners(model)
         starts = [tuple(map(int, star)) for star in _with_least_couples(phasing, family)]
         engines = {star: phasing.realise(family.candidate(phasing, star)) for star in starts}
-        values = {star: objective_value(own, evaluate(own)) for star, own in engines.items()}
+        values = {star: objective_value(star_problem, evaluate(star_problem)) for star, star_problem in engines.items()}
         first = min(starts, key=values.__getitem__, default=family.first)
         built = min(phasing.shafts.allowed, key=lambda some: coarse_value(model, first, some, owners))
         star = improved(model, first, built, owners)
@@ -156,13 +156,13 @@ def improved(model: StarModel, star: tuple[int, ...], built: tuple[int, ...], ow
     """Return the best star that exchanges lead to, everything else at its optimum at few angles (S44)."""
     value = coarse_value(model, star, built, owners)
     while not passed():
-        least, best = min(
+        minimum, best = min(
             ((coarse_value(model, other, built, owners), other) for other in in_time(exchanges(star))),
             default=(math.inf, star),
         )
-        if not least < value * (1.0 - WORTH):
+        if not minimum < value * (1.0 - WORTH):
             break
-        value, star = least, best
+        value, star = minimum, best
     return star
 
 

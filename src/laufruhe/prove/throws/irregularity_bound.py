@@ -41,8 +41,8 @@ class StoredWorkBound:
         angles = math.tau * np.arange(fidelity.samples) / fidelity.samples
         alone = [replace(engine, slider_cranks=(part,)) for part in engine.slider_cranks]
         inertias = [moving_inertia(one, fidelity, angles)[0] for one in alone]
-        most, least = (float(sum(map(end, inertias))) for end in (np.max, np.min))
-        return cls((0.5 * (inertia + most) + 0.25 * (most - least)) * point.speed**2)
+        largest, smallest = (float(sum(map(end, inertias))) for end in (np.max, np.min))
+        return cls((0.5 * (inertia + largest) + 0.25 * (largest - smallest)) * point.speed**2)
 
     def degree(self, work: float) -> float:
         """Return the least degree of irregularity with so much work stored [J]."""

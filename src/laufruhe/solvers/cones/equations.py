@@ -82,7 +82,7 @@ def equations_of(problem: AffineProblem, limits: Sequence[int]) -> Equations | N
         return None
     dual = np.split(left / values, np.cumsum([len(slope) for slope in slopes])[:-1])
     return Equations(
-        right / units, -along / values, units, tuple(own / size for own, size in zip(dual, sizes, strict=True)),
+        right / units, -along / values, units, tuple(matrix / size for matrix, size in zip(dual, sizes, strict=True)),
         tuple(norm.constant.shape for norm in norms),
     )  # fmt: skip
 

@@ -143,7 +143,7 @@ def _refine(problem: Problem, model: AffineModel, nothing: float, begin: int) ->
     has_many_rows = any(len(norm.grid.weights) > MANY_ROWS for _, norm in model.at(half).terms)
     first = half if model.full_samples % 2 == 0 and has_many_rows else model.full_samples
     samples, best = max(first, begin), None
-    # a mean that is all but as little as can be is kept at no few angles
+    # a limit that is nearly the least mean possible needs many angles
     most = max(MOST_DOUBLINGS, math.ceil(math.log2(2 * FINE_SAMPLES / samples)))
     for k in in_time(range(most + 1)):
         optimum = allowed_optimum(problem, model, samples, nothing)
@@ -153,7 +153,7 @@ def _refine(problem: Problem, model: AffineModel, nothing: float, begin: int) ->
             # means averaged, for at a few angles alone one may be more than over the whole cycle (P7)
             if is_infeasible(model.at(samples, averaged=True)):
                 return None, samples
-            # a limit that is all but the least of what it limits is kept by what counts as kept
+            # a limit that is nearly the least value possible is met within the tolerance of limits
             optimum = _attempt(problem, model, samples, nothing, FEASIBLE - KEPT)
             if optimum is not None and optimum.excess <= KEPT and _keeps_limits_finely(problem, optimum):
                 best = optimum

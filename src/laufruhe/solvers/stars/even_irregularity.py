@@ -23,7 +23,7 @@ _ALIKE = "every star that fires evenly turns the crank as evenly"
 
 
 def flywheel_measures(problem: Problem) -> list[Measure]:
-    """Return what is asked of the flywheel, and of how evenly it turns."""
+    """Return measures of the flywheel, and of how evenly it turns."""
     return [measure for measure in problem.measures if measure.channel.is_flywheel]
 
 
@@ -33,7 +33,7 @@ def solve_alike_stars(problem: Problem, phasing: Phasing, solve: Callable[[Probl
     Parameters
     ----------
     solve
-        Solver of the problem without what is asked of the flywheel.
+        Solver of the problem without measures of the flywheel.
     """
     initial = evaluate(problem)
     wheel = [limit for limit in problem.limits if limit.measure.channel.is_flywheel]

@@ -132,8 +132,8 @@ class ThrowPrograms:
         # how many orders are followed along an arc: of the rest, which is next to nothing, the size counts
         sizes = np.zeros(len(waves.orders))
         for norm in every:
-            own = np.sqrt(np.square(np.abs(norm.waves)).sum(axis=(0, 2, 3)))
-            sizes += own / (float(own.max()) or 1.0)
+            by_order = np.sqrt(np.square(np.abs(norm.waves)).sum(axis=(0, 2, 3)))
+            sizes += by_order / (float(by_order.max()) or 1.0)
         self._followed = int(np.flatnonzero(sizes > waves.followed * sizes.max()).max(initial=0)) + 1
         self._by_laps: dict[tuple[int, ...], Program] = {}
         self._proofs: list[Multipliers] = []
@@ -360,21 +360,21 @@ class Mixture:
         is_heavy = self._weights > _FAINT * self._weights.max()
         most = (_MOST[shared_count],) * throws + (_MOST_SHARED[shared_count],) * shared_count
         side_orders = [
-            *(np.where(own, orders[:, 0], 0.0) for own in is_heavy),
+            *(np.where(row, orders[:, 0], 0.0) for row in is_heavy),
             *np.where(is_heavy.any(axis=0), orders[:, 1:].T, 0.0),
         ]
         steps = [
-            min(max(math.ceil(float(np.abs(own).max(initial=0.0)) * width / _APART) + 1, _FEWEST), limit)
+            min(max(math.ceil(float(np.abs(row).max(initial=0.0)) * width / _APART) + 1, _FEWEST), limit)
             if width > 0.0
             else 1
-            for own, width, limit in zip(side_orders, upper - lower, most, strict=True)
+            for row, width, limit in zip(side_orders, upper - lower, most, strict=True)
         ]
         every = [np.linspace(a, b, n) for a, b, n in zip(lower, upper, steps, strict=True)]
         self._angles, shared = every[:throws], list(product(*every[throws:]))
         self._shared = np.array(shared).reshape(len(shared), shared_count)
         places = np.concatenate([[0], np.cumsum([len(shared) - 1, *(len(shared) * (n - 1) for n in steps[:throws])])])
         self._places, size = self.unbalances + places, int(self.unbalances + places[-1])
-        points = [self._wave_points(own) for own in self._angles]
+        points = [self._wave_points(angles) for angles in self._angles]
         ties = []
         for maximum, norm in columns.limits:
             slope = np.zeros((*norm.constant.shape, size))

@@ -104,17 +104,19 @@ def why_none_fires(phasing: Phasing) -> tuple[str, bool]:
 def _firing_patterns(phasing: Phasing) -> tuple[list[FiringPattern], bool]:
     """Return ways to fire, the most even first, and whether these are all."""
     layout = phasing.layout(*phasing.least_geometry)
-    own = [k for k, pin in enumerate(layout.pins) if pin == 0]
+    first = [k for k, pin in enumerate(layout.pins) if pin == 0]
     low, high = (sum(pair) for pair in zip(phasing.bank or (0.0, 0.0), phasing.split or (0.0, 0.0), strict=True))
     slots = FiringSlots(
-        phasing.cycle, len(layout.throw_positions), tuple(layout.side(k) for k in own), (low, high),
+        phasing.cycle, len(layout.throw_positions), tuple(layout.side(k) for k in first), (low, high),
         max(phasing.intervals.least, SOONEST), phasing.intervals.most,
     )  # fmt: skip
     members = None
     if phasing.firing_order is not None:
         # firings of every throw's cylinders
         slot = {number - 1: s for s, number in enumerate(phasing.firing_order)}
-        members = [[slot[k] for k, pin in enumerate(layout.pins) if pin == own] for own in range(max(layout.pins) + 1)]
+        members = [
+            [slot[k] for k, pin in enumerate(layout.pins) if pin == throw] for throw in range(max(layout.pins) + 1)
+        ]
     return slots.patterns(members)
 
 
@@ -137,9 +139,9 @@ def _cranks_of_pattern(phasing: Phasing, pattern: FiringPattern, number: int) ->
     bank = split = None
     if phasing.bank is not None:
         # bank angle and split pin of the pattern's sum, as near to the middle as their bounds allow
-        (low, high), (least, most) = phasing.bank, phasing.split or (0.0, 0.0)
-        bank = min(max(pattern.angle - 0.5 * (least + most), low), high)
-        split = min(max(pattern.angle - bank, least), most)
+        (low, high), (narrowest, widest) = phasing.bank, phasing.split or (0.0, 0.0)
+        bank = min(max(pattern.angle - 0.5 * (narrowest + widest), low), high)
+        split = min(max(pattern.angle - bank, narrowest), widest)
         bank = min(max(pattern.angle - split, low), high)
     layout, count = phasing.layout(bank, split), len(pattern.members)
     plain = Candidate(tuple(0.0 for _ in range(count)), None, bank, split)
@@ -157,9 +159,9 @@ def _cranks_of_pattern(phasing: Phasing, pattern: FiringPattern, number: int) ->
     for k in best:
         # cylinders as they fire, the first one first
         cylinder = {}
-        for pin, own in enumerate(orders[k]):
+        for pin, share in enumerate(orders[k]):
             cylinders = [c for c, at in enumerate(layout.pins) if at == pin]
-            cylinder.update(dict(zip(pattern.members[own], cylinders, strict=True)))
+            cylinder.update(dict(zip(pattern.members[share], cylinders, strict=True)))
         order = from_one([cylinder[slot] + 1 for slot in range(len(cylinder))])
         crank = Candidate(tuple(float(a) % math.tau for a in throws[k]), order, bank, split)
         if simple is not None:
