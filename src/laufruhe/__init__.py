@@ -177,14 +177,14 @@ def study(source: Source, jobs: int = 1) -> dict[str, xr.Dataset]:
     from tempfile import TemporaryDirectory
 
     from laufruhe.files.reader import tables_and_path
-    from laufruhe.studies.kept_points import KEPT
+    from laufruhe.studies.finished_points import FINISHED_POINTS
     from laufruhe.studies.reader import load_study
     from laufruhe.studies.runner import run
 
     check_whole("jobs", jobs, 1)
     _, path = tables_and_path(source)
     with TemporaryDirectory() as folder:
-        datasets, _ = run(load_study(source), path.parent, Path(folder) / KEPT, jobs=jobs)
+        datasets, _ = run(load_study(source), path.parent, Path(folder) / FINISHED_POINTS, jobs=jobs)
     return datasets
 
 

@@ -11,7 +11,7 @@ from pages import PAGES, ROOT, publish
 from laufruhe.extensions.robust.built_engines import BuiltEngines, objective_values
 from laufruhe.extensions.robust.tolerance import Law, Tolerances, tolerances_of
 from laufruhe.files.reader import load
-from laufruhe.present.tables import piped
+from laufruhe.present.tables import markdown_table
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import unbalances_of
 
@@ -62,7 +62,7 @@ def main() -> None:
         f"worst case under {c.lower_bound:.3f} N, this one has {worst:.3f} N, a gap of {c.gap:.1e}. Engines of this",
         "design were then built at random, by `tests/benchmarks/bench_robust.py`.",
         "",
-        piped(head, rows),
+        markdown_table(head, rows),
         "",
         "Engines whose errors are even or normal within their tolerances stay far from the worst case: all errors",
         "would have to be at their limits, and conspire. With all errors at their limits, each end as likely,",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import shutil
 from pathlib import Path
 
@@ -10,7 +9,6 @@ import pytest
 import xarray as xr
 from typer.testing import CliRunner
 
-from lanes import first_fast
 from laufruhe.cli import app
 from laufruhe.errors import SolverError
 from laufruhe.files.study_tables import CaseTable
@@ -112,54 +110,6 @@ def test_a_file_that_changes_under_way_is_told_and_nothing_of_it_kept(
             runner.run(study, folder, kept)
     assert len(str(caught.value).splitlines()) == 1
     assert not kept.exists()
-
-
-@pytest.mark.parametrize("share", first_fast(range(5), 0, 1))
-def test_comments_and_docstrings_are_no_part_of_the_program(share: int) -> None:
-    """The syntax tree has no comments: what is left of each file has the tree of the file without its docstrings."""
-    for path in sorted((PROBLEMS.parent / "src").rglob("*.py"))[share::5]:
-        source = path.read_text(encoding="utf-8")
-        assert ast.dump(ast.parse(program.statements(source))) == without_docstrings(source), path
-
-
-def without_docstrings(source: str) -> str:
-    tree = ast.parse(source)
-    for node in ast.walk(tree):
-        if isinstance(body := getattr(node, "body", None), list):
-            node.body = [ast.Expr(ast.Constant(...)) if _is_text(one) else one for one in body]  # type: ignore[attr-defined]
-    return ast.dump(tree)
-
-
-def _is_text(node: ast.AST) -> bool:
-    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("x = 1", "x = 1  # why"),
-        ("def f():\n    return '#'", "# a\n\ndef f():\n    # b\n    return '#'"),
-        ('def f():\n    """Do."""\n    return 1', 'def f():\n    """Do it.\n\n    At once."""\n    return 1'),
-    ],
-)
-def test_words_change_no_program(old: str, new: str) -> None:
-    assert program.statements(old + "\n").strip() == program.statements(new + "\n").strip()
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("x = 1", "x = 2"),
-        ("x = '# a'", "x = '# b'"),
-        ("f(\n    'a'\n)", "f(\n    'b'\n)"),
-        ("if a:\n    b\nc", "if a:\n    b\n    c"),
-        ('x = \\\n"""a"""', 'x = \\\n"""b"""'),
-        ('"""a""".b', '"""c""".b'),
-        ('x = f"{a}#"', 'x = f"{b}#"'),
-    ],
-)
-def test_what_is_done_does(old: str, new: str) -> None:
-    assert program.statements(old) != program.statements(new)
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ import ready
 from laufruhe.files.reader import load
 from laufruhe.live import live_model, page_assets
 from laufruhe.live.parts import Reference
-from laufruhe.live.saving import written
+from laufruhe.live.saving import file_number
 from laufruhe.live.signals import NORMS_OF_PAGE
 from laufruhe.numerics.spectrum import BEHIND
 from laufruhe.problem.evaluation import evaluate, objective_value
@@ -68,7 +68,7 @@ def test_a_saved_file_is_evaluated_alike(every):
     for values in designs(model, 3):
         text = model.save.text
         for mark, name, unit in model.save.numbers:
-            text = text.replace(json.dumps(mark), written(values[name], unit))
+            text = text.replace(json.dumps(mark), file_number(values[name], unit))
         saved = load(text)
         assert saved.decisions == ()
         direct = evaluated(problem, model, values)
@@ -143,7 +143,7 @@ def test_what_a_star_is_decided_to_be_is_saved_from_its_result_alone():
     model = live_model(result.problem, result)
     text, values = model.save.text, {entry.name: entry.value for entry in result.decisions}
     for mark, name, unit in model.save.numbers:
-        text = text.replace(json.dumps(mark), written(values[name], unit))
+        text = text.replace(json.dumps(mark), file_number(values[name], unit))
     saved = load(text)
     assert saved.phasing is None
     assert objective_value(saved, evaluate(saved)) == pytest.approx(result.objective.value, rel=1e-9)
@@ -189,7 +189,7 @@ def test_a_channel_that_nobody_named_is_not_followed(every):
     ],
 )
 def test_a_reference_is_named_by_what_was_proven_of_it(proof, name, proven):
-    found = Reference.of(1.0, proof, 0.026)
+    found = Reference.from_proof(1.0, proof, 0.026)
     assert (found.name, found.is_proven) == (name, proven)
 
 

@@ -16,7 +16,19 @@ from lanes import first_fast
 from laufruhe.plots import figure, names, style
 from laufruhe.plots.results import firings, torque
 from laufruhe.plots.style import page
-from laufruhe.plots.words import FAINT, INK, READ, beside, contrast, grouped, ink_on, legible, spread, typeset, wrapped
+from laufruhe.plots.words import (
+    FAINT,
+    INK,
+    READ,
+    contrast,
+    grouped,
+    ink_on,
+    label_lines,
+    legible,
+    spread,
+    typeset,
+    wrap_lines,
+)
 from laufruhe.present import picture
 from laufruhe.present.pictures import PICTURES, rows_of
 from picture_faults import faults_of
@@ -112,14 +124,14 @@ def test_words_are_set_as_print_sets_them() -> None:
     assert grouped("−12500.5") == "−12\u2009500.5"
     assert grouped("2500") == "2500"
     assert [rows_of(count, 6)[1] for count in (0, 1, 6, 7, 8, 13)] == [1, 1, 6, 4, 4, 5]
-    assert " ".join(wrapped("one two three four", 0.6)) == "one two three four"
-    assert len(wrapped("one two three four", 0.6)) > 1
+    assert " ".join(wrap_lines("one two three four", 0.6)) == "one two three four"
+    assert len(wrap_lines("one two three four", 0.6)) > 1
 
 
 def test_leaders_of_crowded_names_run_under_no_word() -> None:
     axes = page(1, 1, (4.0, 3.0)).panels[0]
     axes.set_ylim(0.0, 20.0)
-    beside(axes, [6.0, 6.18, 6.38, 6.58, 14.0], ["lateral", "bounce", "bounce-fore-aft", "yaw", "roll"])
+    label_lines(axes, [6.0, 6.18, 6.38, 6.58, 14.0], ["lateral", "bounce", "bounce-fore-aft", "yaw", "roll"])
     axes.figure.draw_without_rendering()
     notes = [text for text in axes.texts if isinstance(text, Annotation)]
     assert len(notes) == 5

@@ -25,7 +25,7 @@ from problem_files import PROBLEMS
 @pytest.mark.parametrize("name", ["vee-six-60", "radial-seven", "boxer-four"])
 def test_pistons_go_through_their_stroke_on_their_axes(name: str) -> None:
     for part in load(PROBLEMS / f"{name}.toml").engine.slider_cranks:
-        poses = [Pose.of(part, phi) for phi in np.linspace(0.0, math.tau, 361)]
+        poses = [Pose.at_angle(part, phi) for phi in np.linspace(0.0, math.tau, 361)]
         along = np.array([(pose.piston - pose.crank) * cmath.exp(-1j * part.bank) for pose in poses])
         assert np.ptp(along.real) == pytest.approx(part.stroke, rel=0.02)
         assert np.abs(along.imag - part.offset).max() < 1e-9
@@ -37,7 +37,7 @@ def test_pistons_go_through_their_stroke_on_their_axes(name: str) -> None:
 def test_pins_turn_clockwise_seen_from_the_front() -> None:
     """C3: a pin at (y, z) = r (sin phi, cos phi)."""
     part = load(PROBLEMS / "tractor-single.toml").engine.slider_cranks[0]
-    pin = Pose.of(part, 0.25 * math.pi).pin
+    pin = Pose.at_angle(part, 0.25 * math.pi).pin
     assert (pin.imag, pin.real) == pytest.approx((part.crank_radius * math.sqrt(0.5),) * 2)
 
 
@@ -50,7 +50,7 @@ def test_a_half_disc_has_the_unbalance_that_it_stands_for() -> None:
 
 def test_what_was_decided_is_marked() -> None:
     result = scenes.solved(scenes.TIGHT)
-    scene = Scene.of(result)
+    scene = Scene.from_result(result)
     assert scene.rotors == {rotor.name for rotor in result.final.engine.rotors}
     assert not scene.cranks
     labels = [text.get_text() for text in engine.figure(result).legends[0].get_texts()]
@@ -69,7 +69,7 @@ def test_what_was_decided_is_marked() -> None:
 )  # fmt: skip
 def test_leads_masses_and_sizes_that_are_open_are_marked(name: str, cranks: int, pistons: int, rods: bool) -> None:
     result = state(load(PROBLEMS / f"{name}.toml"))
-    scene = Scene.of(result)
+    scene = Scene.from_result(result)
     assert (len(scene.cranks), len(scene.pistons), scene.rods) == (cranks, pistons, rods)
     labels = {text.get_text() for text in engine.figure(result).legends[0].get_texts()}
     told = {"crank, open": cranks, "piston, open": pistons, "rod, open": rods}

@@ -6,7 +6,7 @@ import pytest
 
 from laufruhe.files.reader import load
 from laufruhe.plots.results import campbell, modes
-from laufruhe.present.mounting import at_which_stiffness, facts_of
+from laufruhe.present.mounting import facts_of, stiffness_sentence
 from laufruhe.problem.evaluation import evaluate
 from problem_files import PROBLEMS
 from ready import solved
@@ -15,7 +15,7 @@ from ready import solved
 @pytest.mark.parametrize(("name", "depends"), [("powertrain-hydraulic", True), ("powertrain-decoupling", False)])
 def test_a_sentence_is_said_of_mounts_that_depend_on_frequency_alone(name: str, depends: bool) -> None:
     facts = facts_of(evaluate(load(PROBLEMS / f"{name}.toml")))
-    assert ("at rest" in at_which_stiffness(facts)) is depends
+    assert ("at rest" in stiffness_sentence(facts)) is depends
 
 
 @pytest.mark.slow

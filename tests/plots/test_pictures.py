@@ -18,7 +18,7 @@ from lanes import first_fast
 from laufruhe.files.reader import load
 from laufruhe.plots import draw, figures, names
 from laufruhe.plots.results import bars, cycle, engine, polar, spectrum
-from laufruhe.plots.style import AFTER, BEFORE, DPI, fitted
+from laufruhe.plots.style import AFTER, BEFORE, DPI, fit_line
 from laufruhe.present.measures import mount_orders
 from laufruhe.problem.evaluation import measured, samples_of
 from laufruhe.solvers import Result, state
@@ -125,10 +125,10 @@ def test_forces_along_one_line_are_shown_over_the_crank_angle() -> None:
     path[:, 0, 2] = np.sin(np.linspace(0.0, 2.0 * np.pi, 9))
     for lateral, along, times in ((0.01, polar.VERTICAL, 20), (0.09, None, 10), (0.6, None, 1)):
         path[:, 0, 1] = lateral * path[:, 0, 2]
-        frame = polar.Frame.of([path], 1)
+        frame = polar.Frame.from_paths([path], 1)
         assert frame.along == along
         assert along is not None or frame.times == {polar.LATERAL: times, polar.VERTICAL: 1}
-        swapped = polar.Frame.of([path[..., [0, 2, 1]]], 1)
+        swapped = polar.Frame.from_paths([path[..., [0, 2, 1]]], 1)
         assert swapped.size == frame.size
         assert swapped.along == (None if along is None else polar.LATERAL)
 
@@ -267,8 +267,8 @@ def test_any_name_can_be_drawn(called: tuple[str, ...], tmp_path: Path) -> None:
 
 
 def test_long_lines_are_cut() -> None:
-    assert fitted("a  b\nc", 8.0, 9.0) == "a b c"
-    assert fitted("x" * 250, 8.0, 9.0).endswith("…")
+    assert fit_line("a  b\nc", 8.0, 9.0) == "a b c"
+    assert fit_line("x" * 250, 8.0, 9.0).endswith("…")
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ import pytest
 
 from laufruhe.errors import InputError
 from laufruhe.report import files
-from laufruhe.report.files import MADE, Set, staged, staged_file
+from laufruhe.report.files import MADE, FileSet, staged, staged_file
 from laufruhe.report.strict_json import strict
 
 NAMES = [f"file-{k}" for k in range(8)]
@@ -23,10 +23,10 @@ NAMES = [f"file-{k}" for k in range(8)]
 MAKER = f"""
 import sys, itertools
 from pathlib import Path
-from laufruhe.report.files import Set, staged, write
+from laufruhe.report.files import FileSet, staged, write
 first = int(sys.argv[2])
 for k in itertools.count(first):
-    with staged(Set(Path(sys.argv[1]), "--out", "solve", {NAMES})) as stage:
+    with staged(FileSet(Path(sys.argv[1]), "--out", "solve", {NAMES})) as stage:
         if k == first:
             print("begun", flush=True)
         for name in {NAMES}[: 4 + k % 5]:
@@ -50,19 +50,19 @@ Path.rename = renamed
 
 
 def make(folder: Path, text: str, names: list[str] = NAMES, **more: object) -> None:
-    with staged(Set(folder, "--out", "solve", NAMES, **more)) as stage:  # type: ignore[arg-type]
+    with staged(FileSet(folder, "--out", "solve", NAMES, **more)) as stage:  # type: ignore[arg-type]
         for name in names:
             (stage / name).write_text(text)
 
 
 def fail(folder: Path) -> None:
-    with staged(Set(folder, "--out", "solve", NAMES)) as stage:
+    with staged(FileSet(folder, "--out", "solve", NAMES)) as stage:
         (stage / NAMES[0]).write_text("x")
         raise ZeroDivisionError
 
 
 def add_meanwhile(folder: Path, name: str) -> None:
-    with staged(Set(folder, "--out", "solve", NAMES)) as stage:
+    with staged(FileSet(folder, "--out", "solve", NAMES)) as stage:
         (stage / name).write_text("new")
         (folder / name).write_text("mine")
 
@@ -76,7 +76,7 @@ def held(folder: Path) -> tuple[set[str], set[str]]:
 @pytest.mark.parametrize("inside", [False, True])
 def test_a_full_disk_is_told_by_the_folder_that_was_named(inside: bool, tmp_path: Path) -> None:
     def full() -> None:
-        with staged(Set(tmp_path / "out", "--out", "solve", NAMES)) as stage:
+        with staged(FileSet(tmp_path / "out", "--out", "solve", NAMES)) as stage:
             raise OSError(errno.ENOSPC, "No space left on device", *([str(stage / NAMES[0])] if inside else []))
 
     with pytest.raises(OSError, match="No space left") as caught:
@@ -180,7 +180,7 @@ def test_a_note_of_what_is_not_there_brings_nothing(named: str, tmp_path: Path) 
     (tmp_path / "other").write_text("mine")
     (tmp_path / "set").mkdir()
     (tmp_path / "set" / MADE).write_text(f'{{"made_by": "trade", "files": {named}}}')
-    with staged(Set(tmp_path / "set", "--out", "trade", ["new"], adds=True)) as stage:
+    with staged(FileSet(tmp_path / "set", "--out", "trade", ["new"], adds=True)) as stage:
         files.write(stage / "new", "new")
     assert sorted(path.name for path in (tmp_path / "set").iterdir()) == [MADE, "new"]
     assert json.loads((tmp_path / "set" / MADE).read_text())["files"] == ["new"]
@@ -199,7 +199,7 @@ def test_a_run_that_works_is_not_swept_away(locks: bool, tmp_path: Path, monkeyp
     """Nor where no lock tells whether it works."""
     if not locks:
         monkeypatch.setattr("laufruhe.numerics.locks.fcntl", None)
-    with staged(Set(tmp_path / "set", "--out", "solve", NAMES)) as first:
+    with staged(FileSet(tmp_path / "set", "--out", "solve", NAMES)) as first:
         (first / NAMES[0]).write_text("first")
         make(tmp_path / "set", "second")
         assert (first / NAMES[0]).exists()

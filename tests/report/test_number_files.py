@@ -22,7 +22,7 @@ from laufruhe.report import tables
 from laufruhe.report.files import TABLES, result_files
 from laufruhe.report.sections import SECTIONS
 from laufruhe.report.table_files import write_book, write_csv
-from laufruhe.report.tables import number_tables, writing_tables
+from laufruhe.report.tables import number_tables, write_tables
 from laufruhe.solvers import Result, state
 from problem_files import PROBLEMS, loaded
 from ready import solved
@@ -31,8 +31,8 @@ WHOLE = {"stars", "decisions", "limits", "mounts", "modes", "orders"}
 """Sections whose numbers are files in full precision."""
 
 
-def write_tables(result: Result, folder: Path) -> None:
-    with writing_tables(result, folder) as written:
+def write_all(result: Result, folder: Path) -> None:
+    with write_tables(result, folder) as written:
         written()
 
 
@@ -44,7 +44,7 @@ def result() -> Result:
 @pytest.fixture(scope="module")
 def folder(result: Result, tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("tables")
-    write_tables(result, place)
+    write_all(result, place)
     return place
 
 
@@ -119,7 +119,7 @@ def test_the_same_numbers_make_the_same_files(
 ) -> None:
     """Whoever writes the workbook."""
     monkeypatch.setattr(tables, "MANY", many)
-    write_tables(result, tmp_path)
+    write_all(result, tmp_path)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == {
         path.name: path.read_bytes() for path in tmp_path.iterdir()
     }
@@ -152,7 +152,7 @@ def test_ranked_stars_are_a_sheet() -> None:
 
 def test_a_name_that_looks_like_a_formula_stays_text(tmp_path: Path) -> None:
     text = scenes.GIVEN.replace("positions", 'names = ["=1+1", "b", "c", "d"]\npositions')
-    write_tables(state(loaded(tmp_path, text)), tmp_path)
+    write_all(state(loaded(tmp_path, text)), tmp_path)
     book = openpyxl.load_workbook(tmp_path / "tables.xlsx")
     cells = [cell for row in book["measures"].iter_rows() for cell in row if cell.value and "1+1" in str(cell.value)]
     assert cells

@@ -11,7 +11,7 @@ import pytest
 
 import laufruhe
 from cli import scenes
-from laufruhe.present.tables import Table, escaped, unmarked
+from laufruhe.present.tables import Table, escape_markdown, strip_markdown
 from laufruhe.report.document import Bullets, Document, Paragraph
 from laufruhe.report.result_report import result_document
 from laufruhe.report.screen import show, show_document
@@ -113,7 +113,7 @@ def test_source_and_assumptions_are_told() -> None:
 
 
 def test_markdown_in_names_means_nothing() -> None:
-    assert escaped("a|b\n*c* <d>") == r"a\|b \*c\* \<d\>"
+    assert escape_markdown("a|b\n*c* <d>") == r"a\|b \*c\* \<d\>"
 
 
 def test_why_a_star_wins_is_told_by_its_free_couples() -> None:
@@ -184,7 +184,7 @@ def test_a_marked_table_has_no_marks_on_the_screen() -> None:
     text = "\n".join(document_on(80, *blocks))
     for line in ("Take auto of this\n", "a * b * c\n", "- auto is safe", "single    two-order"):
         assert line in text
-    assert unmarked(escaped("a_b [c](d) *e* `f`")) == "a_b [c](d) *e* `f`"
+    assert strip_markdown(escape_markdown("a_b [c](d) *e* `f`")) == "a_b [c](d) *e* `f`"
 
 
 def test_numbers_of_a_study_stand_below_each_other() -> None:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import laufruhe
-from laufruhe.studies.kept_points import KEPT
+from laufruhe.studies.finished_points import FINISHED_POINTS
 
 PROBLEM = Path(__file__).parents[2] / "problems" / "tractor-single.toml"
 STUDY = """
@@ -121,7 +121,7 @@ def uninterrupted(folder: Path) -> Whole:
     """One run in a new folder, left alone."""
     began = time.monotonic()
     process = started(prepared(folder))
-    while not (folder / "out" / KEPT).exists() and process.poll() is None:
+    while not (folder / "out" / FINISHED_POINTS).exists() and process.poll() is None:
         time.sleep(0.01)
     first = time.monotonic() - began
     said = process.communicate()[1]
@@ -147,7 +147,7 @@ def attacked(folder: Path, seed: int, whole: Whole, told: Told) -> None:
         running = [started(folder, jobs) for _ in range(count)]
         told.tried[f"runs of {count} at once, {jobs} core{'s' if jobs > 1 else ''} each"] += 1
         stopped(running, rng, whole, seed, told)
-        told.tried[f"kept points: {damage(folder / 'out' / KEPT, rng)}"] += 1
+        told.tried[f"kept points: {damage(folder / 'out' / FINISHED_POINTS, rng)}"] += 1
     last = started(folder)
     said = last.communicate()[1]
     left = sorted(path.name for path in folder.glob(".unfinished-*"))

@@ -24,7 +24,7 @@ from laufruhe.numerics.workers import working_on
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.solvers import solve
 from laufruhe.studies import scenes
-from laufruhe.studies.kept_points import KEPT
+from laufruhe.studies.finished_points import FINISHED_POINTS
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.regions import Regions
 from laufruhe.studies.runner import run
@@ -42,7 +42,7 @@ def computed(folder: Path, keys: str, problem: str = FOUR) -> xr.Dataset:
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "s.toml"
     path.write_text(f'{HEAD}{keys}\ncases = [{{ name = "c", problem = "{problem}" }}]\n', encoding="utf-8")
-    return run(load_study(path), PROBLEMS, folder / "out" / KEPT)[0]["p"]
+    return run(load_study(path), PROBLEMS, folder / "out" / FINISHED_POINTS)[0]["p"]
 
 
 DESIGNS = 'kind = "random designs"\n'

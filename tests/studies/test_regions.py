@@ -14,7 +14,7 @@ import pytest
 from lanes import of_clusters
 from laufruhe.errors import InputError
 from laufruhe.studies.part import Column, Template
-from laufruhe.studies.regions import VALUES, Region, Regions, kept_to_one
+from laufruhe.studies.regions import VALUES, Region, Regions, locked_store
 
 pytestmark = of_clusters("zarr")
 
@@ -193,15 +193,15 @@ def test_arrays_of_another_form_are_not_written_into(key: str, tmp_path: Path) -
 
 def test_two_runs_do_not_write_at_once(tmp_path: Path) -> None:
     root = tmp_path / "s.zarr"
-    with kept_to_one(root), pytest.raises(InputError, match="is being written by another run"):
-        kept_to_one(root).__enter__()
-    with kept_to_one(root):
+    with locked_store(root), pytest.raises(InputError, match="is being written by another run"):
+        locked_store(root).__enter__()
+    with locked_store(root):
         pass
 
 
 def test_a_system_without_locks_keeps_a_study_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("laufruhe.numerics.locks.fcntl", None)
-    with kept_to_one(tmp_path / "s.zarr"):
+    with locked_store(tmp_path / "s.zarr"):
         assert (tmp_path / "s.zarr").is_dir()
 
 

@@ -29,7 +29,7 @@ from laufruhe.problem.measure import MEASURES, Limit, Measure
 from laufruhe.report.study_report import _flat
 from laufruhe.solvers import solve
 from laufruhe.studies import kinds, runner
-from laufruhe.studies.kept_points import KEPT
+from laufruhe.studies.finished_points import FINISHED_POINTS
 from laufruhe.studies.kinds import KINDS
 from laufruhe.studies.kinds.balancer_sizing import shaft_groups
 from laufruhe.studies.kinds.layout_comparison import LayoutComparison
@@ -37,7 +37,7 @@ from laufruhe.studies.part import Part
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.swept import solved
+from laufruhe.studies.swept import solve_scene
 from problem_files import PROBLEMS
 
 SPEED = "operating_points.1.mean_piston_speed"
@@ -69,7 +69,7 @@ def swept(quantity: str, text: str) -> str:
 
 
 def computed(path: Path, folder: Path = PROBLEMS, jobs: int = 1, kept: Path | None = None) -> xr.Dataset:
-    return run(load_study(path), folder, kept or path.parent / "kept" / KEPT, jobs=jobs)[0]["p"]
+    return run(load_study(path), folder, kept or path.parent / "kept" / FINISHED_POINTS, jobs=jobs)[0]["p"]
 
 
 def points_in(content: bytes) -> set[str]:
@@ -243,13 +243,13 @@ def test_a_scene_of_two_names_is_solved_once_and_shown_twice(tmp_path: Path) -> 
     data = computed(study(tmp_path, text))
     assert data["case"].values.tolist() == ["boxer-four", "b"]
     assert np.ptp(data["objective"].values) == 0.0
-    assert len(points_in((tmp_path / "kept" / KEPT).read_bytes())) == 1
+    assert len(points_in((tmp_path / "kept" / FINISHED_POINTS).read_bytes())) == 1
 
 
 def test_contradicting_limits_are_kept_as_such(tmp_path: Path) -> None:
     problem = load(PROBLEMS / "tractor-four-lanchester.toml")
     force = Limit("force", problem.objective[0].measure, 1.0)
-    kept = solved(replace(problem, limits=(force,)))
+    kept = solve_scene(replace(problem, limits=(force,)))
     assert (kept["status"], kept["proof"]) == ("infeasible", "none")
     assert kept["objective_given"] == pytest.approx(893.3, abs=0.1)
     assert np.isnan([kept["objective"], kept["lower_bound"], *kept["mean"].values()]).all()
@@ -257,11 +257,11 @@ def test_contradicting_limits_are_kept_as_such(tmp_path: Path) -> None:
 
 def test_goes_on_from_a_file_cut_anywhere(tmp_path: Path, small: Path) -> None:
     path = study(tmp_path, part("counterweight fraction", ["single"], SPEEDS.format(5)))
-    kept = tmp_path / "kept" / KEPT
+    kept = tmp_path / "kept" / FINISHED_POINTS
     whole = computed(path, small, kept=kept)
     content = kept.read_bytes()
     assert len(points_in(content)) == 5
-    cut = tmp_path / "cut" / KEPT
+    cut = tmp_path / "cut" / FINISHED_POINTS
     cut.parent.mkdir()
     for length in (1, len(content) // 2, len(content) - 1):
         cut.write_bytes(content[:length])
@@ -310,7 +310,7 @@ def test_progress_says_how_long_is_left(monkeypatch: pytest.MonkeyPatch) -> None
     """Of what this run has done, not of what was kept; and not more often than can be read."""
     now, said = [0.0], []
     monkeypatch.setattr(cli_study.time, "perf_counter", lambda: now[0])
-    tell = cli_study._Teller(said.append)
+    tell = cli_study._Progress(said.append)
     tell(5000, 10_000)
     now[0] = 10.0
     tell(5100, 10_000)
@@ -323,8 +323,8 @@ def test_progress_says_how_long_is_left(monkeypatch: pytest.MonkeyPatch) -> None
 @pytest.mark.slow
 def test_cores_change_nothing(tmp_path: Path, small: Path, pool_at_once: None) -> None:
     path = study(tmp_path, part("counterweight fraction", ["single"], SPEEDS.format(12)))
-    one = computed(path, small, 1, tmp_path / "1" / KEPT)
-    two = computed(path, small, 2, tmp_path / "2" / KEPT)
+    one = computed(path, small, 1, tmp_path / "1" / FINISHED_POINTS)
+    two = computed(path, small, 2, tmp_path / "2" / FINISHED_POINTS)
     assert one.identical(two)
 
 
@@ -334,7 +334,7 @@ def test_what_a_worker_refuses_is_one_line(tmp_path: Path, small: Path, pool_at_
     values = '["9 kp/cm^2", "8 kp/cm^2", "400 kp/cm^2", "7 kp/cm^2", "6 kp/cm^2"]'
     path = study(tmp_path, part("counterweight fraction", ["single"], swept("gas.imep", f"values = {values}")))
     with pytest.raises(InputError, match=r"gas.imep = 400 kp/cm\^2") as caught:
-        computed(path, small, 2, tmp_path / "2" / KEPT)
+        computed(path, small, 2, tmp_path / "2" / FINISHED_POINTS)
     assert "\n" not in str(caught.value)
 
 
@@ -351,16 +351,16 @@ def whole(small: Path, tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
 HALTS = """
 import time
 import laufruhe.cli.supervised
-from laufruhe.studies.kept_points import KeptPoints
+from laufruhe.studies.finished_points import FinishedPoints
 laufruhe.cli.supervised.PATIENCE = 300
-keep, kept = KeptPoints.keep, []
+keep, kept = FinishedPoints.keep, []
 def keep_three(*words):
     keep(*words)
     kept.append(words)
     if len(kept) == 3:
         print("three", flush=True)
         time.sleep(1e4)
-KeptPoints.keep = keep_three
+FinishedPoints.keep = keep_three
 from laufruhe.cli import main
 main()
 """
@@ -382,7 +382,7 @@ def test_stopped_study_goes_on(tmp_path: Path, small: Path, stop: signal.Signals
     assert process.stdout.readline() == "three\n"
     process.send_signal(stop)
     said = process.communicate()[1]
-    kept = out / KEPT
+    kept = out / FINISHED_POINTS
     content = kept.read_bytes()
     assert len(points_in(content)) == 3
     if stop is signal.SIGINT:

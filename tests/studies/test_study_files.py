@@ -17,7 +17,7 @@ from laufruhe.files.study_tables import CaseTable, SweepTable, axis_of, field_at
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.swept import dataset, solved
+from laufruhe.studies.swept import dataset, solve_scene
 from problem_files import PROBLEMS
 
 SPEED = "operating_points.1.mean_piston_speed"
@@ -327,7 +327,7 @@ def test_a_limit_has_the_name_that_results_show() -> None:
 
 def test_forces_by_order_and_prices_of_limits_are_kept() -> None:
     result = scenes.solved(scenes.TIGHT)
-    kept = solved(result.problem)
+    kept = solve_scene(result.problem)
     limit = result.limits[0]
     assert kept["shadow_price"] == {limit.name: pytest.approx(limit.shadow_price, rel=1e-3)}
     assert kept["limit_units"] == {"balancer mass": "kg"}

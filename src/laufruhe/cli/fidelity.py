@@ -78,7 +78,7 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     for k, one, pages in _measured(paths, problems, say):
         trades[k] = one
         names = [f"{problems[k].name}.{end}" for end in ("md", "png", "html")]
-        with files.staged(files.Set(folder, "--out", "trade", names, adds=True)) as stage:
+        with files.staged(files.FileSet(folder, "--out", "trade", names, adds=True)) as stage:
             for name, page in pages.items():
                 (stage / name).write_bytes(page)
     if len(trades) < len(problems):
@@ -92,7 +92,7 @@ def traded(paths: Sequence[Path], folder: Path, say: Callable[[str], None]) -> t
     if len(read) == 1:
         return _page(paths[0], ordered[0]), f"{problems[0].name}.html", as_json
     index = report.index(ordered, [name for _, name in of_wheels])
-    with files.staged(files.Set(folder, "--out", "trade", ["README.md"], adds=True)) as stage:
+    with files.staged(files.FileSet(folder, "--out", "trade", ["README.md"], adds=True)) as stage:
         files.write(stage / "README.md", index.as_markdown(""))
     return index, "README.md", as_json
 

@@ -14,7 +14,7 @@ from laufruhe.present.pictures import PICTURES
 from laufruhe.report import files
 from laufruhe.report.json_result import as_json
 from laufruhe.report.result_report import result_document
-from laufruhe.report.tables import writing_tables
+from laufruhe.report.tables import write_tables
 from laufruhe.report.web_page import as_html, template
 from laufruhe.solvers.result import Result, Status
 
@@ -39,7 +39,7 @@ def write_results(
     say("writing tables")
     with ExitStack() as until_then:
         with timed(result.timing, "tables"):
-            tables = until_then.enter_context(writing_tables(result, stage))
+            tables = until_then.enter_context(write_tables(result, stage))
         live, document = live_model(result.problem, result), result_document(result, list(PICTURES), request.command)
         if request.kinds:
             say("drawing")

@@ -64,7 +64,7 @@ def _write(request: Request, answer: Answer, say: Callable[[str], None]) -> tupl
         # a file called '...toml' would name the folder above
         name = (problem.name.strip(".") or "problem") + _SUFFIX[request.verb]
         option, folder = ("results", Path("results") / name) if request.out is None else ("--out", request.out)
-        stage = places.enter_context(files.staged(files.Set(folder, option, request.verb)))
+        stage = places.enter_context(files.staged(files.FileSet(folder, option, request.verb)))
         copy = json_file(request.json, [request.problem], places)
         open_numbers = len(problem.decisions)
         what = "stars and firing orders" if problem.phasing is not None else counted(open_numbers, "open number")

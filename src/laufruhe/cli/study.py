@@ -14,7 +14,7 @@ from laufruhe.present.picture import Picture
 from laufruhe.report import files
 from laufruhe.report.strict_json import strict
 from laufruhe.report.study_report import as_json, file_names, write_study
-from laufruhe.studies.kept_points import KEPT
+from laufruhe.studies.finished_points import FINISHED_POINTS
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
 from laufruhe.studies.scenes import Scenes
@@ -29,9 +29,9 @@ def run_study(
     started = time.perf_counter()
     study = load_study(path)
     folder = out if out is not None else Path("results") / shown_as(path).stem
-    points = folder / KEPT
+    points = folder / FINISHED_POINTS
     option, file_list = "--out" if out is not None else "results", file_names(study)
-    with files.staged(files.Set(folder, option, "study", file_list, beside=[KEPT])) as stage:
+    with files.staged(files.FileSet(folder, option, "study", file_list, beside=[FINISHED_POINTS])) as stage:
         datasets, seconds = run(study, path.parent, points, _Progress(say), jobs or processors())
         command = typed("laufruhe", "study", str(path))
 
@@ -41,7 +41,7 @@ def run_study(
         write_study(study, datasets, seconds, stage, command, say, draw, f".{kinds[0]}")
     points.unlink(missing_ok=True)
     spent = "".join(f"{duration:8.1f} s on one core  {name}\n" for name, duration in seconds.items())
-    text = f"{spent}done in {time.perf_counter() - started:.1f} s\n{files.placed(folder, files.PAGE)}\n"
+    text = f"{spent}done in {time.perf_counter() - started:.1f} s\n{files.results_line(folder, files.PAGE)}\n"
     return text, lambda: as_json(study, datasets, seconds)
 
 

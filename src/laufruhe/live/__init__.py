@@ -1,4 +1,4 @@
-"""What an HTML page needs to show any design of a problem by itself: numbers, scripts and styles."""
+"""Data, scripts and styles of a page that evaluates any design of a problem by itself."""
 
 from laufruhe.live.assets import page_assets
 from laufruhe.live.model import decided, live_model

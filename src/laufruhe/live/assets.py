@@ -7,7 +7,7 @@ from importlib.resources import files
 
 SCRIPT, STYLE = "live.js", "live.css"
 PARTS = ("signals", "norms", "numbers", "design", "drawing", "figures", "controls", "judge", "page")
-"""Of the script, in the order in which they build on each other."""
+"""Parts of the script, in the order of their dependence."""
 
 
 @cache

@@ -1,4 +1,4 @@
-"""What a page needs to show any design of a problem by itself: loads that are affine in what is open (P1).
+"""Live model of a problem: loads that are affine in the open numbers (P1).
 
 The numbers are those of `AffineModel`, the norms are named, and the page takes them as results do. What no such
 map says is named, never left out without a word.
@@ -18,8 +18,8 @@ from laufruhe import units
 from laufruhe.errors import ModelError
 from laufruhe.files import edits
 from laufruhe.files.complaints import Refused
-from laufruhe.live.parts import Curve, Design, LiveModel, Reference, Shown, Slider
-from laufruhe.live.saving import saved
+from laufruhe.live.parts import Curve, Design, DisplayedMeasure, LiveModel, Reference, Slider
+from laufruhe.live.saving import saved_file
 from laufruhe.live.signals import NORMS_OF_PAGE, Signal, signal_of
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.numerics.arrays import Array
@@ -48,11 +48,11 @@ def live_model(problem: Problem, result: Result, is_served: bool = False) -> Liv
     Parameters
     ----------
     problem
-        As it was read.
+        Problem as read.
     result
-        Of it, solved or evaluated: what is not affine stays as it is there.
+        Its result; numbers that are not affine keep their values.
     is_served
-        Whether the page has a server, which decides and measures what does not follow.
+        True if a server decides and evaluates numbers that do not follow.
     """
     file = f"{problem.name}.toml"
     model = LiveModel(
@@ -68,7 +68,7 @@ def live_model(problem: Problem, result: Result, is_served: bool = False) -> Liv
         filled = _filled(model, problem, moving, result, values, is_served)
     except ModelError as error:
         return replace(model, why_not=f"The loads cannot be shown while decisions move: {error}.")
-    return replace(filled, save=saved(problem, result, moving, values))
+    return replace(filled, save=saved_file(problem, result, moving, values))
 
 
 def decided(problem: Problem, numbers: Mapping[str, float]) -> dict[str, Value]:
@@ -136,7 +136,7 @@ class _Collected:
             self.signals[key] = signal_of(self.model, key)
         return list(self.signals).index(key)
 
-    def measures(self) -> tuple[Shown, ...]:
+    def measures(self) -> tuple[DisplayedMeasure, ...]:
         """Return terms of all objectives, and limits."""
         problem, measures = self.model.problem, []
         for term in problem.objective:
@@ -150,12 +150,14 @@ class _Collected:
 
     def _measure(
         self, measure: Measure, role: str, name: str, limit: Limit | None = None, weight: float = 1.0
-    ) -> list[Shown]:
+    ) -> list[DisplayedMeasure]:
         stays = not depends(measure.channel, self.kinds, self.model.problem)
         follows = (measure.is_mass or measure.is_load) and is_affine(measure.channel, self.kinds, self.model.problem)
         follows = follows and measure.norm.name in NORMS_OF_PAGE
         self.asked.append(measure if follows and not stays else None)
-        base = Shown(role, name, measure.unit, measure.norm.name, measure.norm.refinement, None, weight, _sides(limit))
+        base = DisplayedMeasure(
+            role, name, measure.unit, measure.norm.name, measure.norm.refinement, None, weight, _sides(limit)
+        )
         if stays and limit is None:
             return [replace(base, value=self.model.bare.value(measure))]
         if stays and limit is not None:
@@ -227,8 +229,8 @@ def _reference(result: Result) -> Reference | None:
         return None
     if result.ranks:
         first = result.ranks[0]
-        return Reference.of(first.least, first.proof, first.gap)
-    return Reference.of(objective.value, certificate.kind, certificate.gap)
+        return Reference.from_proof(first.least, first.proof, first.gap)
+    return Reference.from_proof(objective.value, certificate.kind, certificate.gap)
 
 
 def _unmoved(problem: Problem, how: str) -> Iterator[tuple[str, str]]:

@@ -42,12 +42,12 @@ def with_unit(unit: str) -> dict[str, Any]:
     return {"unit": unit, "shown": name, "factor": factor}
 
 
-def packed(part: Any, block: Block) -> Any:
+def pack_part(part: Any, block: Block) -> Any:
     """Return a part of a signal field by field; its numbers are in the block."""
     if isinstance(part, np.ndarray):
         return block.add(part)
     if isinstance(part, tuple):
-        return [packed(one, block) for one in part]
+        return [pack_part(one, block) for one in part]
     if not is_dataclass(part):
         return part
-    return {field.name: packed(getattr(part, field.name), block) for field in fields(part)}
+    return {field.name: pack_part(getattr(part, field.name), block) for field in fields(part)}

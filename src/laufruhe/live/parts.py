@@ -1,4 +1,4 @@
-"""What a live model is made of, and its JSON (docs/how-to/live-page.md)."""
+"""Parts of a live model, and its JSON (docs/how-to/live-page.md)."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.live.packing import Block, packed, with_unit
+from laufruhe.live.packing import Block, pack_part, with_unit
 from laufruhe.live.saving import NOT_SAVED, Saved
 from laufruhe.live.signals import Signal
-from laufruhe.present.numbers import trimmed
+from laufruhe.present.numbers import share
 from laufruhe.prove.certificate import Proof
 
 VERSION = 1
 MOST_MB = 2.0
-"""Of the numbers of a page, compressed."""
+"""Largest size of the compressed numbers of a page."""
 
 
 @dataclass(frozen=True)
@@ -27,15 +27,15 @@ class Slider:
     Attributes
     ----------
     name, unit
-        As results show it; SI.
+        Name in results, and SI unit.
     column, width
-        Of the decision vector: one real number, or the two of a size and an angle.
+        First column in the decision vector, and 1 for a real number or 2 for size and angle.
     lower, upper
-        Of the size.
+        Bounds of the size.
     angles
         Bounds of the angle [rad], where that is open.
     angle
-        What results call it.
+        Name of the angle in results.
     shown, factor
         The unit of the file, and its factor on an SI value.
     """
@@ -53,7 +53,7 @@ class Slider:
 
 
 @dataclass(frozen=True)
-class Shown:
+class DisplayedMeasure:
     """A measure that follows the sliders, or a constant.
 
     Attributes
@@ -65,13 +65,13 @@ class Shown:
     norm, refinement
         Name, and times as many steps.
     weight
-        In the objective.
+        Weight in the objective.
     sides
         Sense and edge of a limit, "at most" or "at least" [SI].
     value
-        Of what stays.
+        Value of a constant.
     followed
-        Whether it is known of every design; else its value is that of the design decided.
+        True if known for every design; else `value` is that of the decided design.
     """
 
     role: str
@@ -112,12 +112,12 @@ class Reference:
     is_proven: bool
 
     @classmethod
-    def of(cls, value: float, proof: Proof, gap: float) -> Reference:
+    def from_proof(cls, value: float, proof: Proof, gap: float) -> Reference:
         """Return the reference of a design with this proof."""
         if proof is Proof.GLOBAL:
             return cls(value, "the proven optimum", True)
         if proof is Proof.WITHIN_GAP:
-            return cls(value, f"the best design found (gap {trimmed(100.0 * gap, 2)} %)", False)
+            return cls(value, f"the best design found (gap {share(gap)})", False)
         return cls(value, "the best design found (a local optimum)", False)
 
 
@@ -130,13 +130,13 @@ class LiveModel:
     points
         Names of the operating points.
     turns
-        Of the crank in a cycle.
+        Turns of the crank in a cycle.
     designs
-        As given, as decided where that is another, and one between the bounds that checks the page's own sums.
+        Given design, decided design if different, and one between the bounds for the page's self-check.
     reference
-        What the objective is compared with; None where a server says it.
+        Design for comparison; None if a server provides it.
     unmoved
-        What is open or asked and does not follow the sliders: a name, and why.
+        Names that do not follow the sliders, with reasons.
     why_not
         Why there are no sliders; empty where there are.
     """
@@ -149,7 +149,7 @@ class LiveModel:
     sliders: tuple[Slider, ...] = ()
     signals: tuple[Signal, ...] = ()
     curves: tuple[Curve, ...] = ()
-    measures: tuple[Shown, ...] = ()
+    measures: tuple[DisplayedMeasure, ...] = ()
     designs: tuple[Design, ...] = ()
     objective: str = ""
     unit: str = ""
@@ -159,7 +159,7 @@ class LiveModel:
     why_not: str = ""
 
     @property
-    def told(self) -> tuple[str, ...]:
+    def notes(self) -> tuple[str, ...]:
         """Sentences about numbers that do not follow sliders."""
         reasons = dict.fromkeys(why for _, why in self.unmoved)
         names = {why: ", ".join(name for name, reason in self.unmoved if reason == why) for why in reasons}
@@ -176,7 +176,7 @@ class LiveModel:
     @cached_property
     def _packed(self) -> tuple[list[dict[str, Any]], str]:
         block = Block()
-        return [{**packed(signal, block), **with_unit(signal.unit)} for signal in self.signals], block.text()
+        return [{**pack_part(signal, block), **with_unit(signal.unit)} for signal in self.signals], block.text()
 
     def as_json(self) -> str:
         """Return the argument of the page's `show`; safe inside an HTML element."""

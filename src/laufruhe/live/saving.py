@@ -36,9 +36,9 @@ class Saved:
     text
         TOML, each place a text "@name@"; empty where there is none.
     numbers
-        Of every place: its mark, the name that results show, and the SI unit that it is written in.
+        Placeholder, name in results and SI unit of every number.
     note
-        What the file needs beside it, or why there is none.
+        Files needed beside it, or the reason for having no file.
     """
 
     text: str = ""
@@ -49,7 +49,7 @@ class Saved:
 NOT_SAVED = Saved()
 
 
-def saved(problem: Problem, result: Result, moving: Problem, values: Mapping[str, Value]) -> Saved:
+def saved_file(problem: Problem, result: Result, moving: Problem, values: Mapping[str, Value]) -> Saved:
     """Return the file of a design with placeholders for moving decisions; empty if it would not read back."""
     if problem.origin is None:
         return NOT_SAVED
@@ -86,11 +86,11 @@ def _filled(text: str, marks: Sequence[tuple[str, str, str]], moving: Problem) -
     for decision in moving.decisions:
         numbers[decision.name], numbers[angle_name(decision)] = decision.set.split(decision.start)
     for mark, name, unit in marks:
-        text = text.replace(toml_text({"k": mark})[4:-1], written(numbers[name], unit))
+        text = text.replace(toml_text({"k": mark})[4:-1], file_number(numbers[name], unit))
     return text
 
 
-def written(value: float, unit: str) -> str:
+def file_number(value: float, unit: str) -> str:
     """Return a number as a problem file writes it, in full precision."""
     if unit in ("", "rad"):
         return repr(math.degrees(value) if unit else float(value))

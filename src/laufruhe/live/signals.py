@@ -32,7 +32,7 @@ class Waves:
     coefficients: ComplexArray
 
     @classmethod
-    def of(cls, coefficients: ComplexArray) -> Waves:
+    def from_series(cls, coefficients: ComplexArray) -> Waves:
         """Return the non-zero orders of a series, shape (n, ...)."""
         size = np.abs(coefficients).reshape(len(coefficients), -1).max(axis=1, initial=0.0)
         smallest = np.argsort(size, kind="stable")
@@ -52,7 +52,7 @@ class Bends:
     corners
         Angles [rad], shape (k,).
     pieces
-        Of every power of the share of the period after a corner, less one half: shape (powers, k, places, d).
+        Coefficients by power of (share of the period after a kink - 1/2), shape (powers, k, places, d).
     at
         Angles at which a peak may stand [rad].
     """
@@ -72,11 +72,11 @@ class PointSignal:
     share
         Weight in a mean over operating points.
     series
-        Of the design with every column at zero, shape (orders, places, d).
+        Series at a decision vector of zero, shape (orders, places, d).
     bends
-        Its corners; None where it has none.
+        Kinks of the signal, or None.
     slope
-        Of one unit of every column, shape (orders, places, d, columns).
+        Change per unit of every column, shape (orders, places, d, columns).
     bent
         Columns that bend by themselves, and how.
     """
@@ -95,7 +95,7 @@ class Signal:
     Attributes
     ----------
     name, unit
-        Of the channel; SI.
+        Name of the channel, and SI unit.
     places
         Names along the second axis.
     base
@@ -103,7 +103,7 @@ class Signal:
     samples
         Steps over the period at which means are taken; a peak is sought among so many times as its norm refines.
     adds
-        Whether its rows are masses that are added up, and no steps of a load.
+        True if rows are masses to add, not samples of a load.
     """
 
     name: str
@@ -148,11 +148,11 @@ def _point(share: float, constant: Spectrum, columns: Sequence[Spectrum], at: Ar
         slope[: len(column.coefficients), ..., k] = column.coefficients
     bent = tuple((k, _bends(column, at)) for k, column in enumerate(columns) if column.corners is not None)
     bends = _bends(constant, at) if bent or constant.corners is not None else None
-    return PointSignal(share, Waves.of(constant.coefficients), bends, Waves.of(slope), bent)
+    return PointSignal(share, Waves.from_series(constant.coefficients), bends, Waves.from_series(slope), bent)
 
 
 def _bends(signal: Spectrum, at: Array) -> Bends:
-    smooth, corners = Waves.of(signal.smooth.coefficients), signal.corners
+    smooth, corners = Waves.from_series(signal.smooth.coefficients), signal.corners
     if corners is None:
         return Bends(smooth, np.zeros(0), np.zeros((1, 0, *signal.coefficients.shape[1:])), at)
     return Bends(smooth, corners.angles, corners.pieces(signal.period), at)

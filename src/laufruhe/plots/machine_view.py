@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -10,31 +11,99 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Patch, Rectangle, Wedge
+from matplotlib.patches import Circle, Patch, Polygon, Rectangle, Wedge
 
 from laufruhe.machine import Engine, Rotor
+from laufruhe.machine.bodies import Outline
 from laufruhe.machine.rotor import Role
-from laufruhe.plots.machine_parts import (
-    IRON,
-    METAL,
-    MM,
-    PISTON,
-    at,
-    bar,
-    bodies,
-    box,
-    cylinder,
-    heights_of,
-    look_of,
-    piston_at,
-    slot,
-)  # fmt: skip
 from laufruhe.plots.style import AFTER, GREY, ORANGE, PALE, Page, entry_of_dots, page
-from laufruhe.plots.words import INK, SMALL, round_ticks, width_of
-from laufruhe.present.measures import changed
+from laufruhe.plots.words import FAINT, INK, SMALL, round_ticks, width_of
+from laufruhe.present.measures import is_changed
 from laufruhe.present.poses import THICKNESS, Pose, bore_of, direction, half_disc
 from laufruhe.problem.decision import Kind
 from laufruhe.solvers.result import Result
+
+METAL, IRON = "#d5dade", "#b4bcc4"
+PISTON: Any = {"facecolor": "white", "edgecolor": INK}
+MM = 1e3
+
+
+def slot(axes: Axes, pose: Pose, bore: float, order: float) -> None:
+    """Draw the slot of a Scotch yoke, from the front."""
+    if math.isfinite(pose.part.rod_length):
+        return
+    across = 1j * pose.part.crank_radius * cmath.exp(1j * pose.part.bank)
+    ends = (pose.foot - across, 0.16 * bore), (pose.foot + across, 0.16 * bore)
+    bar(axes, *ends, order, facecolor=METAL, edgecolor=INK)
+
+
+def heights_of(radius: float, along: float) -> tuple[float, float]:
+    """Return the lowest and highest point of a half disc about its centre [m]."""
+    up, across = math.cos(along), radius * abs(math.sin(along))
+    return (-radius if up < 0.0 else -across), (radius if up > 0.0 else across)
+
+
+def at(place: complex) -> tuple[float, float]:
+    """Return the coordinates of a point in the view from the front [mm]."""
+    return MM * place.imag, MM * place.real
+
+
+def bar(axes: Axes, one: tuple[complex, float], other: tuple[complex, float], order: float, **look: Any) -> None:
+    """Draw a rod or a web as two circles and the area between them."""
+    (first, wide), (second, narrow) = one, other
+    along = cmath.phase(second - first)
+    turns = np.linspace(0.5 * math.pi, 1.5 * math.pi, 13)
+    corners = [first + wide * cmath.exp(1j * (along + turn)) for turn in turns]
+    corners += [second + narrow * cmath.exp(1j * (along + turn + math.pi)) for turn in turns]
+    axes.add_patch(Polygon([at(corner) for corner in corners], closed=True, linewidth=0.8, zorder=order, **look))
+
+
+def box(axes: Axes, xs: tuple[float, float], levels: tuple[float, float], order: float, **look: Any) -> None:
+    """Draw a part from the side: x in metres, levels in millimetres."""
+    low, high = min(levels), max(levels)
+    style = {"edgecolor": INK, "linewidth": 0.7, **look}
+    axes.add_patch(Rectangle((MM * min(xs), low), MM * abs(xs[1] - xs[0]), high - low, zorder=order, **style))
+
+
+def look_of(body: Outline) -> dict[str, Any]:
+    """Return the style of a turning body or of its housing."""
+    if body.moves:
+        return {**PISTON, "zorder": 2.2}
+    return {"fill": False, "edgecolor": GREY, "linewidth": 1.4, "zorder": 1.8}
+
+
+def bodies(axes: Axes, pose: Pose) -> None:
+    """Draw rotating bodies that stand in place of a piston, from the front."""
+    for body in pose.bodies:
+        axes.add_patch(Polygon([at(place) for place in body.points], closed=True, **look_of(body)))
+
+
+def cylinder(axes: Axes, pose: Pose, bore: float) -> complex:
+    """Draw the walls of a cylinder between its dead centres, and return a point beside them."""
+    turn = cmath.exp(1j * pose.part.bank)
+    along = complex((pose.piston - pose.crank) / turn)
+    ends = [Pose.at_angle(pose.part, phi).piston for phi in np.linspace(0.0, math.tau / abs(pose.part.shaft.ratio), 13)]
+    heights = [complex((end - pose.crank) / turn).real for end in ends]
+    for side in (-0.5, 0.5):
+        walls = [pose.crank + turn * complex(height, along.imag + side * bore) for height in
+                 (min(heights) - 0.25 * bore, max(heights) + 0.3 * bore)]  # fmt: skip
+        axes.plot(*zip(*map(at, walls), strict=True), color=FAINT, linewidth=0.8, zorder=2.0)
+    return pose.crank + turn * complex(max(heights) + 0.1 * bore, along.imag + 0.72 * bore)
+
+
+def piston_at(axes: Axes, pose: Pose, bore: float, order: float, **look: Any) -> None:
+    """Draw a piston and its rings, from the front."""
+    turn = cmath.exp(1j * pose.part.bank)
+
+    def corner(up: float, side: float) -> tuple[float, float]:
+        return at(pose.piston + turn * bore * complex(up, side))
+
+    corners = [corner(*place) for place in ((-0.25, -0.48), (-0.25, 0.48), (0.25, 0.48), (0.25, -0.48))]
+    axes.add_patch(Polygon(corners, closed=True, zorder=order - 0.01, linewidth=0.9, **look))
+    for ring in (0.12, 0.19):
+        ends = zip(corner(ring, -0.48), corner(ring, 0.48), strict=True)
+        axes.plot(*ends, color=FAINT, linewidth=0.6, zorder=order - 0.005)
+
 
 # both views side by side, of one page, and between them [inch]
 WIDE, HIGH, ACROSS, NARROW = 8.0, 4.4, 0.8, 2.2
@@ -50,11 +119,11 @@ class Scene:
     Attributes
     ----------
     rotors, mounts, pistons
-        Names of those that were decided.
+        Names of open rotors, mounts and pistons.
     cranks
-        Names of the shafts whose throws, lead or sizes were.
+        Names of shafts with open throws, lead or sizes.
     rods
-        Whether their sizes were.
+        True if sizes of the rods were open.
     state
         "decided", or "open" in a design as given.
     """
@@ -68,7 +137,7 @@ class Scene:
     state: str
 
     @classmethod
-    def of(cls, result: Result) -> Scene:
+    def from_result(cls, result: Result) -> Scene:
         """Return the scene of a result's final design."""
         engine, problem = result.final.engine, result.problem
         drives = [drive for decision in problem.decisions for drive in decision.drives]
@@ -82,7 +151,7 @@ class Scene:
         mounts = frozenset(mount.name for k, mount in enumerate(engine.mounts) if k in numbers)
         every = frozenset(part.shaft.name for part in engine.slider_cranks)
         cranks = every if problem.phasing is not None or sizes - _OF_RODS else driven("key", Kind.LEAD) & every
-        state = "decided" if changed(result) else "open"
+        state = "decided" if is_changed(result) else "open"
         return cls(engine, driven("rotor"), mounts, masses, cranks, bool(sizes & _OF_RODS), state)
 
     @property
@@ -146,7 +215,7 @@ def draw_views(drawn: Page, scene: Scene, phi: float = 0.0) -> None:
 def _front(axes: Axes, scene: Scene, phi: float) -> None:
     """Draw the view from the front: y to the right, z up, turning clockwise (C3)."""
     # what stands further back is drawn first
-    poses = [Pose.of(part, phi) for part in sorted(scene.engine.slider_cranks, key=lambda part: part.x)]
+    poses = [Pose.at_angle(part, phi) for part in sorted(scene.engine.slider_cranks, key=lambda part: part.x)]
     bore, places = bore_of(scene.engine), dict[str, complex]()
     for k, pose in enumerate(poses):
         behind = 4.0 + k / len(poses)
@@ -179,7 +248,7 @@ def _front(axes: Axes, scene: Scene, phi: float) -> None:
 def _side(axes: Axes, scene: Scene, phi: float) -> None:
     """Draw the view from the left (z up) or from above (y down), the front of the engine at the left."""
     bore = bore_of(scene.engine)
-    poses = [Pose.of(part, phi) for part in scene.engine.slider_cranks]
+    poses = [Pose.at_angle(part, phi) for part in scene.engine.slider_cranks]
     quarter, pistons = 0.5 * math.pi if scene.is_flat else 0.0, list[tuple[Pose, float]]()
 
     def level(place: complex) -> float:
@@ -263,7 +332,7 @@ def reaches(scene: Scene) -> tuple[list[tuple[float, float]], list[tuple[float, 
 def _spots(scene: Scene) -> Iterator[tuple[float, complex, float]]:
     bore = bore_of(scene.engine)
     for part in scene.engine.slider_cranks:
-        for pose in (Pose.of(part, phi) for phi in np.linspace(0.0, math.tau / abs(part.shaft.ratio), 13)):
+        for pose in (Pose.at_angle(part, phi) for phi in np.linspace(0.0, math.tau / abs(part.shaft.ratio), 13)):
             spots = [*(place for body in pose.bodies for place in body.points)] or [pose.piston]
             yield from ((part.x, place, 0.0 if pose.bodies else 0.6 * bore) for place in spots)
             yield part.x, pose.pin, 0.15 * bore

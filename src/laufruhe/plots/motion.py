@@ -11,9 +11,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.plots.machine_parts import MM, at
-from laufruhe.plots.machine_view import Scene, draw_views, legend_of, views
-from laufruhe.plots.style import VERMILION, Page, Series, entry_of_dots, headed, point_name, series_of, styled
+from laufruhe.plots.machine_view import MM, Scene, at, draw_views, legend_of, views
+from laufruhe.plots.style import VERMILION, Page, Series, entry_of_dots, finish_page, point_name, series_of, styled
 from laufruhe.plots.words import in_thousands
 from laufruhe.present.measures import hardest_point, has_loads
 from laufruhe.present.numbers import number
@@ -22,13 +21,13 @@ from laufruhe.problem.curves import forces_of
 from laufruhe.solvers.result import Result
 
 FRAMES = 48
-"""Over the working cycle."""
+"""Number of frames over the working cycle."""
 SECONDS = 4.0
 DPI, COLOURS = 80, 96
 # of the height of the picture, for the largest force
 REACH = 0.35
 LIT = math.radians(70.0)
-"""How long a firing is shown [rad]."""
+"""Crank angle for which a firing is displayed [rad]."""
 
 
 @styled()
@@ -36,7 +35,7 @@ def animate(result: Result, path: Path) -> None:
     """Write one working cycle as GIF: arrows are the shaking force and the mount forces, dots are firings."""
     from PIL import Image
 
-    scene = Scene.of(result)
+    scene = Scene.from_result(result)
     k, series = hardest_point(result) if result.problem.points else 0, series_of(result, loads=True)
     loads = [_loads(one, k) for one in series] if has_loads(result) else []
     largest = max((float(np.abs(one[:, :, 1:]).max()) for one in loads), default=0.0)
@@ -52,7 +51,7 @@ def animate(result: Result, path: Path) -> None:
         where = f", at {point_name(result, k)}" if loads else ""
         fires = entry_of_dots("fires", color=VERMILION, markersize=7.0)
         legend = [*legend_of(scene), fires, *(one.entry(": forces") for one in series[: len(loads)])]
-        headed(drawn, result, f"The engine turning{where}", f"{angle}{scale}.", legend)
+        finish_page(drawn, result, f"The engine turning{where}", f"{angle}{scale}.", legend)
         drawn.figure.set_dpi(DPI)
         drawn.figure.canvas.draw()
         pixels = np.asarray(drawn.figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
@@ -67,7 +66,7 @@ def animate(result: Result, path: Path) -> None:
 def _firings(drawn: Page, scene: Scene, phi: float) -> None:
     bore, cycle = bore_of(scene.engine), scene.engine.cycle.angle
     for part in scene.engine.cylinders:
-        pose = Pose.of(part, phi)
+        pose = Pose.at_angle(part, phi)
         if (phi - part.firing_angle + 1e-9) % cycle > LIT or pose.bodies:
             continue
         place = pose.piston + 0.4 * bore * cmath.exp(1j * part.bank)

@@ -20,7 +20,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from laufruhe.plots import style
 from laufruhe.plots.letters import prepare
 from laufruhe.plots.style import as_svg, heading, page, save, styled
-from laufruhe.plots.words import SMALL, apart, grouped, ink_on, legible, typeset
+from laufruhe.plots.words import SMALL, grouped, ink_on, legible, separate_texts, typeset
 from laufruhe.present.picture import Area, Axis, Bars, Colour, Line, Mark, Panel, Picture, Words
 
 MOST_ENTRIES, FEW_ENTRIES = 8, 5
@@ -63,7 +63,7 @@ def save_picture(picture: Picture, place: Path, kinds: Sequence[str] = ("png",))
     return as_svg(drawn)
 
 
-def hue(colour: Colour) -> str:
+def colour_of(colour: Colour) -> str:
     """Return a colour as matplotlib takes it."""
     if isinstance(colour, float):
         return to_hex(colormaps["viridis"](colour))
@@ -77,13 +77,13 @@ def _panel(axes: Axes, panel: Panel) -> None:
     axes.set_title(typeset(panel.title), loc="left", size=SMALL)
     _axis(axes, "x", panel.x)
     _axis(axes, "y", panel.y)
-    apart([text for mark, text in words if mark.across == "left"])
+    separate_texts([text for mark, text in words if mark.across == "left"])
 
 
 def _words(axes: Axes, mark: Words) -> Text:
     drawn = axes.text(
         mark.x, mark.y, typeset(grouped(mark.text)), size=SMALL, clip_on=False, ha=mark.across, va=mark.along,
-        color=ink_on(hue(mark.inside)) if mark.inside else legible(hue(mark.colour)),
+        color=ink_on(colour_of(mark.inside)) if mark.inside else legible(colour_of(mark.colour)),
     )  # fmt: skip
     if mark.boxed:
         drawn.set_bbox({"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.0})
@@ -94,20 +94,22 @@ def _mark(axes: Axes, mark: Mark) -> None:
     if isinstance(mark, Bars):
         draws = axes.bar if mark.upright else axes.barh
         fill: dict[str, Any] = (
-            {"facecolor": "none", "edgecolor": hue(mark.colour)} if mark.hollow else {"color": hue(mark.colour)}
+            {"facecolor": "none", "edgecolor": colour_of(mark.colour)}
+            if mark.hollow
+            else {"color": colour_of(mark.colour)}
         )
         bars = draws(mark.places, mark.values, mark.width, linewidth=1.3 if mark.hollow else 0.0, **fill)
         if mark.numbers:
             axes.bar_label(bars, [grouped(text) for text in mark.numbers], size=SMALL)
     elif isinstance(mark, Area):
-        axes.fill_between(mark.x, mark.low, mark.high, color=hue(mark.colour), linewidth=0)
+        axes.fill_between(mark.x, mark.low, mark.high, color=colour_of(mark.colour), linewidth=0)
     elif isinstance(mark, Line) and np.size(mark.x):
         axes.plot(mark.x, mark.y, clip_on=bool(mark.width), **_look(mark))
 
 
 def _look(line: Line) -> dict[str, Any]:
     dash = (0, tuple(line.dash)) if line.dash else "-"
-    look: dict[str, Any] = {"color": hue(line.colour), "marker": line.marker, "markersize": line.size}
+    look: dict[str, Any] = {"color": colour_of(line.colour), "marker": line.marker, "markersize": line.size}
     look |= {"linestyle": dash if line.width else "", "linewidth": line.width, "zorder": 1 if line.behind else 2}
     if line.hollow:
         look["fillstyle"] = "none"
@@ -146,4 +148,4 @@ def _named(picture: Picture) -> Sequence[Mark]:
 def _entry(mark: Mark) -> Artist:
     if isinstance(mark, Line):
         return Line2D([], [], label=mark.label, **_look(mark))
-    return Patch(color=hue(mark.colour), label=getattr(mark, "label", ""))
+    return Patch(color=colour_of(mark.colour), label=getattr(mark, "label", ""))

@@ -1,4 +1,4 @@
-"""What pictures over crank speed share: the end of the axis, orders, operating points and limits."""
+"""Common parts of pictures over crank speed: orders, operating points and limits."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from laufruhe.plots.style import VERMILION, entry
-from laufruhe.plots.words import FAINT, SMALL, fitted, spread, width_of
+from laufruhe.plots.words import FAINT, SMALL, fit_line, spread, width_of
 from laufruhe.present.mounting import MountingFacts
 from laufruhe.present.numbers import RPM
 from laufruhe.problem.channels import Channel
@@ -39,14 +39,14 @@ def mark_points(axes: Axes, result: Result, lift: float = 0.06) -> None:
     Parameters
     ----------
     lift
-        Of the names over the panel [inch].
+        Height of the names above the panel [inch].
     """
     points = sorted(result.problem.points, key=lambda point: point.speed)
     for point in points:
         axes.axvline(point.speed * RPM, color=FAINT, linewidth=0.7, linestyle=(0, (2, 3)), zorder=0.6)
     named = points if len(points) <= MOST_NAMES else [points[0], points[-1]]
     wide, tall = axes.bbox.width / axes.figure.dpi, axes.bbox.height / axes.figure.dpi
-    names = [fitted(point.name, wide / len(named) - _APART) for point in named]
+    names = [fit_line(point.name, wide / len(named) - _APART) for point in named]
     (low, high), widest = axes.get_xlim(), max(map(width_of, names)) + _APART
     at = (np.array([point.speed * RPM for point in named]) - low) / (high - low)
     half = 0.5 * widest / wide

@@ -1,4 +1,4 @@
-"""What all pictures share: page, colours, fonts, and the words around the data.
+"""Common parts of all pictures: page, colours, fonts, and the words around the data.
 
 A picture is made under `styled()`, begins with a `page` of panels and ends with `headed` (or `heading`), which gives
 the page the margins that all that was drawn needs: nothing can stand outside it. Figures are made without pyplot and
@@ -27,8 +27,8 @@ from matplotlib.transforms import Bbox
 from PIL import Image
 
 from laufruhe.plots.letters import families
-from laufruhe.plots.words import FAINT, INK, SMALL, fitted, round_ticks, typeset, width_of, wrapped
-from laufruhe.present.measures import changed, load_designs
+from laufruhe.plots.words import FAINT, INK, SMALL, fit_line, round_ticks, typeset, width_of, wrap_lines
+from laufruhe.present.measures import evaluations_with_loads, is_changed
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result
 
@@ -40,7 +40,7 @@ BEFORE, AFTER = GREY, BLUE
 DPI = 150
 GAP = 0.42
 NARROWEST, WIDEST = 6.4, 10.2
-"""Of a page [inch]: the widest stands in a report at its own size, so its letters do too."""
+"""Width of a page [inch]; the widest keeps its size, and that of its letters, in a report."""
 EDGE = 0.3
 """Around all that is on a page [inch]."""
 _BELOW_HEAD, _ABOVE_FOOT = 0.22, 0.2
@@ -96,7 +96,7 @@ def page(
     count
         Panels wanted, where fewer than rows times columns.
     gap, across
-        Between panels, and between columns of them where that is another [inch].
+        Distance between panels; `across` between columns, if different [inch].
     lead
         Above each panel, for a heading of its own [inch].
     """
@@ -129,8 +129,8 @@ def heading(figure: Figure, title: str, lines: str, legend: Sequence[Artist], so
         wide = max(inside.width + 2.0 * EDGE, NARROWEST)
         room = wide - 2.0 * EDGE
         words = [(title, _TITLE, "bold", INK), (engine, _ENGINE, "normal", INK), (lines, SMALL, "normal", FAINT)]
-        head = [(wrapped(text, room, size, weight), size, weight, ink) for text, size, weight, ink in words if text]
-        foot = wrapped(source, room)
+        head = [(wrap_lines(text, room, size, weight), size, weight, ink) for text, size, weight, ink in words if text]
+        foot = wrap_lines(source, room)
         rows, columns = _legend_shape([str(artist.get_label()) for artist in legend], room)
         above = sum(len(text) * size * _LINE + 0.03 for text, size, _, _ in head) + rows * 1.05 * SMALL * _LINE
         below = EDGE + len(foot) * SMALL * _LINE + _ABOVE_FOOT
@@ -155,7 +155,9 @@ def _moved(figure: Figure, size: tuple[float, float], by: tuple[float, float]) -
         axes.set_position((*corner, *(np.array([box.width, box.height]) * before / size)))
 
 
-def headed(drawn: Page, result: Result, title: str, lines: str, legend: Sequence[Artist], note: str = "") -> Figure:
+def finish_page(
+    drawn: Page, result: Result, title: str, lines: str, legend: Sequence[Artist], note: str = ""
+) -> Figure:
     """Finish the page of a result; the note says what it leaves out."""
     problem = result.problem
     described = f"Source: {problem.source}. " if problem.source else ""
@@ -170,7 +172,7 @@ def _legend(figure: Figure, entries: Sequence[Artist], room: float, columns: int
         borderpad=0.2, borderaxespad=0.0, handlelength=_HANDLE, columnspacing=_APART, labelcolor=INK,
     )  # fmt: skip
     for text in legend.get_texts():
-        text.set_text(fitted(text.get_text(), room - 2.6 * SMALL / 72.0))
+        text.set_text(fit_line(text.get_text(), room - 2.6 * SMALL / 72.0))
     return legend
 
 
@@ -205,10 +207,10 @@ class Series:
 
 def series_of(result: Result, loads: bool = False) -> list[Series]:
     """Return the given and the decided design; only one if nothing was decided, or if one lacks loads."""
-    if not changed(result):
+    if not is_changed(result):
         return [Series(result.final, AFTER, "as given")]
     both = [Series(result.initial, BEFORE, "as given"), Series(result.final, AFTER, "as decided")]
-    return both[-len(load_designs(result)) :] if loads else both
+    return both[-len(evaluations_with_loads(result)) :] if loads else both
 
 
 def entry(label: str, **look: Any) -> Line2D:
@@ -249,6 +251,6 @@ def as_svg(figure: Figure) -> str:
     return drawn.getvalue()
 
 
-def thin(values: Iterable[float]) -> float:
+def axis_end(values: Iterable[float]) -> float:
     """Return the largest value, or one if all are zero: the end of an axis."""
     return max(values, default=0.0) or 1.0

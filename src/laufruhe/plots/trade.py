@@ -21,9 +21,9 @@ LEAST_ERROR, LEAST_REGRET = 1e-7, 1e-8
 PANEL, DOT = (5.4, 4.4), 0.13
 """Width and height of the panel, and room of a dot [inch]."""
 NAME_HEIGHT = 0.036
-"""Of a name, over the panel."""
+"""Height of a name relative to the panel."""
 _NAMES = 1.03
-"""Where names begin, over the panel."""
+"""Left end of the names relative to the panel."""
 _FEW_DECADES = 30.0
 _PLAIN = FuncFormatter(lambda value, _: _power(value))
 

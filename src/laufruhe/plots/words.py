@@ -24,7 +24,7 @@ from laufruhe.present.numbers import NOTHING, number
 
 INK, FAINT = "#222222", "#5c5c5c"
 SMALL = 9.0
-"""No letter of a picture is smaller [points]."""
+"""Smallest size of letters [points]."""
 READ = 4.5
 """Least contrast of letters, as WCAG 2 asks."""
 THIN_SPACE = "\u2009"
@@ -47,7 +47,7 @@ def _width_in(fonts: tuple[str, ...], text: str, size: float, weight: str) -> fl
     return float(text_to_path.get_text_width_height_descent(text, font, ismath=False)[0]) / _POINTS
 
 
-def fitted(text: str, inches: float, size: float = SMALL) -> str:
+def fit_line(text: str, inches: float, size: float = SMALL) -> str:
     """Return text cut to one line of this width [inch]."""
     text = " ".join(text.split())
     if width_of(text, size) <= inches:
@@ -56,7 +56,7 @@ def fitted(text: str, inches: float, size: float = SMALL) -> str:
     return f"{text[:length].rstrip()}…"
 
 
-def wrapped(text: str, inches: float, size: float = SMALL, weight: str = "normal") -> list[str]:
+def wrap_lines(text: str, inches: float, size: float = SMALL, weight: str = "normal") -> list[str]:
     """Break text into lines of this width [inch]; a wider word is cut."""
     lines: list[str] = []
     # widths of words add up; most stand in several pictures
@@ -66,7 +66,7 @@ def wrapped(text: str, inches: float, size: float = SMALL, weight: str = "normal
         if lines and longer <= inches:
             lines[-1], wide = f"{lines[-1]} {word}", longer
         else:
-            lines.append(fitted(word, inches, size))
+            lines.append(fit_line(word, inches, size))
             wide = width_of(lines[-1], size, weight)
     return lines
 
@@ -121,7 +121,7 @@ def _rising(values: Array) -> Array:
     return np.repeat([mean for mean, _ in shared], [count for _, count in shared])
 
 
-def beside(axes: Axes, heights: Sequence[float], texts: Sequence[str]) -> None:
+def label_lines(axes: Axes, heights: Sequence[float], texts: Sequence[str]) -> None:
     """Write names of horizontal lines to the right of the panel, without overlaps."""
     low, high = axes.get_ylim()
     least = 1.3 * SMALL / _POINTS / (axes.bbox.height / axes.figure.dpi)
@@ -152,14 +152,14 @@ def empty(axes: Axes, words: str) -> None:
     axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center", color=FAINT, size=SMALL)
 
 
-def left_out(largest: float, most: float, unit: str) -> str:
+def omitted_words(largest: float, most: float, unit: str) -> str:
     """Return what is said of a load too small to draw; empty if it is drawn."""
     if largest > UNSEEN * most:
         return ""
     return "zero" if largest <= NOTHING * most else f"at most {number(largest, 2)} {unit}"
 
 
-def apart(texts: Sequence[Text]) -> None:
+def separate_texts(texts: Sequence[Text]) -> None:
     """Move overlapping words up and down, as little as possible."""
     left = [(text, text.get_window_extent()) for text in texts]
     while left:
@@ -187,7 +187,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _UNITS = {"deg": "°", "us": "µs", "um": "µm", "degC": "°C"}
 
 
-def aligned(panels: Sequence[Axes]) -> None:
+def align_labels(panels: Sequence[Axes]) -> None:
     """Align the labels of the vertical axes of one column, clear of the longest number."""
     longest = 0.0
     for axes in panels:

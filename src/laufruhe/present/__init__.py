@@ -1,1 +1,1 @@
-"""What a result says, read and worded once for tables, files and pictures."""
+"""Numbers and words of results that tables, files and pictures share."""

@@ -1,4 +1,4 @@
-"""What tables, files and pictures read from an evaluation: mount forces and orders, point by point."""
+"""Loads of an evaluation for tables, files and pictures, point by point."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class Places:
     Attributes
     ----------
     key
-        In `result.json`.
+        Key in `result.json`.
     title, place
-        In a table.
+        Title of the table, and head of its first column.
     """
 
     key: str
@@ -94,7 +94,7 @@ def moment_orders(wrench: Spectrum) -> tuple[Array, Array]:
     return order_amplitude(wrench.coefficients[:, 3:4]), order_amplitude(wrench.coefficients[:, 4:])
 
 
-def padded(values: Array, length: int) -> Array:
+def pad_orders(values: Array, length: int) -> Array:
     """Return values with zeros for missing orders."""
     return np.pad(values, [(0, length - len(values))] + [(0, 0)] * (values.ndim - 1))
 
@@ -134,7 +134,7 @@ def firing_words(result: Result) -> tuple[str, str]:
 
 def has_loads(result: Result) -> bool:
     """Return True if loads are finite: not on a resonance."""
-    return bool(result.problem.points) and not load_designs(result)[-1].resonance
+    return bool(result.problem.points) and not evaluations_with_loads(result)[-1].resonance
 
 
 def has_mount_forces(result: Result) -> bool:
@@ -154,19 +154,19 @@ def ranking_of(result: Result) -> PhasingResult:
     return result.phasing
 
 
-def changed(result: Result) -> bool:
+def is_changed(result: Result) -> bool:
     """Return True if the final design differs from the given one."""
     return result.final is not result.initial
 
 
-def loaded(result: Result) -> dict[str, Evaluation]:
+def designs_with_loads(result: Result) -> dict[str, Evaluation]:
     """Return the designs with finite loads, by name; always the final one."""
     return {name: design for name, design in result.designs.items() if design is result.final or not design.resonance}
 
 
-def load_designs(result: Result) -> list[Evaluation]:
+def evaluations_with_loads(result: Result) -> list[Evaluation]:
     """Return the designs of `loaded` as a list."""
-    return list(loaded(result).values())
+    return list(designs_with_loads(result).values())
 
 
 def has_bearings(result: Result) -> bool:

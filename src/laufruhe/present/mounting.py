@@ -1,4 +1,4 @@
-"""What a report says of a block on its mounts: modes, what excites them, critical speeds."""
+"""Facts about a block on its mounts: modes, their excitation, critical speeds."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ class MountingFacts:
     orders
         Orders that make most of the load, the strongest first.
     sag, mount_sag
-        Of the centre of gravity under its own weight, and at every mount, downwards [m].
+        Static sag of the centre of gravity, and at every mount, downwards [m].
     torque_travel
         Largest displacement of any mount under the mean torque [m].
     torque_roll_axis, torque_roll_coupling, torque_roll_frequency
         Unit vector, what is zero where turning about it is a mode (E8), and the frequency of the mode that comes
         nearest [Hz] (E46).
     depends_on_frequency
-        Whether stiffness does: modes are then of that at rest (E50).
+        True if stiffness does: modes then use the stiffness at rest (E50).
     with_fluid
         Natural frequencies of the block and the fluid of its mounts together, undamped [Hz]; none without fluid
         tracks (E50).
@@ -85,7 +85,7 @@ def facts_of(evaluation: Evaluation) -> MountingFacts:
     )
 
 
-def at_which_stiffness(facts: MountingFacts) -> str:
+def stiffness_sentence(facts: MountingFacts) -> str:
     """Return a sentence about the stiffness of the modes; empty if it is constant."""
     return " Modes are of the stiffness at rest, which changes with frequency." if facts.depends_on_frequency else ""
 
@@ -107,7 +107,7 @@ def critical_speed(frequency: float, order: float) -> float:
     return math.tau * frequency / order
 
 
-def driven(facts: MountingFacts) -> list[float]:
+def excited_frequencies(facts: MountingFacts) -> list[float]:
     """Return the excited natural frequencies; the highest one if there is none [Hz]."""
     return [float(facts.modes.frequencies[j]) for j in facts.excited] or [float(facts.modes.frequencies[-1])]
 

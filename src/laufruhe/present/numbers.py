@@ -9,7 +9,7 @@ from laufruhe.units import readable
 
 DASH = "-"
 RPM, DEGREE = readable("rad/s")[1], readable("rad")[1]
-"""In one rad/s, and in one rad."""
+"""Factors on rad/s and on rad."""
 NOTHING = 1e-9
 
 
@@ -19,7 +19,7 @@ def number(value: float, digits: int = 4, scale: float = 0.0) -> str:
     Parameters
     ----------
     scale
-        Size beside which the number is read: what is a rounding of it is shown as 0.
+        Reference size: numbers that are a rounding of it become 0.
     """
     if not math.isfinite(value):
         return DASH
@@ -72,6 +72,11 @@ def in_grams(value: float, unit: str, scale: float) -> str:
 def percent(share: float) -> str:
     """Return a relative change in percent, with sign."""
     return f"{100.0 * share:+.1f} %" if math.isfinite(share) else DASH
+
+
+def share(value: float, digits: int = 2) -> str:
+    """Return a share in percent."""
+    return f"{trimmed(100.0 * value, digits)} %"
 
 
 def price_of(price: float, unit: str, of: str, counts: bool = False) -> str:

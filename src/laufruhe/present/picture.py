@@ -13,7 +13,7 @@ Colour: TypeAlias = str | float
 SERIES: tuple[Colour, ...] = ("blue", "orange", "green", "vermilion", "purple", "sky", "indigo", "olive")
 WIDE, HIGH = 6.4, 3.6
 WIDEST = 8.8
-"""Of all panels side by side [inch]."""
+"""Width of all panels side by side [inch]."""
 DASHES = ((6.0, 2.0), (2.0, 2.0), (1.0, 3.0))
 
 

@@ -15,7 +15,7 @@ class ResultPicture:
     Attributes
     ----------
     name
-        Of its files.
+        Name of its files.
     caption
         Words under it.
     home

@@ -1,4 +1,4 @@
-"""Where the parts of an engine are at a crank angle, and how large weights are drawn (C4, C5)."""
+"""Positions of engine parts at a crank angle, and sizes of drawn weights (C4, C5)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from laufruhe.machine.bodies import Outline
 
 STEEL = 7850.0
 THICKNESS = 0.02
-"""Of the half discs that stand for weights [m]."""
+"""Thickness of the half discs that represent weights [m]."""
 LONG_ROD = 4.0
 
 
@@ -29,7 +29,7 @@ class Pose:
     bodies: tuple[Outline, ...]
 
     @classmethod
-    def of(cls, part: SliderCrank, phi: float) -> Pose:
+    def at_angle(cls, part: SliderCrank, phi: float) -> Pose:
         """Return the pose at a crank angle [rad] (C5)."""
         centre, axis = complex(part.shaft.z, part.shaft.y), cmath.exp(1j * part.bank)
         turn = part.throw + part.shaft.ratio * phi

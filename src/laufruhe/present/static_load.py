@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from laufruhe.present.numbers import figure, trimmed
+from laufruhe.present.numbers import figure, share
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.static_load import static_part, with_alternating_loads
@@ -23,8 +23,7 @@ def static_sentence(problem: Problem, evaluation: Evaluation) -> str:
             f"{lead}: nothing that turns can bring the objective below it. Without that mean it is {rest}; "
             "alternating = true minimises this."
         )
-    share = trimmed(100.0 * part.static / part.whole, 2)
     return (
-        f"{lead} ({share} %), which nothing that turns can balance. "
+        f"{lead} ({share(part.static / part.whole)}), which nothing that turns can balance. "
         f"Without that mean the objective is {rest} (alternating = true)."
     )

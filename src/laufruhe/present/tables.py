@@ -24,7 +24,7 @@ class Table:
     left
         Number of leading text columns, or the text columns themselves; None finds those that hold more than numbers.
     marked
-        Whether code and emphasis in the cells are marked as in Markdown.
+        True if cells mark code and emphasis as in Markdown.
     file
         Name of the file that holds the table as it is printed; empty if a file has its numbers in full precision.
     omitted
@@ -51,36 +51,38 @@ class Table:
         """Indices of the text columns."""
         if self.left is None:
             columns = range(len(self.head))
-            return frozenset(k for k in columns if not all(_NUMBER.fullmatch(unmarked(row[k])) for row in self.rows))
+            return frozenset(
+                k for k in columns if not all(_NUMBER.fullmatch(strip_markdown(row[k])) for row in self.rows)
+            )
         return frozenset(range(self.left) if isinstance(self.left, int) else self.left)
 
     def plain(self) -> Table:
         """Return the table without the marks of Markdown."""
         if not self.marked:
             return self
-        rows = [[unmarked(cell) for cell in row] for row in self.rows]
-        return replace(self, head=[unmarked(cell) for cell in self.head], rows=rows, marked=False)
+        rows = [[strip_markdown(cell) for cell in row] for row in self.rows]
+        return replace(self, head=[strip_markdown(cell) for cell in self.head], rows=rows, marked=False)
 
     def as_markdown(self) -> str:
         """Return title, table and note; names of the user mean nothing to Markdown."""
-        convert = str if self.marked else escaped
+        convert = str if self.marked else escape_markdown
         rows = [[convert(cell) for cell in row] for row in self.rows]
-        parts = [f"## {escaped(self.title)}"] if self.title else []
-        parts.append(piped([convert(cell) for cell in self.head], rows, self.texts))
-        return "\n\n".join([*parts, escaped(self.note)] if self.note else parts)
+        parts = [f"## {escape_markdown(self.title)}"] if self.title else []
+        parts.append(markdown_table([convert(cell) for cell in self.head], rows, self.texts))
+        return "\n\n".join([*parts, escape_markdown(self.note)] if self.note else parts)
 
 
-def piped(head: Sequence[str], rows: Iterable[Sequence[str]], texts: Collection[int] = (0,)) -> str:
+def markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]], texts: Collection[int] = (0,)) -> str:
     """Return a table in Markdown, its text columns aligned left."""
     marks = ["---" if k in texts else "---:" for k in range(len(head))]
     return "\n".join(f"| {' | '.join(cells)} |" for cells in (head, marks, *rows))
 
 
-def escaped(text: str) -> str:
+def escape_markdown(text: str) -> str:
     """Return text that Markdown shows as it is."""
     return re.sub(r"([\\`*_\[\]<>|#$])", r"\\\1", " ".join(text.split()))
 
 
-def unmarked(text: str) -> str:
+def strip_markdown(text: str) -> str:
     """Return Markdown text without its code, emphasis, links and escapes."""
-    return _MARKS.sub(lambda match: match[1] or match[2] or unmarked(match[3] or match[4] or match[5]), text)
+    return _MARKS.sub(lambda match: match[1] or match[2] or strip_markdown(match[3] or match[4] or match[5]), text)

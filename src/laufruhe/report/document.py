@@ -9,7 +9,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from laufruhe.present.tables import Table, escaped
+from laufruhe.present.tables import Table, escape_markdown
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Heading:
 
     def as_markdown(self) -> str:
         """Return the heading as Markdown."""
-        return f"## {escaped(self.text)}"
+        return f"## {escape_markdown(self.text)}"
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Paragraph:
 
     def as_markdown(self) -> str:
         """Return the paragraph as Markdown."""
-        return self.text if self.marked else escaped(self.text)
+        return self.text if self.marked else escape_markdown(self.text)
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Bullets:
 
     def as_markdown(self) -> str:
         """Return the list as Markdown."""
-        convert = str if self.marked else escaped
+        convert = str if self.marked else escape_markdown
         return f"{self.lead}\n\n" + "\n".join(f"- {convert(text)}" for text in self.items)
 
 
@@ -59,7 +59,7 @@ class Illustration:
 
     def as_markdown(self, ending: str) -> str:
         """Return the picture with its caption as Markdown; `ending` is that of the picture file."""
-        image = f"![{escaped(self.caption)}]({self.name}{ending})"
+        image = f"![{escape_markdown(self.caption)}]({self.name}{ending})"
         return f"{image}\n\n*{self.caption}*" if self.is_captioned else image
 
 
@@ -95,4 +95,4 @@ class Document:
             block.as_markdown(ending) if isinstance(block, Illustration) else block.as_markdown()
             for block in self.blocks
         )  # fmt: skip
-        return "\n\n".join([f"# {escaped(self.title)}", *parts]) + "\n"
+        return "\n\n".join([f"# {escape_markdown(self.title)}", *parts]) + "\n"

@@ -1,4 +1,4 @@
-"""What a scene needs of the physics, as text and as JSON."""
+"""Choice of physics for a problem, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def as_text(problem: Problem, choice: Choice, tolerance: float, milliseconds: tu
     Parameters
     ----------
     milliseconds
-        Of one evaluation of a further design: as chosen, and exact over the whole cycle.
+        Time of one evaluation with the chosen and with the exact physics.
     """
     pruned, exact = choice.numbers
     fewer = f", one in {trimmed(exact / pruned, 2)}" if 0 < pruned < exact else ""

@@ -33,7 +33,7 @@ TABLES = (
 )  # fmt: skip
 """Names of the tables of a result that are CSV files; extensions add theirs."""
 MADE = ".laufruhe.json"
-"""What stands in a folder of results beside them: the command that made them, and their names."""
+"""File in a folder of results with the command that made them, and their names."""
 _NEXT = f"{MADE}-next"
 _SWAP = 2
 _HERE = -100
@@ -41,7 +41,7 @@ _HERE = -100
 
 def result_files() -> tuple[str, ...]:
     """Return the names of all files that a result may have."""
-    added = [(*section.printed, *section.sheets) for section in EXTENSION_SECTIONS.values()]
+    added = [(*section.printed, *section.number_tables) for section in EXTENSION_SECTIONS.values()]
     return (
         RESULT, REPORT, PAGE, BOOK, MOTION,
         *(f"{name}.{kind}" for name in PICTURES for kind in KINDS),
@@ -50,21 +50,21 @@ def result_files() -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Set:
+class FileSet:
     """Files that one command makes in a folder.
 
     Attributes
     ----------
     folder
-        Made if it does not exist.
+        Target folder; created if missing.
     option
-        Names the culprit in a complaint.
+        Name of the option for error messages.
     verb
-        Of the command; a folder holds the results of one.
+        Command; a folder holds the results of one command.
     names
-        That may be made.
+        File names that may be made.
     adds
-        Whether what earlier runs made stays, where this one does not make it again.
+        True if files of earlier runs stay, unless they are made again.
     beside
         Files of this command that are no results and stay where they are.
     """
@@ -101,7 +101,7 @@ class Set:
 
 
 @contextmanager
-def staged(wanted: Set) -> Iterator[Path]:
+def staged(wanted: FileSet) -> Iterator[Path]:
     """Yield a hidden folder that replaces the target folder atomically when all files are made.
 
     Whether it can is found out on entry. After an error, an interrupt or a kill at any
@@ -138,7 +138,7 @@ def staged(wanted: Set) -> Iterator[Path]:
 
 
 @contextmanager
-def _reporting(wanted: Set) -> Iterator[None]:
+def _reporting(wanted: FileSet) -> Iterator[None]:
     try:
         yield
     except OSError as error:
@@ -165,7 +165,7 @@ def staged_file(path: Path, option: str) -> Iterator[Path]:
         If `path` cannot be written, or is a file that Laufruhe did not make.
     """
     path = path.resolve()
-    place = Set(path, option, "", ())
+    place = FileSet(path, option, "", ())
     if path.exists() and not path.is_file() and not path.is_dir():
         # a device or a pipe takes text, and must not be replaced by a file
         yield path
@@ -185,7 +185,7 @@ def staged_file(path: Path, option: str) -> Iterator[Path]:
             os.replace(stage / path.name, path)
 
 
-def placed(folder: Path, page: str) -> str:
+def results_line(folder: Path, page: str) -> str:
     """Return where the files are, and which to open first."""
     return f"Results: {printed(str(folder))} (begin with {printed(page)})"
 

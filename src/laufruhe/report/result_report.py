@@ -1,4 +1,4 @@
-"""What the report of a result says, in which order."""
+"""Content and order of the report of a result."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def result_document(result: Result, pictures: Sequence[str], command: str) -> Do
     pictures
         Names without endings, of those that were drawn.
     command
-        What makes the same result again.
+        Command that reproduces the result.
     """
     return Document(result.problem.title, tuple(_blocks(result, pictures, command)))
 

@@ -61,9 +61,9 @@ class SavedResult(Told):
     problem, title
         Name of the problem file without its ending, and its title.
     status, message, conflict, objective, certificate, decisions, limits
-        As of `Result`.
+        Same as in `Result`.
     record
-        All that the file holds, as plain Python values: mounts, orders, points and more.
+        Whole content of the file, as plain Python values.
     """
 
     problem: str
@@ -87,9 +87,9 @@ def write_result(result: Result, path: str | Path, series: bool = False) -> None
     Parameters
     ----------
     path
-        Of the file; what stands there is overwritten.
+        Path of the file, which is overwritten.
     series
-        Whether the loads over the cycle are written too.
+        True to add the loads over the cycle.
     """
     write(Path(path), as_json(result, series))
 
@@ -100,7 +100,7 @@ def read_result(path: str | Path) -> SavedResult:
     Parameters
     ----------
     path
-        Of the file, or of the folder of results that holds it.
+        Path of the file, or of its folder of results.
 
     Raises
     ------

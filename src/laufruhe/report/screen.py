@@ -12,9 +12,9 @@ from rich.console import Console
 from rich.table import Table as RichTable
 from rich.text import Text
 
-from laufruhe.present.tables import Table, unmarked
+from laufruhe.present.tables import Table, strip_markdown
 from laufruhe.report.document import Bullets, Document, Heading, Paragraph
-from laufruhe.report.files import PAGE, placed
+from laufruhe.report.files import PAGE, results_line
 from laufruhe.report.sections import tables_of
 from laufruhe.report.wording import details, explained, fidelity_of, headline
 from laufruhe.solvers.result import Result, Status
@@ -52,11 +52,11 @@ def show_document(document: Document, stream: TextIO, folder: Path, page: str) -
                 console.print()
                 console.print(Text(text, style="bold"))
             case Paragraph(text, marked):
-                console.print(Text(unmarked(text) if marked else text))
+                console.print(Text(strip_markdown(text) if marked else text))
             case Bullets(lead, items, marked):
                 console.print(Text(lead))
                 for item in items:
-                    _print_item(console, unmarked(item) if marked else item)
+                    _print_item(console, strip_markdown(item) if marked else item)
             case Table():
                 _print_grid(console, block)
                 console.print()
@@ -72,7 +72,7 @@ def _console(stream: TextIO) -> Console:
 
 def _print_place(console: Console, folder: Path, page: str) -> None:
     # a path is copied in one piece, however long it is
-    console.print(Text(placed(folder, page)), soft_wrap=True)
+    console.print(Text(results_line(folder, page)), soft_wrap=True)
 
 
 def _print_item(console: Console, text: str) -> None:

@@ -1,4 +1,4 @@
-"""What extensions add to reports: tables, files of numbers, and an entry of result.json."""
+"""Report sections of extensions: tables, files of numbers, and an entry of result.json."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
 
 NumberTables: TypeAlias = Mapping[str, tuple[Callable[[Result], object], Callable[[Result], Table]]]
-"""By file names: a function that returns whether a result has the table, and one that returns it."""
+"""File names, each with a function that tests for the table and one that returns it."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Section:
         Return the entry of result.json, if there is one.
     printed
         Names of the tables that are files as they are printed.
-    sheets
+    number_tables
         Further files of numbers.
     """
 
@@ -39,7 +39,7 @@ class Section:
     tables: Callable[[Result], Sequence[Table]] = lambda _: ()
     record: Callable[[Result], Mapping[str, Any]] | None = None
     printed: tuple[str, ...] = ()
-    sheets: NumberTables = field(default_factory=dict)
+    number_tables: NumberTables = field(default_factory=dict)
 
 
 EXTENSION_SECTIONS: Mapping[str, Section] = extended("sections", Section, ())

@@ -42,13 +42,13 @@ def write_study(
     Parameters
     ----------
     seconds
-        What each part took.
+        Seconds of each part.
     draw
-        Begins to make the files of a picture, whose place comes without an ending; gives what waits for it as SVG.
+        Starts writing a picture at a path without ending; returns a function that waits for its SVG.
     ending
-        Of the files that the Markdown page shows.
+        Ending of the picture files of the Markdown page.
     """
-    drawn, sheets = {}, {}
+    drawn, tables = {}, {}
     for part in study.study.parts:
         say(f"writing {part.name}")
         name, data = part.name, datasets[part.name]
@@ -57,12 +57,12 @@ def write_study(
         data.rename(spaced).to_netcdf(folder / f"{name}.nc")
         if "csv" in part.ends:
             rows = _flat(data)
-            sheets[name] = Table([*rows.index.names, *rows.columns], rows.reset_index().to_numpy(dtype=object).tolist())
-            write_csv(sheets[name], folder / f"{name}.csv")
+            tables[name] = Table([*rows.index.names, *rows.columns], rows.reset_index().to_numpy(dtype=object).tolist())
+            write_csv(tables[name], folder / f"{name}.csv")
         if "png" in part.ends:
             drawn[name] = draw(part.picture(data), folder / name)
-    if sheets:
-        write_book(sheets, folder / files.BOOK)
+    if tables:
+        write_book(tables, folder / files.BOOK)
     document = study_document(study, datasets, seconds, command)
     pictures = {name: picture() for name, picture in drawn.items()}
     files.write(folder / files.REPORT, document.as_markdown(ending))

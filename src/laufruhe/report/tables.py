@@ -1,4 +1,4 @@
-"""Every table and curve of a result as numbers: a CSV file each, and a workbook of them all."""
+"""Tables and curves of a result as numbers: one CSV file each, and a workbook."""
 
 from __future__ import annotations
 
@@ -22,26 +22,32 @@ from laufruhe.physics.irregularity import swing_of
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torque import torque_parts
 from laufruhe.physics.willans import FrictionTest
-from laufruhe.present.chambers import indicator_of, points_with_chambers
+from laufruhe.present.curves import (
+    KINDS,
+    indicator_of,
+    is_twin,
+    parts_of,
+    points_with_chambers,
+    transmissibility_of,
+    transmissibility_speeds,
+)
 from laufruhe.present.measures import (
     BEARINGS,
     as_crank_turns,
     asks_torque,
     bearing_paths,
+    designs_with_loads,
     has_bearings,
     has_loads,
     has_ranking,
     limits_of,
-    loaded,
     objective_unit,
     places_of,
     ranking_of,
 )
 from laufruhe.present.mounting import critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import RPM
-from laufruhe.present.speed_curves import speeds_of, transmissibility_of
 from laufruhe.present.tables import Table
-from laufruhe.present.twins import KINDS, is_twin, parts_of
 from laufruhe.problem.curves import STEPS, forces_of, modes_of, orders_of
 from laufruhe.problem.evaluation import measured
 from laufruhe.report import files
@@ -53,12 +59,12 @@ from laufruhe.solvers.values import DecisionValue, LimitValue
 
 MOST_ROWS = 20 * STEPS
 MANY = 5_000
-"""Cells that take longer to write than a process to begin."""
+"""Number of cells from which a forked process writes the workbook."""
 
 
 def number_tables(result: Result) -> dict[str, Table]:
     """Return the tables of a result by file name: SI, degrees and rpm where the heads say so, others as printed."""
-    groups = [_TABLES, *(section.sheets for section in EXTENSION_SECTIONS.values())]
+    groups = [_TABLES, *(section.number_tables for section in EXTENSION_SECTIONS.values())]
     tables = {name: fill(result) for group in groups for name, (applies, fill) in group.items() if applies(result)}
     for printed in printed_tables(result):
         if printed.file:
@@ -83,7 +89,7 @@ def _measures(result: Result) -> Table:
         [places.title, point.name, design, name, each.mean, each.max, each.rms, places.channel.unit]
         for places in places_of(result)
         for k, point in enumerate(result.problem.points)
-        for design, evaluation in loaded(result).items()
+        for design, evaluation in designs_with_loads(result).items()
         for name, each in zip(
             places.channel.places(evaluation.engine), measured(evaluation, k, places.channel), strict=True
         )
@@ -93,14 +99,14 @@ def _measures(result: Result) -> Table:
 
 def _forces(result: Result) -> Table:
     steps = max(min(STEPS, MOST_ROWS // len(result.problem.points)), 36)
-    return Table.from_fields(forces_of(loaded(result), steps))
+    return Table.from_fields(forces_of(designs_with_loads(result), steps))
 
 
 def _transmissibility(result: Result) -> Table:
-    speeds, orders = speeds_of(result), facts_of(result.final).orders
+    speeds, orders = transmissibility_speeds(result), facts_of(result.final).orders
     columns = [
         (f"{design}, {point.name}: order {orders[k]:g}", curve.tolist())
-        for design, evaluation in loaded(result).items()
+        for design, evaluation in designs_with_loads(result).items()
         for point in result.problem.points
         for k, curve in transmissibility_of(evaluation, point, speeds, orders)
     ]
@@ -130,7 +136,7 @@ def _degrees(angles: Iterable[float]) -> str:
 
 
 DIRECTIONS = 180
-"""In which wear is told."""
+"""Number of directions of the wear table."""
 TURN = math.tau * np.arange(STEPS) / STEPS
 
 
@@ -217,7 +223,7 @@ def _test_rows(test: FrictionTest) -> Iterator[list[Any]]:
 def _on_crank(result: Result) -> Table:
     """Return forces on main bearings along and across the turning crank (B4)."""
     names, rows, heads = BEARINGS.channel.places(result.final.engine), [], []
-    designs = loaded(result)
+    designs = designs_with_loads(result)
     for k, point in enumerate(result.problem.points):
         columns = []
         for design in designs.values():
@@ -235,7 +241,7 @@ def _on_crank(result: Result) -> Table:
 def _wear(result: Result) -> Table:
     names, angles = BEARINGS.channel.places(result.final.engine), math.tau * np.arange(DIRECTIONS) / DIRECTIONS
     rows = []
-    for name, design in loaded(result).items():
+    for name, design in designs_with_loads(result).items():
         for k, point in enumerate(result.problem.points):
             shares = [wear_of(path, angles) for path in bearing_paths(design, k).T]
             rows += [[name, point.name, *row] for row in np.column_stack([np.degrees(angles), *shares]).tolist()]
@@ -247,7 +253,7 @@ def _turning(result: Result) -> Table:
     rows = [
         [name, point.name, kind, order, abs(forward), math.degrees(cmath.phase(forward)), abs(backward),
          math.degrees(cmath.phase(backward)), KINDS[kind][1]]
-        for name, design in loaded(result).items()
+        for name, design in designs_with_loads(result).items()
         for k, point in enumerate(result.problem.points)
         for (kind, order), (forward, backward) in parts_of(result, design.engine, k).items()
     ]  # fmt: skip
@@ -258,7 +264,7 @@ def _turning(result: Result) -> Table:
 
 def _mount_criticals(result: Result) -> Table:
     rows = []
-    for name, design in loaded(result).items():
+    for name, design in designs_with_loads(result).items():
         facts = facts_of(design)
         for j, (mode, frequency) in enumerate(zip(facts.modes.names, facts.modes.frequencies.tolist(), strict=True)):
             rows += [
@@ -274,7 +280,7 @@ _TABLES: NumberTables = {
     "limits": (limits_of, lambda result: _values(limits_of(result))),
     "measures": (places_of, _measures),
     "forces": (has_loads, _forces),
-    "orders": (has_loads, lambda result: Table.from_fields(orders_of(loaded(result)))),
+    "orders": (has_loads, lambda result: Table.from_fields(orders_of(designs_with_loads(result)))),
     "modes": (is_elastic, lambda result: Table.from_fields(modes_of(result.designs))),
     "transmissibility": (is_elastic, _transmissibility),
     "rankings": (has_ranking, _rankings),
@@ -290,15 +296,15 @@ _TABLES: NumberTables = {
 
 
 @contextmanager
-def writing_tables(result: Result, folder: Path) -> Iterator[Callable[[], None]]:
+def write_tables(result: Result, folder: Path) -> Iterator[Callable[[], None]]:
     """Write a CSV file for every table, and a workbook, into an existing folder.
 
-    Gives what waits for the workbook: a process of its own writes one of many cells.
+    Yield a function that waits for the workbook, which a forked process writes if it is large.
     """
-    sheets = number_tables(result)
-    cells = sum(len(sheet.head) * len(sheet.rows) for sheet in sheets.values())
-    book = partial(write_book, sheets, folder / files.BOOK) if sheets else lambda: None
-    with run_concurrently(book, cells > MANY) as written:
-        for name, sheet in sheets.items():
-            write_csv(sheet, folder / f"{name}.csv")
-        yield written
+    tables = number_tables(result)
+    cells = sum(len(table.head) * len(table.rows) for table in tables.values())
+    book = partial(write_book, tables, folder / files.BOOK) if tables else lambda: None
+    with run_concurrently(book, cells > MANY) as wait_for_book:
+        for name, table in tables.items():
+            write_csv(table, folder / f"{name}.csv")
+        yield wait_for_book

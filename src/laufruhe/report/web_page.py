@@ -27,11 +27,11 @@ def as_html(document: Document, pictures: Mapping[str, str], live: LiveModel | N
     Parameters
     ----------
     pictures
-        SVG by name; they stand in the page, which loads nothing.
+        SVG by name; they are part of the page.
     live
-        What lets a reader move decisions.
+        Model for sliders in the page.
     """
-    inline = {name: inlined(svg) for name, svg in pictures.items()}
+    inline = {name: data_address(svg) for name, svg in pictures.items()}
     return f"{template().render(document=document, pictures=inline, live=_live(live))}\n"
 
 
@@ -50,13 +50,13 @@ def _live(model: LiveModel | None) -> dict[str, Any] | None:
         return None
     why = model.why_not or model.too_large
     if why:
-        return {"heading": HEADING, "sentences": (why, *model.told)}
+        return {"heading": HEADING, "sentences": (why, *model.notes)}
     # of our own making, and JSON without an opening bracket
     texts = {"model": model.as_json(), "style": page_assets()["live.css"], "script": page_assets()["live.js"]}
     return {"heading": HEADING, **{name: Markup(text) for name, text in texts.items()}}
 
 
-def inlined(svg: str) -> str:
+def data_address(svg: str) -> str:
     """Return a picture as a data address; names within it cannot clash with those of another."""
     return "data:image/svg+xml;base64," + base64.b64encode(svg.encode("utf-8")).decode("ascii")
 

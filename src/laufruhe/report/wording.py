@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 from laufruhe.numerics.turns import as_turn, within
-from laufruhe.present.measures import breaks_a_limit, changed, has_firing
-from laufruhe.present.numbers import figure, number, percent, trimmed
+from laufruhe.present.measures import breaks_a_limit, has_firing, is_changed
+from laufruhe.present.numbers import figure, number, percent, share, trimmed
 from laufruhe.present.static_load import static_sentence
 from laufruhe.problem.plausibility import together
 from laufruhe.prove.certificate import Certificate, Proof
@@ -31,7 +31,7 @@ def headline(result: Result) -> str:
     if o is None:
         return "The design as given, evaluated; nothing was to be minimised."
     name = f"RMS{o.name[3:]}" if o.name.startswith("rms ") else o.name[:1].upper() + o.name[1:]
-    if not changed(result):
+    if not is_changed(result):
         return f"{name} of the design as given: {figure(o.value, o.unit)}."
     if math.isinf(o.initial):
         text = f"{name} is {figure(o.value, o.unit)}, {_proven(result.certificate)}"
@@ -96,7 +96,7 @@ def why_star(result: Result) -> str:
         return f"Star {k} has the same free forces and couples as star 1." if abs(gain) < UNFELT else ""
     if gain < UNFELT:
         return f"Star {k} is as good."
-    said = f"Star 1 beats star {k} by {trimmed(100.0 * gain, 3)} %."
+    said = f"Star 1 beats star {k} by {share(gain, 3)}."
     said += f" Its throws leave a smaller {' and '.join(less)}." if less else ""
     lead = "It leaves" if less else "Its throws leave"
     return said + (f" {lead} a larger {' and '.join(more)}." if more else "")
@@ -125,15 +125,10 @@ def _proven(certificate: Certificate | None) -> str:
         return NO_BOUND
     words = {
         "global": "the proven optimum",
-        "global within gap": f"proven to within {percent_of(max(certificate.gap, 0.0))} of the optimum",
+        "global within gap": f"proven to within {share(max(certificate.gap, 0.0))} of the optimum",
         "local": "a local optimum",
     }
     return words.get(str(certificate.kind), "not proven")
-
-
-def percent_of(share: float) -> str:
-    """Return a share in percent, to two figures."""
-    return f"{trimmed(100.0 * share, 2)} %"
 
 
 def explained(result: Result) -> str:
@@ -160,7 +155,7 @@ def explained(result: Result) -> str:
             f"The best of the local optima found ({c.method}), with {figure(o.value, o.unit, 6)}. "
             f"For this design {_conditions(c.kkt_residual)}. {bound if c.is_useful else NO_BOUND.capitalize() + '.'}"
         )
-    gap = f"a gap of {percent_of(c.gap)}" if c.gap > 0.0 else "which leaves no gap"
+    gap = f"a gap of {share(c.gap)}" if c.gap > 0.0 else "which leaves no gap"
     return (
         f"No design within the bounds and limits has less than {figure(c.lower_bound, o.unit, 6)}; "
         f"this one has {figure(o.value, o.unit, 6)}, {gap} (proof: {c.kind}). "
@@ -173,5 +168,5 @@ def _conditions(residual: float) -> str:
     if not math.isfinite(residual):
         return "no search ended at this design, so its optimality conditions are not known"
     if residual > LOOSE:
-        return f"the optimality conditions, on which no bound rests, are met to {percent_of(residual)} only"
+        return f"the optimality conditions, on which no bound rests, are met to {share(residual)} only"
     return f"the optimality conditions hold with a residual of {residual:.1e}"

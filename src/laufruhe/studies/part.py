@@ -1,4 +1,4 @@
-"""What every kind of study part is: one class with its keys, points, dataset, table and picture."""
+"""Base of all kinds of study parts: keys, points, dataset, table and picture."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class Template:
     Attributes
     ----------
     draws, chunk
-        Of each case, and of one piece of work.
+        Number of draws of each case, and of one piece of work.
     columns
-        By their names.
+        Columns by name.
     """
 
     cases: tuple[str, ...]

@@ -46,7 +46,7 @@ class Regions:
     root
         Folder of the store, which all parts of a study share; this part is a group in it.
     wanted
-        Where the pieces stand, by their fingerprints.
+        Region of every piece, by fingerprint.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def _store_at(root: Path) -> Any:
 
 
 @contextmanager
-def kept_to_one(root: Path) -> Iterator[None]:
+def locked_store(root: Path) -> Iterator[None]:
     """Lock a store against other runs.
 
     Raises

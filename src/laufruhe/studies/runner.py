@@ -49,7 +49,7 @@ def run(
     Parameters
     ----------
     folder
-        That the study's problem files are named from.
+        Folder that the paths of problem files are relative to.
     kept
         File of the finished points; points in it are not solved again.
     say

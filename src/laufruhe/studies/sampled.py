@@ -110,7 +110,7 @@ def share_below(values: Array, colour: p.Colour, label: str, dash: Sequence[floa
     return p.Line(np.percentile(known, CURVE), CURVE, colour, label, dash=dash)
 
 
-def listed(values: Array) -> list[float]:
+def percentiles_of(values: Array) -> list[float]:
     """Return the values that 5, 50 and 95 % stay below; NaN without values."""
     known = values[np.isfinite(values)]
     return [float(one) for one in np.percentile(known, LISTED)] if len(known) else [float("nan")] * len(LISTED)

@@ -1,4 +1,4 @@
-"""Where finished points of a study are kept, by their fingerprints.
+"""Stores of finished points of a study, by fingerprint.
 
 There are two stores, for two shapes of records. Points of most kinds are as different as their engines, each costs
 milliseconds to minutes, and a study that is changed keeps those that are not: a line for each, added to a file, needs
@@ -12,10 +12,10 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Protocol, TypeAlias
 
-from laufruhe.studies.kept_points import KeptPoints
+from laufruhe.studies.finished_points import FinishedPoints
 from laufruhe.studies.part import Part, Record
 from laufruhe.studies.reader import StudyFile
-from laufruhe.studies.regions import Region, Regions, kept_to_one
+from laufruhe.studies.regions import Region, Regions, locked_store
 from laufruhe.studies.scenes import Point, Scenes
 
 Task: TypeAlias = tuple[Part, Point]
@@ -42,7 +42,7 @@ def stores_of(
     rest, root = set(tasks), regions_in(finished.parent)
     templates = [(part, template) for part in study.study.parts if (template := part.template(scenes)) is not None]
     if templates:
-        stores.enter_context(kept_to_one(root))
+        stores.enter_context(locked_store(root))
     for part, template in templates:
         regions = {
             mark: Region(template.cases.index(point.case.name), *point.span)
@@ -51,7 +51,7 @@ def stores_of(
         }
         yield Regions(root, part.name, template, regions), regions
         rest -= set(regions)
-    yield stores.enter_context(KeptPoints(finished, rest)), rest
+    yield stores.enter_context(FinishedPoints(finished, rest)), rest
 
 
 def regions_in(folder: Path) -> Path:

@@ -25,7 +25,7 @@ from laufruhe.solvers import solve, state
 from laufruhe.solvers.result import Result
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.swept_shown import by_point
+from laufruhe.studies.swept_report import by_point
 from laufruhe.studies.text import Text
 
 AS_GIVEN, FAILED = "as given", "failed"
@@ -38,7 +38,7 @@ HIGHEST_ORDER = 12.0
 _ON_MOUNTS = ("mean_given", "maximum_given", "mean", "maximum")
 
 
-def decided(problem: Problem) -> tuple[Result, str, str]:
+def decide_scene(problem: Problem) -> tuple[Result, str, str]:
     """Return the result of a scene, its status and its proof; evaluate the given design if there is no solution."""
     try:
         result = solve(problem)
@@ -55,7 +55,7 @@ Further: TypeAlias = Callable[[Evaluation], float]
 """A further quantity of a design; `ModelError` says why it has none."""
 
 
-def solved(problem: Problem, further: Mapping[str, Further] | None = None) -> Record:
+def solve_scene(problem: Problem, further: Mapping[str, Further] | None = None) -> Record:
     """Return the record of a scene [SI], NaN for missing values.
 
     Its metric and the unit of that, status and proof ("as given" where nothing was open), the
@@ -64,7 +64,7 @@ def solved(problem: Problem, further: Mapping[str, Further] | None = None) -> Re
     order; how limits stand, and their shadow prices, by name; and the design in further quantities,
     or why it has none.
     """
-    result, status, proof = decided(problem)
+    result, status, proof = decide_scene(problem)
     objective, bound = result.objective, result.certificate.lower_bound if result.certificate else math.nan
     limits = limits_of(result)
     designed = status not in (FAILED, "infeasible")
@@ -176,10 +176,10 @@ def _orders_and_limits(records: Sequence[Mapping[str, Any]], unit: str) -> tuple
     names |= {order for record in records for order, size in record["order_force"].items() if size}
     orders = sorted(names, key=float)
     units = {name: of for record in records for name, of in record["limit_units"].items()}
-    initial, decided = (_table(name, records, orders) for name in ("order_force_given", "order_force"))
+    initial, final = (_table(name, records, orders) for name in ("order_force_given", "order_force"))
     variables = {
         "order_force_given": variable(("point", "order"), initial, "amplitude by order, as given", "N"),
-        "order_force": variable(("point", "order"), decided, "amplitude by order, as decided", "N"),
+        "order_force": variable(("point", "order"), final, "amplitude by order, as decided", "N"),
     }
     coords: dict[str, Any] = {"order": [float(order) for order in orders]}
     if not units:
@@ -228,7 +228,7 @@ class SweptPart(Part):
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """Return the record of one scene: its proven optimum, or the given design if nothing is open."""
-        return solved(scenes.problem(point))
+        return solve_scene(scenes.problem(point))
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return the records of all scenes along their points."""

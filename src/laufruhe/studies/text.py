@@ -1,4 +1,4 @@
-"""What a report says of a study part: paragraphs, tables, and statements of a source beside ours, as data."""
+"""Text of a study part in a report: paragraphs, tables, and statements of a source with verdicts."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Text: TypeAlias = str | Table
 """A paragraph or a table of a report."""
 
 UNSTATED = "not in the study"
-"""In place of the study's number, where ours goes beyond it."""
+"""Replaces the study's number for values that it does not state."""
 
 NEGLIGIBLE = 0.07
 """Change of a force that cannot be told apart in the bars of a printed figure, by which the study judges."""
@@ -49,7 +49,7 @@ def number(value: float, digits: int = 5) -> str:
     return NOTHING if value != value else trimmed(value, digits)
 
 
-def said(verdicts: Sequence[Verdict]) -> list[Text]:
+def statement_table(verdicts: Sequence[Verdict]) -> list[Text]:
     """Return the table of a source's statements; empty without statements."""
     if not verdicts:
         return []

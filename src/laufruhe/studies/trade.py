@@ -47,7 +47,7 @@ class Row:
     Attributes
     ----------
     error, estimate
-        Of the objective of the design as given, and what it is said not to exceed; relative to the reference.
+        Error of the objective of the given design relative to the reference, and its bound.
     evaluation, gradient, solve, fresh
         Seconds; another design with the scene prepared (from nothing where that cannot
         be prepared), its gradient with it, an optimum (of a processor), and an evaluation from nothing. NaN
@@ -58,7 +58,7 @@ class Row:
         Reference objective of the design that this fidelity decides, and the largest share by which that is beyond a
         limit at the reference; NaN as above.
     regret
-        That objective over the one of the best design known, less one; NaN as above, and where that is zero.
+        Relative excess of that objective over the best known design; NaN as above, and for an objective of zero.
     """
 
     name: str
@@ -107,11 +107,11 @@ class Trade:
         Crank inertia at which the constant speed was priced [kg m2], and the relative
         change of the objective that the uneven speed makes; None where no load is asked.
     time_domain
-        None where mounts are rigid.
+        Comparison in time; None for rigid mounts.
     left_out
-        What the file asks beyond a trade, in words.
+        Sentences about parts of the problem that a trade does not include.
     whole
-        Whether time was enough for all fidelities.
+        True if all fidelities were measured in the given time.
     """
 
     problem: Problem

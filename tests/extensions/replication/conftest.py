@@ -13,7 +13,7 @@ import xarray as xr
 
 from laufruhe.extensions.replication.expressions import value_of
 from laufruhe.extensions.replication.part import Replication
-from laufruhe.studies.kept_points import KEPT
+from laufruhe.studies.finished_points import FINISHED_POINTS
 from laufruhe.studies.reader import StudyFile, load_study
 from laufruhe.studies.runner import run
 from problem_files import PROBLEMS
@@ -36,7 +36,7 @@ def shared_part(file: str, name: str) -> Path:
     def fill(folder: Path) -> None:
         study = study_of(file)
         alone = study.study.model_copy(update={"parts": [parts_of(file)[name]]})
-        data = run(study.model_copy(update={"study": alone}), PROBLEMS, folder / KEPT)[0][name]
+        data = run(study.model_copy(update={"study": alone}), PROBLEMS, folder / FINISHED_POINTS)[0][name]
         (folder / "data").write_bytes(pickle.dumps(data))
 
     return once(f"{file}-{name}", fill)
@@ -61,9 +61,9 @@ def finished() -> Callable[[str, Path], None]:
     def fill(file: str, folder: Path) -> None:
         folder.mkdir(parents=True)
         for part in parts_of(file):
-            points = shared_part(file, part) / KEPT
+            points = shared_part(file, part) / FINISHED_POINTS
             if points.exists():
-                with (folder / KEPT).open("ab") as kept:
+                with (folder / FINISHED_POINTS).open("ab") as kept:
                     kept.write(points.read_bytes())
 
     return fill

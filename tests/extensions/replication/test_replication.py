@@ -14,11 +14,11 @@ from typer.testing import CliRunner
 
 from laufruhe.cli import app
 from laufruhe.errors import ModelError
-from laufruhe.extensions.replication.expressions import ExpressionError, check, filled, numbers_of, value_of
-from laufruhe.extensions.replication.judging import CONFIRMED, NOT_CONFIRMED, counted, judged, rows
+from laufruhe.extensions.replication.expressions import ExpressionError, check, fill_in, numbers_of, value_of
+from laufruhe.extensions.replication.judging import CONFIRMED, NOT_CONFIRMED, count_confirmed, judge_statements, rows
 from laufruhe.extensions.replication.models import Hue, StatementTable
 from laufruhe.extensions.replication.part import Replication
-from laufruhe.plots.picture import draw, hue
+from laufruhe.plots.picture import colour_of, draw
 from laufruhe.present.tables import Table
 from laufruhe.studies.scenes import Scenes
 from problem_files import PROBLEMS
@@ -94,10 +94,10 @@ class TestExpressions:
 
     def test_texts_are_filled(self) -> None:
         told = {"a": ["{x} kg", "{throws}", 3], "b": "{x:.2f} and {2 * x:.0f} %", "c": "plain"}
-        assert filled(told, NAMES) == {"a": ["2.0 kg", [0, 180, 180, 0], 3], "b": "2.00 and 4 %", "c": "plain"}
+        assert fill_in(told, NAMES) == {"a": ["2.0 kg", [0, 180, 180, 0], 3], "b": "2.00 and 4 %", "c": "plain"}
         for wrong in ("{x", "{x:1000000000f}", "{x:d}", "{z}"):
             with pytest.raises(ExpressionError):
-                filled(wrong, NAMES)
+                fill_in(wrong, NAMES)
 
     def test_numbers_build_on_one_another(self) -> None:
         given = {"r": 2, "area": "pi * r**2", "k": {"from": 0, "to": 1, "points": 3}, "half": "k / 2"}
@@ -110,7 +110,7 @@ class TestExpressions:
 
 def _judged(**more: Any) -> str:
     statement = StatementTable.model_validate({"text": "s", "printed": "1", "value": "x", **more})
-    return str(judged([statement], {"": NAMES})["verdict"][1][0][0])
+    return str(judge_statements([statement], {"": NAMES})["verdict"][1][0][0])
 
 
 @pytest.mark.parametrize(("more", "verdict"), [
@@ -132,25 +132,25 @@ def test_table_and_count() -> None:
         {"text": "fails", "printed": "3 kp", "value": "x", "unit": "kp", "is": 3, "within": 0, "why": "{x:.1f}"},
     ]
     statements = [StatementTable.model_validate(one) for one in both]
-    data = xr.Dataset(coords=judged(statements, {"": NAMES}))
+    data = xr.Dataset(coords=judge_statements(statements, {"": NAMES}))
     (table,) = rows(data)
     assert isinstance(table, Table)
     assert table.rows == [["holds (p. 3)", "2", "2", "yes", ""], ["fails", "3 kp", "2 kp", "**no**", "2.0"]]
-    assert counted([data, xr.Dataset()]) == "1 of 2 statements are confirmed."
+    assert count_confirmed([data, xr.Dataset()]) == "1 of 2 statements are confirmed."
 
 
 def test_readings_stand_side_by_side() -> None:
     """A part without readings counts in each of them."""
     statement = {"text": "s", "printed": "3", "value": "x", "is": 3, "within": 0, "why": "{x:.0f} found"}
     table = StatementTable.model_validate(statement)
-    in_two = xr.Dataset(coords=judged([table], {"as printed": NAMES, "as meant": {**NAMES, "x": 3.0}}))
-    in_one = xr.Dataset(coords=judged([table], {"": {"x": 3.0}}))
+    in_two = xr.Dataset(coords=judge_statements([table], {"as printed": NAMES, "as meant": {**NAMES, "x": 3.0}}))
+    in_one = xr.Dataset(coords=judge_statements([table], {"": {"x": 3.0}}))
     (shown,) = rows(in_two)
     assert isinstance(shown, Table)
     assert list(shown.head) == ["statement", "the source", "as printed", "confirmed", "as meant", "confirmed", "why"]
     assert shown.rows == [["s", "3", "2", "**no**", "3", "yes", "as printed: 2 found<br>as meant: 3 found"]]
     told = "as printed: 1 of 2 statements are confirmed. as meant: 2 of 2 statements are confirmed."
-    assert counted([in_one, in_two]) == told
+    assert count_confirmed([in_one, in_two]) == told
 
 
 def _part(**more: Any) -> Replication:
@@ -305,7 +305,7 @@ def test_marks_that_cannot_be_drawn_are_refused_when_read(key: str, value: Any) 
 
 
 def test_every_colour_is_one_of_the_pictures() -> None:
-    assert all(hue(name).startswith("#") for name in get_args(Hue))
+    assert all(colour_of(name).startswith("#") for name in get_args(Hue))
 
 
 @pytest.mark.parametrize("within", ["5", "five %", "-5 %", "%"])

@@ -14,7 +14,7 @@ import xarray as xr
 from tests.extensions.replication.conftest import PROBLEMS, parts_of
 
 from laufruhe import load
-from laufruhe.extensions.replication.judging import CONFIRMED, counted
+from laufruhe.extensions.replication.judging import CONFIRMED, count_confirmed
 from laufruhe.extensions.replication.part import Replication
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.plots.picture import draw
@@ -109,7 +109,7 @@ def test_statements(figure: Data, name: str) -> None:
 def test_all_are_counted(figure: Data) -> None:
     assert [*JUDGED, "reciprocating-mass"] == FIGURES
     counts = f"{PRINTED}: 38 of 45 statements are confirmed. {MEANT}: 44 of 45 statements are confirmed."
-    assert counted([figure(name) for name in FIGURES]) == counts
+    assert count_confirmed([figure(name) for name in FIGURES]) == counts
 
 
 @pytest.mark.parametrize("name", FIGURES)

@@ -10,7 +10,7 @@ import pytest
 
 from laufruhe.extensions.served_page import answers, scenes
 from laufruhe.extensions.served_page.answers import Source
-from laufruhe.extensions.served_page.claims import Simpler, conflict_claim, is_broken
+from laufruhe.extensions.served_page.claims import Simplification, conflict_claim, is_broken
 from laufruhe.extensions.served_page.page_state import Edit, PageState
 from laufruhe.files.reader import load, tables_of
 from laufruhe.problem.evaluation import evaluate
@@ -163,10 +163,10 @@ def test_what_is_held_as_decided_is_named() -> None:
 
 
 def test_words_of_what_is_simpler() -> None:
-    assert not Simpler()
-    both = Simpler(("these mounts", "this crank"), ("tolerances",))
+    assert not Simplification()
+    both = Simplification(("these mounts", "this crank"), ("tolerances",))
     assert both.phrase == " for these mounts and this crank without tolerances"
-    told = conflict_claim(3, ("a", "b"), Simpler(("these mounts",)))
+    told = conflict_claim(3, ("a", "b"), Simplification(("these mounts",)))
     assert told.text == "No design found: 'a' and 'b' contradict each other for these mounts. Move one of the limits"
     assert conflict_claim(3, ("a",), is_last=True).lead == "No design exists:"
 

@@ -22,7 +22,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.static_load import with_alternating_loads
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes, shafts_of
-from laufruhe.studies.text import NOTHING, Text, marked_table, number, said
+from laufruhe.studies.text import NOTHING, Text, marked_table, number, statement_table
 
 SAME = 1e-4
 """Relative difference of forces below which proofs cannot tell designs apart."""
@@ -203,7 +203,7 @@ class Economics(Part):
             rows.append([*cells, f"{'**yes**' if worth.worth else 'no'}: {worth.why}" if worth else NOTHING])
         return [
             marked_table(head, rows),
-            *said([v for own in verdicts(data).values() for v in own]),
+            *statement_table([v for own in verdicts(data).values() for v in own]),
             *_front_rows(data),
         ]
 

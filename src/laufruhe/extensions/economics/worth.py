@@ -43,7 +43,7 @@ from laufruhe.studies.text import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
 MASS_ON_SHAFTS = Measure(channels.BALANCER_MASS, NORMS["mean"])
 LIMIT_NAME = "mass on shafts"
 PLAIN, SHAFTS, NEXT = "plain", "with shafts", "more cylinders"
-"""What an engine is in a comparison; the one without any of the shafts has that name too."""
+"""Roles of engines in a comparison; the first is also the name of the engine without shafts."""
 Judgement: TypeAlias = Literal["negligible", "noticeable", "better", "worth building", "not worth building"]
 _ALLOWED = f"{100.0 * PRINTED_FALL:.0f} points are allowed: what the unprinted rod ratio and gas trace move it by"
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from laufruhe.extensions.replication.expressions import ExpressionError, filled, number_of, value_of
+from laufruhe.extensions.replication.expressions import ExpressionError, fill_in, number_of, value_of
 from laufruhe.extensions.replication.functions import join
 from laufruhe.extensions.replication.models import AxisTable, BarsTable, CurveTable, PanelTable, PictureTable
 from laufruhe.present.picture import Area, Axis, Bars, Line, Mark, Panel, Picture, Words, credit
@@ -25,7 +25,7 @@ BAR = 0.31
 Names = Mapping[str, Any]
 
 
-def drawn(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) -> Picture:
+def draw_picture(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) -> Picture:
     """Return the picture of a table, evaluated in each reading of the source."""
     wide = Picture("", "", (), "", (table.size[0], table.size[1]), table.columns, table.gap).width
     count = sum(1 if panel.once else len(readings) for panel in table.panels)
@@ -37,7 +37,7 @@ def drawn(table: PictureTable, readings: Mapping[str, Names], data: xr.Dataset) 
     ]
     return Picture(
         table.title or data.attrs["title"],
-        filled(table.words, next(iter(readings.values()))),
+        fill_in(table.words, next(iter(readings.values()))),
         panels,
         credit(data),
         # broken into rows, panels need less height each
@@ -90,7 +90,7 @@ def _drawn_panel(panel: PanelTable, names: Names, reading: str) -> Panel:
     marks: list[Mark] = []
     for area in panel.areas:
         x, (low, high) = ([number_of(end, names) for end in ends] for ends in (area.x, area.y))
-        marks.append(Area(x, [low, low], [high, high], area.colour, filled(area.label, names)))
+        marks.append(Area(x, [low, low], [high, high], area.colour, fill_in(area.label, names)))
     for curve in panel.curves:
         marks += _curves(curve, names)
     if panel.bars:
@@ -98,13 +98,13 @@ def _drawn_panel(panel: PanelTable, names: Names, reading: str) -> Panel:
         marks += _bars(panel.bars, names, 0.0 if ends is None else max(ends))
     for words in panel.words:
         across, up = (number_of(at, names) for at in (words.x, words.y))
-        marks.append(Words(across, up, filled(words.text, names), words.colour, words.across, words.along))
-    title = ", ".join(words for words in (filled(panel.title, names), reading) if words)
+        marks.append(Words(across, up, fill_in(words.text, names), words.colour, words.across, words.along))
+    title = ", ".join(words for words in (fill_in(panel.title, names), reading) if words)
     return Panel(marks, _axis(panel.x, names), _axis(panel.y, names), title)
 
 
 def _axis(axis: AxisTable, names: Names) -> Axis:
-    labels = filled(axis.names, names)
+    labels = fill_in(axis.names, names)
     ticks = [(float(k), str(text)) for k, text in enumerate(labels)] if labels else None
     if axis.ticks is not None:
         ticks = [(float(at), f"{at:g}") for at in axis.ticks]
@@ -129,9 +129,9 @@ def _curves(curve: CurveTable, names: Names) -> Iterator[Mark]:
         x = value_of(curve.x, {**own_names, **{dim: y[dim] for dim in dims}}) if curve.x is not None else y[dims[0]]
         xs, ys = (np.atleast_1d(np.asarray(values, dtype=float)) for values in (x, y))
         xs, ys = np.broadcast_arrays(xs, ys)
-        yield Line(xs, ys, colour, filled(curve.label, own_names), curve.width, curve.dash, curve.marker)
+        yield Line(xs, ys, colour, fill_in(curve.label, own_names), curve.width, curve.dash, curve.marker)
         if curve.end:
-            yield Words(float(xs[-1]), float(ys[-1]), f" {filled(curve.end, own_names)}", colour)
+            yield Words(float(xs[-1]), float(ys[-1]), f" {fill_in(curve.end, own_names)}", colour)
 
 
 def _bars(bars: BarsTable, names: Names, end: float) -> Iterator[Mark]:
@@ -142,7 +142,7 @@ def _bars(bars: BarsTable, names: Names, end: float) -> Iterator[Mark]:
     top, width = max(max(values) for values in outlines), GROUP / len(series)
     for k, (own_names, low, high) in enumerate(zip(series, fills, outlines, strict=True)):
         places = np.arange(len(low)) + (k - 0.5 * (len(series) - 1)) * width
-        label = filled(bars.labels[k] if bars.labels else bars.label, own_names)
+        label = fill_in(bars.labels[k] if bars.labels else bars.label, own_names)
         colour = bars.colours[k % len(bars.colours)]
         yield Bars(places, low, 0.9 * width, colour, label)
         if bars.outline:

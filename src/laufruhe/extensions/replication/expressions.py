@@ -26,7 +26,7 @@ from laufruhe.files.complaints import nearest
 from laufruhe.files.fields import Table
 
 Place: TypeAlias = tuple[str | int, ...]
-"""Of a text in a file: keys, and numbers in lists from zero."""
+"""Position of a text in a file: keys, and indices of lists."""
 MOST_LETTERS = 2000
 _ARITHMETIC: Mapping[str, Any] = {
     "Add": operator.add, "Sub": operator.sub, "Mult": operator.mul, "Div": operator.truediv, "Mod": operator.mod,
@@ -190,22 +190,22 @@ _CALLED = {f"{name}()": function for name, function in FUNCTIONS.items()}
 _CALLED |= {f"{name}()": _of_numbers(function) for name, function in _ARITHMETIC.items()}
 
 
-def filled(text: Any, names: Mapping[str, Any]) -> Any:
+def fill_in(text: Any, names: Mapping[str, Any]) -> Any:
     """Return a text, list or table with its `{expressions}` replaced; a single expression keeps its type."""
-    fill = filling(text)
+    fill = filler(text)
     return text if fill is None else fill(names)
 
 
-def filling(text: Any) -> Callable[[Mapping[str, Any]], Any] | None:
+def filler(text: Any) -> Callable[[Mapping[str, Any]], Any] | None:
     """Return a function that fills a text, list or table with names; None without expressions.
 
     What holds no expression is shared by all that is filled.
     """
     if isinstance(text, dict):
-        inside = {key: fill for key, value in text.items() if (fill := filling(value)) is not None}
+        inside = {key: fill for key, value in text.items() if (fill := filler(value)) is not None}
         return (lambda names: {**text, **{key: fill(names) for key, fill in inside.items()}}) if inside else None
     if isinstance(text, list):
-        fills = [filling(value) for value in text]
+        fills = [filler(value) for value in text]
         pairs = list(zip(text, fills, strict=True))
         return (lambda names: [entry if fill is None else fill(names) for entry, fill in pairs]) if any(fills) else None
     return partial(_filled, text) if isinstance(text, str) and "{" in text else None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from laufruhe.extensions.replication.expressions import filled, number_of
+from laufruhe.extensions.replication.expressions import fill_in, number_of
 from laufruhe.extensions.replication.models import StatementTable
 from laufruhe.studies.text import UNSTATED, Text, marked_table
 
@@ -17,13 +17,13 @@ _SLACK, _NOTHING = 1e-9, 1e-9
 _CELLS = {CONFIRMED: "yes", NOT_CONFIRMED: "**no**", BEYOND: "–"}
 
 
-def judged(statements: Sequence[StatementTable], readings: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def judge_statements(statements: Sequence[StatementTable], readings: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Return coordinates of a dataset along statements and readings: printed, ours, verdict, why.
 
     Parameters
     ----------
     readings
-        What names are worth in each reading of the source.
+        Values of the names in each reading of the source.
     """
     if not statements:
         return {}
@@ -43,7 +43,7 @@ def judged(statements: Sequence[StatementTable], readings: Mapping[str, Mapping[
 def _judged(one: StatementTable, names: Mapping[str, Any]) -> tuple[float, str, str]:
     value = number_of(one.value, names)
     known = {**names, "value": value}
-    return value, verdict(one, known), filled(one.why, known)
+    return value, verdict(one, known), fill_in(one.why, known)
 
 
 def verdict(statement: StatementTable, names: Mapping[str, Any]) -> str:
@@ -84,7 +84,7 @@ def _shown(value: float) -> str:
     return "0" if abs(value) < _NOTHING else f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
 
 
-def counted(datasets: Iterable[xr.Dataset]) -> str:
+def count_confirmed(datasets: Iterable[xr.Dataset]) -> str:
     """Return how many statements of all parts are confirmed, in every reading; empty without statements."""
     judged_ones = [data for data in datasets if "verdict" in data.coords]
     readings = dict.fromkeys(str(name) for data in judged_ones for name in data["by_reading"].values)

@@ -14,21 +14,21 @@ from pydantic import Field, ValidationError, model_validator
 from pydantic_core import InitErrorDetails
 
 from laufruhe.errors import ModelError
-from laufruhe.extensions.replication.drawing import drawn
+from laufruhe.extensions.replication.drawing import draw_picture
 from laufruhe.extensions.replication.expressions import (
     ExpressionError,
     Place,
     check,
     check_among,
     checks_in,
-    filled,
-    filling,
+    fill_in,
+    filler,
     grid,
     numbers_of,
 )
-from laufruhe.extensions.replication.judging import counted, judged, rows
+from laufruhe.extensions.replication.judging import count_confirmed, judge_statements, rows
 from laufruhe.extensions.replication.models import PictureTable, ReplicaCase, StatementTable
-from laufruhe.extensions.replication.quantities import DIMENSIONS, AskedTable, asked, check_asked
+from laufruhe.extensions.replication.quantities import DIMENSIONS, AskedTable, check_quantity, quantity_value
 from laufruhe.files import fields as f
 from laufruhe.files.study_tables import joined
 from laufruhe.present.picture import Picture
@@ -75,7 +75,7 @@ class Replication(Part):
             for name in numbers:
                 yield ("readings", reading), name, partial(check_among, known=self.numbers, what="number")
         for name, what in self.quantities.items():
-            yield ("quantities", name), what, check_asked
+            yield ("quantities", name), what, check_quantity
         cases = [case.name for case in self.cases]
         known: dict[str, Sequence[Any]] = dict.fromkeys((*self.numbers, *self.quantities), ())
         for name, text in self.define.items():
@@ -115,13 +115,13 @@ class Replication(Part):
         grids = {name: grid(name, table).values.tolist() for name, table in case.sweep.items()}
         with self._blamed(case.name):
             tables = self._tables(case.problem, scenes)
-        fill = filling(tables)
+        fill = filler(tables)
         for values in itertools.product(*grids.values()):
             swept = dict(zip(grids, values, strict=True))
             with self._blamed(case.name):
                 names = numbers_of({**self.numbers, **reading, **case.numbers, **swept}, {})
                 filled_tables = tables if fill is None else fill(names)
-                changed = case.model_copy(update={"set": filled(case.set, names), "numbers": swept})
+                changed = case.model_copy(update={"set": fill_in(case.set, names), "numbers": swept})
             yield Point(changed, base=filled_tables)
 
     def _tables(self, name: Any, scenes: Scenes, *seen: Any) -> dict[str, Any]:
@@ -139,7 +139,7 @@ class Replication(Part):
         result = solve(problem)
         if result.status in (Status.INFEASIBLE, Status.FAILED):
             raise ModelError(f"no design meets all limits of '{case.name}'; loosen one")
-        return {name: asked(result, what)._asdict() for name, what in self.quantities.items()}
+        return {name: quantity_value(result, what)._asdict() for name, what in self.quantities.items()}
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return quantities along the points, and every statement judged."""
@@ -159,7 +159,7 @@ class Replication(Part):
         for name in self.quantities if records else ():
             data = data.merge(_along_points([record[name] for record in records], name))
         with self._blamed("statements"):
-            return data.assign_coords(judged(self.statements, self.names(data)))
+            return data.assign_coords(judge_statements(self.statements, self.names(data)))
 
     def names(self, data: xr.Dataset) -> dict[str, dict[str, Any]]:
         """Return the names of expressions in each reading: numbers, quantities by case, definitions."""
@@ -173,7 +173,7 @@ class Replication(Part):
     @staticmethod
     def summary(datasets: Iterable[xr.Dataset]) -> str:
         """Return how many statements of all parts are confirmed."""
-        return counted(datasets)
+        return count_confirmed(datasets)
 
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
@@ -187,7 +187,7 @@ class Replication(Part):
         part = Replication.model_validate_json(data.attrs["part"])
         assert part.picture_ is not None
         with part._blamed("picture"):
-            return drawn(part.picture_, part.names(data), data)
+            return draw_picture(part.picture_, part.names(data), data)
 
     @contextmanager
     def _blamed(self, where: str) -> Iterator[None]:

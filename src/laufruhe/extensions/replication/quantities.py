@@ -1,4 +1,4 @@
-"""What may be asked of a case: any measure of a problem file, and what else stands in `RESULTS`, by name."""
+"""Quantities of a case: any measure of a problem file, and the entries of `RESULTS`."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class Labelled(NamedTuple):
     coords: dict[str, list[Any]]
 
 
-def check_asked(what: str | AskedTable) -> None:
+def check_quantity(what: str | AskedTable) -> None:
     """Check that a quantity exists.
 
     Raises
@@ -66,7 +66,7 @@ def check_asked(what: str | AskedTable) -> None:
         check_among(name, [*RESULTS, *MEASURES], "quantity")
 
 
-def asked(result: Result, what: str | AskedTable) -> Labelled:
+def quantity_value(result: Result, what: str | AskedTable) -> Labelled:
     """Return a quantity of a case's design [SI].
 
     Raises

@@ -5,7 +5,7 @@ from __future__ import annotations
 from matplotlib.figure import Figure
 
 from laufruhe.extensions.robust.result import SHARES, AssemblyResult
-from laufruhe.plots.style import AFTER, BEFORE, SKY, entry, headed, page, styled
+from laufruhe.plots.style import AFTER, BEFORE, SKY, entry, finish_page, page, styled
 from laufruhe.plots.words import INK, label_of
 from laufruhe.solvers.result import Result
 
@@ -36,4 +36,4 @@ def figure(result: Result) -> Figure:
         entry("parts of mean mass", color=INK, linestyle=MEAN),
     ]  # fmt: skip
     lines = f"{found.random} of {found.assemblies:,.0f} ways to assemble the measured parts."
-    return headed(drawn, result, "What choosing parts buys", lines, legend)
+    return finish_page(drawn, result, "What choosing parts buys", lines, legend)

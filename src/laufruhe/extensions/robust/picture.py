@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from laufruhe.extensions.robust.result import SHARES, RobustResult
-from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled, thin
+from laufruhe.plots.style import AFTER, BEFORE, axis_end, entry, finish_page, page, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, label_of
 from laufruhe.present.measures import objective_unit
 from laufruhe.present.numbers import number
@@ -45,12 +45,12 @@ def figure(result: Result) -> Figure:
     lines = (
         f"{found.engines:,} engines built at random within their tolerances; below, which tolerance to narrow first."
     )
-    return headed(drawn, result, "The price of tolerances", lines, legend)
+    return finish_page(drawn, result, "The price of tolerances", lines, legend)
 
 
 def _bars(axes: Axes, found: RobustResult, unit: str) -> None:
     shown = found.tolerances[:MOST_TOLERANCES]
-    top = thin(one.saving for one in shown)
+    top = axis_end(one.saving for one in shown)
     axes.barh(range(len(shown)), [max(one.saving, 0.0) for one in shown], color=AFTER, height=0.55)
     for k, one in enumerate(shown):
         axes.text(0.01 * top, k - 0.36, one.name, size=SMALL, color=INK, va="bottom")

@@ -34,7 +34,7 @@ from laufruhe.problem.measure import MEAN_MOUNT_FORCE
 from laufruhe.problem.problem import Drawing, Problem
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.text import NEGLIGIBLE, Text, Verdict, marked_table, number, said
+from laufruhe.studies.text import NEGLIGIBLE, Text, Verdict, marked_table, number, statement_table
 
 ANGLES, PIECE = 360, 500
 MAXIMUM, CLOSE = NORMS["maximum"], 1e-5
@@ -254,7 +254,7 @@ class Tolerance(Part):
             cells = [str(name), number(nominal, 3), f"{worst:.1f}", *parts, f"{float(row['mean']) / GRAVITY:.1f}"]
             cells += [f"{often:.1f}", f"{nominal / worst:.2g}", number(float(row["mount"]) / GRAVITY, 3)]
             rows.append([*cells, percent(rise_of(row))])
-        return [marked_table(head, rows), *said(verdicts(data))]
+        return [marked_table(head, rows), *statement_table(verdicts(data))]
 
     @staticmethod
     def picture(data: xr.Dataset) -> p.Picture:

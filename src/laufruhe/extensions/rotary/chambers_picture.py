@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator
 
 from laufruhe.extensions.rotary.chambers import rotor_chambers, rotors_of
-from laufruhe.plots.style import GREEN, ORANGE, SKY, entry, headed, page, styled
-from laufruhe.plots.words import FAINT, INK, aligned
+from laufruhe.plots.style import GREEN, ORANGE, SKY, entry, finish_page, page, styled
+from laufruhe.plots.words import FAINT, INK, align_labels
 from laufruhe.present.measures import hardest_point
 from laufruhe.solvers.result import Result
 
@@ -40,12 +40,12 @@ def figure(result: Result) -> Figure:
         axes.set(xlim=(0.0, degrees[-1]), ylabel=label)
         axes.xaxis.set_major_locator(MultipleLocator(180.0))
         axes.tick_params(labelbottom=axes is drawn.panels[-1], length=2)
-    aligned(drawn.panels)
+    align_labels(drawn.panels)
     drawn.panels[-1].set_xlabel("angle of the eccentric shaft [°]")
     legend = [entry(f"chamber {k + 1}", color=colour, linewidth=2.0) for k, colour in enumerate(COLOURS)]
     legend += [] if found.torque is None else [entry("all", color=INK, linewidth=2.0)]
     lines = f"{part.name[:1].upper()}{part.name[1:]} at {point.name}; each chamber fires a turn after the one before."
-    return headed(drawn, result, "Chambers of a rotor", lines, legend)
+    return finish_page(drawn, result, "Chambers of a rotor", lines, legend)
 
 
 def _lines(axes: Axes, degrees: np.ndarray, values: np.ndarray) -> None:

@@ -33,4 +33,4 @@ def _has_rotors(result: Result) -> bool:
     return bool(rotors_of(result.final.engine))
 
 
-SECTION = Section("rotary", _has_rotors, sheets={"chambers": (_has_rotors, _chambers)})
+SECTION = Section("rotary", _has_rotors, number_tables={"chambers": (_has_rotors, _chambers)})

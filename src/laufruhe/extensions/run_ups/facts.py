@@ -5,7 +5,7 @@ from __future__ import annotations
 from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.extensions.run_ups.runs import RunUp, point_of, runs_of
 from laufruhe.machine import OperatingPoint
-from laufruhe.present.mounting import critical_speed, driven, facts_of, is_elastic, main_order
+from laufruhe.present.mounting import critical_speed, excited_frequencies, facts_of, is_elastic, main_order
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result
@@ -27,7 +27,7 @@ def run_of(result: Result) -> Run:
         return given
     facts = facts_of(result.final)
     top = max(point.speed for point in result.problem.points)
-    critical = [critical_speed(frequency, main_order(facts)) for frequency in driven(facts)]
+    critical = [critical_speed(frequency, main_order(facts)) for frequency in excited_frequencies(facts)]
     last = BEYOND * max((speed for speed in critical if speed <= REACH_OVER * top), default=top)
     return Run(last, SECONDS, SECONDS)
 

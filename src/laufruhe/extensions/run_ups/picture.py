@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from laufruhe.extensions.run_ups.channels import FORCE, TRAVEL, TWIST
 from laufruhe.extensions.run_ups.facts import run_of, run_point, runs_up, shown_runs
 from laufruhe.plots.speed_axis import LIMIT, limits_on
-from laufruhe.plots.style import entry, headed, page, series_of, styled
+from laufruhe.plots.style import entry, finish_page, page, series_of, styled
 from laufruhe.plots.words import INK
 from laufruhe.present.numbers import RPM
 from laufruhe.present.numbers import figure as words
@@ -49,4 +49,4 @@ def figure(result: Result) -> Figure:
     legend += [entry(name, color=INK, linestyle=style) for style, name in _RUNS]
     times = f"{run.up:g} s" if run.up == run.down else f"{run.up:g} s up and {run.down:g} s down"
     lines = f"On any mount, in {times} at constant acceleration; loads of {run_point(result).name}."
-    return headed(drawn, result, "Through resonance", lines, legend)
+    return finish_page(drawn, result, "Through resonance", lines, legend)

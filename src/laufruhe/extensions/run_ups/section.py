@@ -9,7 +9,7 @@ import numpy as np
 
 from laufruhe.extensions.run_ups.facts import run_of, run_point, runs_up, shown_runs
 from laufruhe.extensions.run_ups.machine import Run
-from laufruhe.present.measures import has_loads, loaded
+from laufruhe.present.measures import designs_with_loads, has_loads
 from laufruhe.present.numbers import RPM, figure
 from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
@@ -46,7 +46,7 @@ def _record(result: Result) -> dict[str, Any]:
 def _over_speed(result: Result) -> Table:
     rows = [
         [design, way, RPM * speed, force, travel, math.degrees(twist)]
-        for design, found in loaded(result).items()
+        for design, found in designs_with_loads(result).items()
         for way, run in zip(("run-up", "shut-down"), shown_runs(result, found), strict=True)
         for speed, force, travel, twist in np.column_stack([run.speeds, run.force, run.travel, run.twist]).tolist()
     ]

@@ -1,4 +1,4 @@
-"""What a page is answered, worked out in a process of its own: an optimum that follows, then the proven one."""
+"""Answers to a page's requests, computed in worker processes: fast optimum, then proven optimum."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Any, Concatenate, ParamSpec
 from laufruhe.errors import Complaint, InputError, LaufruheError, ModelError, SolverError, refused
 from laufruhe.extensions.served_page import serialise
 from laufruhe.extensions.served_page.claims import (
-    Simpler,
+    Simplification,
     breaks_words,
     conflict_claim,
     given_claim,
@@ -22,7 +22,7 @@ from laufruhe.extensions.served_page.claims import (
     settled_claim,
 )
 from laufruhe.extensions.served_page.controls import as_json, as_typed, controls_of, offered_by
-from laufruhe.extensions.served_page.fixed_values import held_by, ranking_of
+from laufruhe.extensions.served_page.fixed_values import fixing_edits, ranking_of
 from laufruhe.extensions.served_page.page_state import CRANK, LATER, STAR, Edit, PageState
 from laufruhe.extensions.served_page.pareto import ParetoFront, partners, places
 from laufruhe.extensions.served_page.scenes import scene_of
@@ -36,7 +36,7 @@ from laufruhe.present.pictures import PICTURES
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
-from laufruhe.report.web_page import inlined
+from laufruhe.report.web_page import data_address
 from laufruhe.solvers import solve
 from laufruhe.solvers.conclusion import decision_values, limit_values
 from laufruhe.solvers.result import Result
@@ -202,7 +202,7 @@ def picture(source: Source, state: PageState, k: int) -> dict[str, Any]:
     names = [] if result is None else plots.names(result)
     if result is None or k >= len(names):
         return {"done": True}
-    image = inlined(as_svg(plots.figure(result, names[k])))
+    image = data_address(as_svg(plots.figure(result, names[k])))
     return {"name": names[k], "caption": PICTURES[names[k]].caption, "image": image, "of": len(names)}
 
 
@@ -213,11 +213,11 @@ def _settled(result: Result, tables: Mapping[str, Any], position: int) -> dict[s
         **serialise.answer(claim, result.limits, result.problem, result.conflict),
         "design": {entry.name: entry.value for entry in result.decisions} if has_design else None,
         "ranking": ranking_of(result),
-        "holds": held_by(result, tables),
+        "holds": fixing_edits(result, tables),
     }
 
 
-def _front(source: Source, state: PageState, across: str) -> tuple[ParetoFront, Simpler]:
+def _front(source: Source, state: PageState, across: str) -> tuple[ParetoFront, Simplification]:
     tables, whole_problem = _requested(source, state, with_held=True)
     scene = scene_of(whole_problem, tables, source.content)
     problem = replace(scene.problem, limits=whole_problem.limits)

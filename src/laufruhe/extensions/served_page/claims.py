@@ -35,7 +35,7 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True)
-class Simpler:
+class Simplification:
     """Simplifications behind a moving slider; false without any.
 
     Attributes
@@ -55,11 +55,11 @@ class Simpler:
     @property
     def phrase(self) -> str:
         """Words that follow a number, with a blank before them."""
-        fixed = f" for {listed(self.held)}" if self.held else ""
-        return f"{fixed} without {listed(self.left_out)}" if self.left_out else fixed
+        fixed = f" for {join_phrases(self.held)}" if self.held else ""
+        return f"{fixed} without {join_phrases(self.left_out)}" if self.left_out else fixed
 
 
-WHOLE = Simpler()
+WHOLE = Simplification()
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class Claim:
     Attributes
     ----------
     kind
-        How strong it is.
+        Strength of the claim.
     position
         Number of the page's settings that it is about: a claim about other settings is never shown as one about these.
     lead, words
@@ -81,7 +81,7 @@ class Claim:
     breaks
         Limits that the design breaks, in words; empty where it keeps all that are known.
     is_last
-        Whether nothing more is being solved for these settings.
+        True if the solution for these settings is complete.
     """
 
     kind: Kind
@@ -117,7 +117,7 @@ def breaks_words(limits: Iterable[LimitValue]) -> str:
 
 
 def preview_claim(
-    position: int, problem: Problem, value: float, simpler: Simpler, limits: Iterable[LimitValue]
+    position: int, problem: Problem, value: float, simpler: Simplification, limits: Iterable[LimitValue]
 ) -> Claim:
     """Return the claim about a design that follows a slider.
 
@@ -126,9 +126,9 @@ def preview_claim(
     value
         Objective of the design [SI].
     simpler
-        What makes the problem that was decided simpler than the whole one.
+        Simplifications of the decided problem.
     limits
-        How the design stands to all limits of the whole problem.
+        Values of the design for all limits of the whole problem.
     """
     kind = Kind.HELD if simpler else Kind.ESTIMATE
     lead = f"Estimate {figure(value, problem.objective_unit or '')}"
@@ -146,9 +146,11 @@ def given_claim(position: int, problem: Problem, value: float | None, limits: It
     return Claim(Kind.GIVEN, position, lead, words, value, "the design as given", breaks_words(limits))
 
 
-def conflict_claim(position: int, names: Sequence[str], simpler: Simpler = WHOLE, is_last: bool = False) -> Claim:
+def conflict_claim(
+    position: int, names: Sequence[str], simpler: Simplification = WHOLE, is_last: bool = False
+) -> Claim:
     """Return the claim that no design keeps these limits together: found for a simpler problem, or the last word."""
-    names_text = listed([f"'{name}'" for name in names])
+    names_text = join_phrases([f"'{name}'" for name in names])
     why = f"{names_text} contradict each other" if len(names) > 1 else f"{names_text} cannot be met within the bounds"
     lead = "No design exists:" if is_last else "No design found:"
     return Claim(Kind.NO_DESIGN, position, lead, f"{why}{simpler.phrase}. Move one of the limits", is_last=is_last)
@@ -186,7 +188,7 @@ def _gap_words(certificate: Certificate, least: str) -> str:
     return f"{least} (gap {number(100.0 * certificate.gap, 2)} %{local})"
 
 
-def listed(phrases: Sequence[str]) -> str:
+def join_phrases(phrases: Sequence[str]) -> str:
     """Return phrases as one, with commas and "and" before the last."""
     *first, last = phrases
     return f"{', '.join(first)} and {last}" if first else last

@@ -1,4 +1,4 @@
-"""What of a problem a page may change that loads are not affine in: one control each, with the ends of its slider."""
+"""Controls of a page for numbers that loads are not affine in, with the ranges of their sliders."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ class Control:
     Attributes
     ----------
     way, name
-        Of the edit that moves it.
+        Kind and name of the edit that moves it.
     group, label
-        Where it stands on the page, and what it is called.
+        Group on the page, and label.
     value, low, high
-        In `unit`, as a file has it.
+        Value and range in `unit`, as in a file.
     open
-        Whether it is decided unless it is held.
+        True if it is decided unless the page fixes it.
     """
 
     way: str

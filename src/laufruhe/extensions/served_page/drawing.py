@@ -15,7 +15,7 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers.prices import angle_name
 
 STEPS = 72
-"""Over one turn of the crank."""
+"""Steps over one turn of the crank."""
 _MOST_PARTS = 48
 
 
@@ -43,7 +43,7 @@ def _steps(cycle: float) -> int:
 @lru_cache(maxsize=4)
 def _parts(parts: tuple[SliderCrank, ...], cycle: float) -> list[dict[str, Any]]:
     angles = np.arange(_steps(cycle)) * cycle / _steps(cycle)
-    return [_part([Pose.of(part, float(phi)) for phi in angles]) for part in parts]
+    return [_part([Pose.at_angle(part, float(phi)) for phi in angles]) for part in parts]
 
 
 def _part(poses: list[Pose]) -> dict[str, Any]:

@@ -26,7 +26,7 @@ class FileWatcher:
     Parameters
     ----------
     path
-        Of a problem that can be read (`InputError` else).
+        Path of a valid problem file (`InputError` otherwise).
     """
 
     def __init__(self, path: Path) -> None:

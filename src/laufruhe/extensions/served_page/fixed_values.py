@@ -1,4 +1,4 @@
-"""What of a solution stays where it is while sliders move what loads are affine in: cranks, and all other numbers."""
+"""Values of a solution that stay fixed while sliders move affine numbers: cranks and all others."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import RankedOrder, RankedStar
 
 _DIGITS = 9
-"""Of an angle in degrees: steps of a turn are found again from them."""
+"""Decimals of an angle in degrees, enough to recover steps of a turn."""
 
 
-def held_by(result: Result, tables: Mapping[str, Any]) -> list[list[Any]]:
+def fixing_edits(result: Result, tables: Mapping[str, Any]) -> list[list[Any]]:
     """Return edits that fix the numbers that are not affine; empty without any, or if one cannot be fixed."""
     edits_: list[list[Any]] = []
     if result.phasing is not None and result.phasing.ranking:

@@ -26,7 +26,7 @@ from laufruhe.solvers.cones.tie_break import break_ties
 from laufruhe.solvers.cones.unbalances import smallest_conflict
 
 FEW_ANGLES = 48
-"""Over the period of the loads, where the problem itself takes more."""
+"""Number of samples over the period of the loads, if the problem uses more."""
 TIMES = 2
 _FOLLOWED = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
 
@@ -38,13 +38,13 @@ class Optimum:
     Attributes
     ----------
     values
-        Of the decisions; empty where no design exists.
+        Values of the decisions; empty without a design.
     value, bound
         Objective at the angles looked at, and what no design allowed goes under [SI].
     gap
         Share of the value that is not proven.
     standing, prices
-        Of every limit in turn the value of its measure, and the fall of the objective per unit by which it is relaxed.
+        Value of every limit's measure, and its shadow price.
     conflict
         Names of limits that cannot be met together, proven for the whole cycle.
     """
@@ -76,7 +76,7 @@ class Follower:
     Parameters
     ----------
     problem
-        That `can_follow`.
+        Problem that satisfies `can_follow`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Who may ask: a page that this server handed out, opened by the address that the command printed, on this machine."""
+"""Access control: only pages of this server, opened on this machine by the printed address."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-"""Of every answer: nothing is loaded from elsewhere, framed, kept, or told of to others."""
+"""Headers of every answer: no foreign content, no frames, no cache, no referrer."""
 
 
 class Guard:

@@ -46,14 +46,14 @@ class LatestWorker:
         Parameters
         ----------
         seconds
-            After which it is ended.
+            Time limit of the work.
 
         Raises
         ------
         Superseded
-            Where a newer request came before the answer.
+            If a newer request came before the answer.
         Late
-            Where time is over.
+            If the work exceeds `seconds`.
         """
         mine, workers = self._turn()
         try:

@@ -1,4 +1,4 @@
-"""What a page asks for: numbers of the problem changed by name, of those only that it was offered."""
+"""State of a page as its requests carry it: changes of offered numbers, by name."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from laufruhe.files.complaints import Refused
 Tables: TypeAlias = Mapping[str, Any]
 
 MOST_EDITS, LONGEST, MOST_ENTRIES = 300, 100, 96
-"""Of one request; characters of a text; entries of a list."""
+"""Largest number of edits in a request, of characters in a text, of entries in a list."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class PageState:
     Attributes
     ----------
     edits
-        That the user made.
+        Edits by the user.
     held
         Open numbers that stay where the last whole solution had them, while what is affine follows a slider.
     design

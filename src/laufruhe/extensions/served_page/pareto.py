@@ -18,7 +18,7 @@ POINTS = 25
 _USUAL = ("maximum mount force", "mean mount force", "rms shaking force", "rms rocking couple", "counterweight mass",
           "balancer mass", "maximum main-bearing force")  # fmt: skip
 _NARROW = 1e-3
-"""Of the whole range: ends that are nearer have nothing between them."""
+"""Relative width of a range that is too narrow for points between its ends."""
 
 
 def partners(problem: Problem) -> dict[str, Measure]:

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any
 
 from laufruhe.errors import ModelError
-from laufruhe.extensions.served_page.claims import Simpler, listed
+from laufruhe.extensions.served_page.claims import Simplification, join_phrases
 from laufruhe.extensions.served_page.drawing import drawing_of
 from laufruhe.extensions.served_page.follower import Follower, Optimum, can_follow
 from laufruhe.extensions.served_page.pareto import partners
@@ -96,7 +96,7 @@ class Scene:
         about = {"engine": drawing_of(self.problem), "partners": list(partners(self.problem))}
         return {**about, "unshown": model.why_not} if model.why_not else {**about, "model": model.as_json()}
 
-    def simpler(self, fixed_kinds: Collection[Kind]) -> Simpler:
+    def simpler(self, fixed_kinds: Collection[Kind]) -> Simplification:
         """Return what is fixed or left out while sliders move.
 
         Parameters
@@ -112,10 +112,10 @@ class Scene:
         left_out = [
             *(extra.words for extra in problem.extras),
             *(["later objectives"] if problem.ranks else []),
-            *([f"the limit{'s' if len(unread) > 1 else ''} on {listed(unread)}"] if unread else []),
+            *([f"the limit{'s' if len(unread) > 1 else ''} on {join_phrases(unread)}"] if unread else []),
         ]
         phrases = dict.fromkeys(STILL.get(kind, f"the {kind.words}") for kind in sorted(kinds))
-        return Simpler(tuple(phrases), tuple(left_out))
+        return Simplification(tuple(phrases), tuple(left_out))
 
     def _reads(self, limit: Limit) -> bool:
         moved = depends(limit.measure.channel, kinds_of(self.problem), self.problem)

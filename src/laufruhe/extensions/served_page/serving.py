@@ -28,7 +28,7 @@ from laufruhe.present.pictures import PICTURES
 P = ParamSpec("P")
 
 USUAL_PORT = 8537
-"""Where links of yesterday lead, unless another page is served there."""
+"""Default port, so that old links keep working."""
 FOLLOWED, GRACE = 30.0, 60.0
 """Seconds for an answer while a slider moves, and beyond those that a search may take."""
 HEARTBEAT = 1.0
@@ -41,11 +41,11 @@ class Page:
     Parameters
     ----------
     path
-        Of the problem.
+        Path of the problem file.
     port
-        To listen on; the usual one, or any that is free, when None.
+        Port; None takes the usual one, or a free one.
     seconds
-        That a search may take.
+        Time limit of a search.
     """
 
     def __init__(self, path: Path, port: int | None, seconds: float) -> None:

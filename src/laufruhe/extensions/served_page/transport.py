@@ -42,7 +42,7 @@ class Server(ThreadingHTTPServer):
     Parameters
     ----------
     port
-        To listen on; any that is free when 0.
+        Port; 0 takes a free one.
     files
         Texts that are handed out, by their names.
     """

@@ -14,9 +14,9 @@ from laufruhe.extensions.torsion.channels import TORSIONAL_FREQUENCIES
 from laufruhe.extensions.torsion.facts import TorsionFacts, facts_of, is_twisted, speed_range
 from laufruhe.extensions.torsion.physics import chain_of
 from laufruhe.plots.speed_axis import LIMIT, limits_on, mark_points
-from laufruhe.plots.style import AFTER, GREEN, ORANGE, entry, entry_of_dots, headed, page, styled
-from laufruhe.plots.words import FAINT, INK, SMALL, fitted, spread
-from laufruhe.present.measures import changed
+from laufruhe.plots.style import AFTER, GREEN, ORANGE, entry, entry_of_dots, finish_page, page, styled
+from laufruhe.plots.words import FAINT, INK, SMALL, fit_line, spread
+from laufruhe.present.measures import is_changed
 from laufruhe.present.numbers import RPM, number
 from laufruhe.solvers.result import Result
 
@@ -42,9 +42,9 @@ def figure(result: Result) -> Figure:
     ]
     legend += [entry("main order", color=INK, linewidth=1.4), entry("other order", color=FAINT, linewidth=0.6)]
     legend.append(entry_of_dots("vector sum of an order and mode", color=INK, markersize=6.0))
-    which = "of the design as decided" if changed(result) else "as given"
+    which = "of the design as decided" if is_changed(result) else "as given"
     lines = f"Natural modes {which}, and where an order meets them: the larger the dot, the more cylinders add up."
-    return headed(drawn, result, "Torsional vibration of the crankshaft", lines, legend)
+    return finish_page(drawn, result, "Torsional vibration of the crankshaft", lines, legend)
 
 
 def _shapes(axes: Axes, facts: TorsionFacts, names: list[str]) -> None:
@@ -54,7 +54,7 @@ def _shapes(axes: Axes, facts: TorsionFacts, names: list[str]) -> None:
         axes.plot(places, facts.modes.shapes[:, m], "o-", color=COLOURS[m], linewidth=1.6, markersize=4.0)
     axes.set(ylim=(-1.1, 1.1), ylabel="swing, the largest of a mode is 1")
     every = -(-len(names) // MOST_NAMES)
-    shown = [fitted(name, 1.1) if k % every == 0 else "" for k, name in enumerate(names)]
+    shown = [fit_line(name, 1.1) if k % every == 0 else "" for k, name in enumerate(names)]
     axes.set_xticks(list(places), shown, rotation=60, ha="right", rotation_mode="anchor")
 
 

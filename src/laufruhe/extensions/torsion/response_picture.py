@@ -10,7 +10,7 @@ from matplotlib.patches import Patch
 from laufruhe.extensions.torsion.facts import barred_ranges, is_twisted, speed_range, speeds_between, torque_over_speed
 from laufruhe.extensions.torsion.physics import chain_of
 from laufruhe.plots.speed_axis import LIMIT, mark_points
-from laufruhe.plots.style import entry, headed, page, series_of, styled
+from laufruhe.plots.style import entry, finish_page, page, series_of, styled
 from laufruhe.plots.words import FAINT
 from laufruhe.present.numbers import RPM, number
 from laufruhe.solvers.result import Result
@@ -51,4 +51,4 @@ def figure(result: Result) -> Figure:
              ylabel="alternating torque [N m]")  # fmt: skip
     mark_points(axes, result)
     lines = "Half of the peak to peak torque in the section that has most of it, steady at every speed."
-    return headed(drawn, result, "Twist of the crankshaft over speed", lines, legend)
+    return finish_page(drawn, result, "Twist of the crankshaft over speed", lines, legend)

@@ -20,7 +20,7 @@ from laufruhe.extensions.torsion.facts import (
     torque_over_speed,
 )
 from laufruhe.extensions.torsion.physics import absorber_heat, chain_of
-from laufruhe.present.measures import changed
+from laufruhe.present.measures import is_changed
 from laufruhe.present.numbers import DASH, RPM, number
 from laufruhe.present.tables import Table
 from laufruhe.report.section import Section
@@ -33,7 +33,7 @@ def _tables(result: Result) -> list[Table]:
     """Modes, the critical speeds that twist it most, before and after, and barred ranges."""
     reach = speed_range(result)
     before, after = facts_of(result.initial, *reach), facts_of(result.final, *reach)
-    criticals = [_criticals(before, "as given"), *([_criticals(after, "as decided")] if changed(result) else [])]
+    criticals = [_criticals(before, "as given"), *([_criticals(after, "as decided")] if is_changed(result) else [])]
     return [_modes(result, after), *criticals, _barred(result)]
 
 

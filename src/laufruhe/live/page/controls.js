@@ -1,10 +1,10 @@
-// Sliders, and the measures beside them. They show a state, and tell what was typed or slid.
+// Sliders, and the measures beside them: they display a state and report input.
 
 const STEPS = 1000;
 
 /** A range and a number field of one value. */
 class Slider {
-  /** @param refuse told why a number that was typed is not taken; empty where it is */
+  /** @param refuse called with the reason for refusing a typed number; empty if accepted */
   constructor(field, marks, told, refuse) {
     Object.assign(this, { field, refuse });
     const { name, unit, lower, upper } = field, id = `live-${name.replace(/[^\w-]/g, "-")}`;
@@ -30,7 +30,7 @@ class Slider {
       element("label", { for: id }, name, ends), this.rail, entry);
   }
 
-  /** Where a known design stands. */
+  /** Mark the value of a known design. */
   setMark(kind, value) {
     const { lower, upper } = this.field;
     if (value === undefined) {
@@ -39,7 +39,7 @@ class Slider {
     }
     const made = this.marks[kind] ??= element("i", { class: `live-mark ${kind}`, "aria-hidden": "true" });
     if (!made.parentNode) this.rail.append(made);
-    // the middle of a thumb runs from one half of it to the other
+    // the centre of a thumb moves from half its width to the end less half its width
     made.style.left = `calc(8px + (100% - 16px) * ${(value - lower) / (upper - lower || 1)})`;
   }
 
@@ -72,7 +72,7 @@ class Slider {
     if (!this.editing) this.write();
   }
 
-  /** Write the value into the number field. A field in which somebody types keeps its text until then. */
+  /** Write the value into the number field, unless the user is typing in it. */
   write() {
     this.editing = false;
     this.number.value = trimmed(this.value * this.field.unit.factor, 4);
@@ -80,7 +80,7 @@ class Slider {
   }
 }
 
-/** Rows of limits: value, edge, and how much of the room is used. */
+/** Rows of limits: value, edge, and the used share of the limit. */
 class Limits {
   constructor(measures) {
     this.rows = measures.map((measure) => this.row(measure));
@@ -117,7 +117,7 @@ function button(what, text, title, pressed) {
   return made;
 }
 
-/** One of several to choose from. */
+/** A choice of several options. */
 function choice(name, texts, first, chosen) {
   const list = texts.map((text, k) => {
     const input = element("input", { type: "radio", name, value: k, checked: k === first });

@@ -1,4 +1,4 @@
-// The design that is shown: one number for every slider, what was shown before, and the address.
+// The displayed design: one number per slider, the history, and the address.
 
 /** Numbers of the sliders by name: sizes, and angles where they are open. */
 function fields(model) {
@@ -23,7 +23,7 @@ function vectorOf(model, values) {
   return x;
 }
 
-/** The design of a decision vector; the angle of nothing is the least. */
+/** The design of a decision vector; a zero size has its smallest angle. */
 function valuesOf(model, x) {
   const values = {};
   for (const slider of model.sliders) {
@@ -36,7 +36,7 @@ function valuesOf(model, x) {
   return values;
 }
 
-/** Values within the bounds of a model; those that it lacks are its own. */
+/** Values clipped to the bounds of a model; missing ones are the model's. */
 function fitting(model, values, otherwise) {
   const out = { ...otherwise };
   for (const { name, lower, upper } of fields(model)) {
@@ -46,13 +46,13 @@ function fitting(model, values, otherwise) {
   return out;
 }
 
-/** States that can be gone back to. */
+/** Undo history. */
 class History {
   constructor(first) { this.states = [first]; this.at = 0; }
   get now() { return this.states[this.at]; }
   get canUndo() { return this.at > 0; }
   get canRedo() { return this.at < this.states.length - 1; }
-  /** A new state, unless it is the same. */
+  /** Add a state, unless it equals the current one. */
   add(state) {
     if (JSON.stringify(state) === JSON.stringify(this.now)) return;
     this.states = [...this.states.slice(0, this.at + 1), state].slice(-200);
@@ -64,7 +64,7 @@ class History {
 
 const KEY = "d";
 
-/** The design in the address; null where there is none. Other keys are left alone. */
+/** The design in the address, or null; other keys stay. */
 function fromAddress() {
   const text = new URLSearchParams(location.hash.slice(1)).get(KEY);
   if (!text) return null;
@@ -74,7 +74,7 @@ function fromAddress() {
   }));
 }
 
-/** Put a design into the address, in full precision; without one, take it out. */
+/** Write a design into the address in full precision, or remove it. */
 function toAddress(values) {
   const rest = new URLSearchParams(location.hash.slice(1));
   rest.delete(KEY);
@@ -94,7 +94,7 @@ function savedText(model, values) {
   return `# Saved from the live report of ${model.file}.\n${model.save.note ? `# ${model.save.note}\n` : ""}${text}`;
 }
 
-/** A number as TOML has it: 1e-7 is one, 1e+21 as well. */
+/** A number in TOML syntax. */
 function tomlNumber(value) {
   return String(value);
 }

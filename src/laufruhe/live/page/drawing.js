@@ -27,7 +27,7 @@ function download(text, name) {
   setTimeout(() => URL.revokeObjectURL(href), 1000);
 }
 
-/** A picture that readers aloud know by its label. */
+/** A picture with a label for screen readers. */
 function picture(width, height, label) {
   return drawn("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", "aria-label": label });
 }
@@ -39,7 +39,7 @@ function label(x, y, text, anchor = "middle", kind = "tick") {
 
 const FINE = 10;
 
-/** A path through points, x and y of every index, in tenths: whole numbers are quick to write and to read. */
+/** A path through points, in integer tenths, which are fast to write and parse. */
 function pathOf(count, x, y, isClosed = false) {
   const parts = new Array(count);
   for (let i = 0; i < count; i++) parts[i] = `${Math.round(FINE * x(i))} ${Math.round(FINE * y(i))}`;
@@ -51,12 +51,12 @@ function line(kind) {
   return drawn("path", { class: kind, transform: `scale(${1 / FINE})`, "vector-effect": "non-scaling-stroke" });
 }
 
-/** So many even steps of a longer row, for drawing. */
+/** A row thinned to a number of equal steps. */
 function thinned(length, most) {
   return Math.max(1, Math.ceil(length / most));
 }
 
-/** Colour of a place. */
+/** Colour of the k-th place. */
 function colour(k) {
   return `s${k % 8}`;
 }
@@ -64,7 +64,7 @@ function colour(k) {
 /** A scale that grows with what is drawn, and shrinks only when it is far too large. */
 class Scale {
   constructor() { this.top = 0; }
-  /** Whether it has changed. */
+  /** Update the scale; return true if it changed. */
   follow(value) {
     const stays = this.top > 0 && value <= this.top && value >= 0.3 * this.top;
     if (stays) return false;

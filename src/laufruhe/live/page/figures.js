@@ -1,11 +1,11 @@
-// The figures of a page. Each is made once, and follows a design by `update`.
+// Figures of a page, created once and updated with the design.
 
 const POINTS = 360;
-// times as many steps, among which results seek maxima of a place (M6)
+// refinement of the samples in which maxima are sought (M6)
 const FINER = 8;
 
 /**
- * What is drawn of a load at one design: per place its rows at every step, its mean and its peak.
+ * Drawing data of a load at one design: per place its rows at every step, mean and peak.
  * @returns {{length: number, places: {name: string, rows: Float64Array[], lengths: Float64Array, mean: number, most: number}[]}}
  */
 function drawnOf(signal, k, x) {
@@ -19,7 +19,7 @@ function drawnOf(signal, k, x) {
   return { length: gridOf(signal, 1).points[k].length, places };
 }
 
-/** The same in arrays of its own. */
+/** A copy with its own arrays. */
 function keptOf(signal, k, x) {
   const { length, places } = drawnOf(signal, k, x);
   const copied = ({ lengths, rows }) => ({ lengths: lengths.slice(), rows: rows.map((row) => row.slice()) });
@@ -31,7 +31,7 @@ function peakOf(now, was) {
   return Math.max(largest(now.places.map((place) => place.most)), largest(was.places.map((place) => place.most)));
 }
 
-/** A figure of a design beside another, whose lines and marks are drawn when these or the scale change. */
+/** A figure of a design and a reference, which is redrawn when it or the scale changes. */
 class Compared {
   constructor(signal, was, key, title) {
     Object.assign(this, { signal, was, key, title, scale: new Scale(), isNew: true });
@@ -42,7 +42,7 @@ class Compared {
     this.isNew = true;
   }
 
-  /** Whether more than the design has to be drawn. */
+  /** Return true if the reference or the scale must be redrawn. */
   follow(now) {
     const isNew = this.scale.follow(peakOf(now, this.was)) || this.isNew;
     this.isNew = false;
@@ -87,7 +87,7 @@ class Polar extends Compared {
     });
   }
 
-  /** Components to the left and up; of two these. */
+  /** Components to the left and up. */
   across(place) {
     return place.rows.slice(-2);
   }
@@ -98,7 +98,7 @@ class Polar extends Compared {
   }
 }
 
-/** Size over the crank angle, a line for every place; of one component with its sign. */
+/** Magnitude over the crank angle, a line per place; a single component with its sign. */
 class OverAngle extends Compared {
   constructor(signal, was, width) {
     super(signal, was, "angle", `${signal.parts > 1 ? "Size" : "Value"} over the crank angle [${signal.shown}]`);
@@ -183,7 +183,7 @@ class Bars extends Compared {
 
 const MOST_ORDERS = 12;
 
-/** Amplitude of every order that counts in one of the designs known, a bar for every place. */
+/** Amplitudes of the largest orders of all known designs, a bar per place. */
 class Orders {
   constructor(signal, k, designs) {
     Object.assign(this, { signal, point: signal.points[k], scale: new Scale() });
@@ -196,7 +196,7 @@ class Orders {
     this.root.append(drawn("path", { d: "M44 160H410", class: "axis" }), this.top, label(227, 188, "order of crank speed"));
   }
 
-  /** Orders above a share of the largest of one of the designs, each beside its own; of these the largest. */
+  /** The largest orders above a share of the largest amplitude. */
   counted(designs) {
     const { signal, point } = this, all = ordersOf(signal, point), share = all.map(() => 0);
     for (const x of designs) {
@@ -236,7 +236,7 @@ class Orders {
   }
 }
 
-/** Figures of a load that follow its rows; a path where it is a force or a couple across the crank. */
+/** Figures of a load; with a path for a force or a couple across the crank. */
 function forcesOf(signal, was, width) {
   const isPath = signal.parts > 1 && signal.unit.startsWith("N");
   return [...(isPath ? [new Polar(signal, was)] : []), new OverAngle(signal, was, width), new Bars(signal, was)];

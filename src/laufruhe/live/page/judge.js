@@ -1,6 +1,6 @@
-// What is known of a design: every measure, how it stands to its limits, and how good it is against the optimum.
+// Evaluation of a design: measures, limits, and comparison with the optimum.
 
-// relative excess over a limit that counts as none, and difference of objectives that are told as one
+// relative tolerance of limits, and relative difference below which objectives count as equal
 const KEPT = 1e-5, AT = 5e-5;
 
 /** A model with its numbers. */
@@ -9,14 +9,14 @@ async function opened(model) {
   return { ...model, signals: model.signals.map((signal) => decoded(signal, block)) };
 }
 
-/** All measures at a decision vector, in their order; rows of one signal are taken once. */
+/** All measures at a decision vector; rows of a signal are computed once. */
 function measured(model, x) {
   return model.measures.map(({ signal, norm, refinement, value }) => {
     return signal === null ? value : NORMS[norm](rowsAt(model.signals[signal], refinement, x));
   });
 }
 
-/** How a value stands to a limit: the side that has least room, and whether it is kept; null where that is not known. */
+/** The tighter side of a limit, and whether it is kept; null if unknown. */
 function standing(measure, value, isKnown) {
   const { sides } = measure;
   const room = ([sense, edge]) => (sense === "at most" ? edge - value : value - edge) / (Math.abs(edge) || 1);
@@ -30,14 +30,14 @@ function ofRole(model, role) {
 }
 
 /**
- * What is known of one design: objective, limits, and what is minimised after it.
+ * Values of one design: objective, limits, and later objectives.
  * @param {{values: object, objective: number | null, limits: object}} told what the exact model says of one design
  */
 function judged(model, values, told) {
   return judgedAt(model, vectorOf(model, values), isSame(model, values, told.values) ? told : null);
 }
 
-/** The same of a decision vector, and of what does not follow where that is told of it. */
+/** Values at a decision vector, with those that the server evaluated. */
 function judgedAt(model, x, told = null) {
   const found = measured(model, x), value = (measure) => found[model.measures.indexOf(measure)];
   const known = (measure) => (measure.followed ? undefined : told?.limits[measure.name]) ?? value(measure);
@@ -50,12 +50,12 @@ function judgedAt(model, x, told = null) {
   };
 }
 
-/** Designs that came with the model: their vectors, and what the exact model measures of them. */
+/** Designs of the model: vectors, and measures by the exact model. */
 function designsOf(model) {
   return Object.values(model.designs).map(({ x, measured: told }) => ({ x: Float64Array.from(x), told }));
 }
 
-/** Largest difference between the page's own numbers and those of the exact model, over the largest of each measure. */
+/** Largest relative difference between the page's numbers and those of the exact model. */
 function difference(model) {
   const designs = designsOf(model).map(({ x, told }) => ({ own: measured(model, x), told }));
   return largest(model.measures.map((_, k) => {
@@ -64,12 +64,12 @@ function difference(model) {
   }));
 }
 
-/** Largest objective of the designs that came with the model. */
+/** Largest objective of the model's designs. */
 function sizeOf(model) {
   return largest(designsOf(model).map(({ x }) => judgedAt(model, x).objective ?? 0));
 }
 
-/** Whether two designs are one, but for roundings. */
+/** Return true if two designs are equal within rounding. */
 function isSame(model, values, others) {
   const x = vectorOf(model, values), y = vectorOf(model, others);
   const size = largest(model.sliders.map((slider) => slider.upper - slider.lower));
@@ -77,7 +77,7 @@ function isSame(model, values, others) {
 }
 
 /**
- * How an objective stands to that of the reference, in words.
+ * Compare an objective with that of the reference, in words.
  * @param {{value: number, name: string}} reference
  * @param told of an objective
  * @param {{value: number, isNothing: boolean, isReference: boolean, isBroken: boolean, unknown: string[]}} at the objective,
@@ -92,21 +92,21 @@ function against(reference, told, at) {
   return `${at.isNothing ? `${told(less)} more than` : `${percent(less / reference.value)} against`} ${best}.${aside}`;
 }
 
-/** Number of the curve that the objective is of; else the first. */
+/** Index of the objective's curve, or 0. */
 function ownCurve(model) {
   const asked = model.measures.find((measure) => measure.role === "objective" && measure.signal !== null);
   const name = (curve) => model.signals[curve.signal].name;
   return Math.max(model.curves.findIndex((curve) => asked && name(curve) === model.signals[asked.signal].name), 0);
 }
 
-/** Names that have the same to be said of them. */
+/** Group names with equal sentences. */
 function grouped(unmoved) {
   const by = new Map();
   for (const { name, why } of unmoved) by.set(why, [...(by.get(why) ?? []), name]);
   return [...by].map(([why, names]) => ({ why, names }));
 }
 
-/** SI unit, the one that is shown, and its factor. */
+/** SI unit, displayed unit, and factor. */
 function unitOf({ unit, shown, factor }) {
   return { unit, shown, factor };
 }

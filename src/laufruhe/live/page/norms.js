@@ -1,4 +1,4 @@
-// Norms of rows, by the names of problem files. Each takes what `rowsAt` gives, and says one number.
+// Norms of rows by their names in problem files: functions of the result of `rowsAt`.
 
 /** Sum of a function over all lengths of a point. */
 function total(point, of) {
@@ -20,12 +20,12 @@ function weighted(rows, of) {
   }, 0);
 }
 
-/** Points that count. */
+/** Points with a positive share. */
 function counted(rows) {
   return rows.points.filter((point) => point.share > 0);
 }
 
-/** The largest of numbers; nothing of none. */
+/** Largest number; 0 for an empty list. */
 function largest(numbers) {
   let most = 0;
   for (const value of numbers) if (value > most) most = value;
@@ -44,7 +44,7 @@ function diameter({ rows }) {
 
 const distance = (a, b) => Math.hypot(...a.map((value, k) => value - b[k]));
 
-/** Number of the point farthest from a centre, rows being its components. */
+/** Index of the point farthest from a centre; rows are components. */
 function farthest(rows, centre) {
   let best = 0, most = -1;
   for (let i = 0; i < rows[0].length; i++) {
@@ -55,7 +55,7 @@ function farthest(rows, centre) {
   return best;
 }
 
-/** Radius of the smallest ball: the farthest point joins those that hold it, until none is outside. */
+/** Radius of the smallest enclosing ball: add the farthest point to the support until none is outside. */
 function ballOf(rows) {
   const at = (i) => rows.map((row) => row[i]);
   let held = [at(0)], ball = { centre: at(0), radius: 0 };
@@ -68,7 +68,7 @@ function ballOf(rows) {
   return ball.radius;
 }
 
-/** The smallest ball of a handful: that of a subset, centred between its points, which holds all. */
+/** Smallest enclosing ball of few points: that of a subset which encloses all. */
 function ballOfFew(few) {
   let best = null;
   for (let mask = 1; mask < 1 << few.length; mask++) {
@@ -85,7 +85,7 @@ function ballOfFew(few) {
   return best ?? [few, { centre: few[0], radius: Math.max(...few.map((point) => distance(point, few[0]))) }];
 }
 
-/** The point as far from each of these, in the plane that they span; null where it is not between them. */
+/** Circumcentre of points in the plane that they span; null if it lies outside them. */
 function centreOf(points) {
   const apart = points.slice(1).map((point) => point.map((value, k) => value - points[0][k]));
   const dot = (a, b) => a.reduce((sum, value, k) => sum + value * b[k], 0);
@@ -96,7 +96,7 @@ function centreOf(points) {
   return points[0].map((value, k) => value + apart.reduce((sum, a, j) => sum + shares[j] * a[k], 0));
 }
 
-/** A small system of equations by elimination; null where it is singular. */
+/** Solve a small linear system by elimination; null if singular. */
 function solved(matrix, right) {
   const rows = matrix.map((row, k) => [...row, right[k]]), n = rows.length;
   for (let k = 0; k < n; k++) {

@@ -1,6 +1,6 @@
 // Numbers as the report prints them.
 
-/** To `digits` figures, without an exponent where it can be read without. */
+/** A number with `digits` figures, without an exponent where possible. */
 function number(value, digits = 4) {
   if (value === null || !Number.isFinite(value)) return "-";
   if (value === 0) return "0";
@@ -16,14 +16,14 @@ function exponential(value, digits) {
   return `${mantissa}e${power[0]}${power.slice(1).padStart(2, "0")}`;
 }
 
-/** A number without zeros that say nothing. */
+/** A number without trailing zeros. */
 function trimmed(value, digits = 4) {
   const text = number(value, digits);
   return text.includes(".") && !text.includes("e") ? text.replace(/0+$/, "").replace(/\.$/, "") : text;
 }
 
 /**
- * A number as it was typed, with a point or a comma before its decimals.
+ * Parse a typed number, with a decimal point or comma.
  * @param {string} text
  * @returns {{value?: number, why?: string}} the number, or a line that says why it is refused
  */
@@ -37,7 +37,7 @@ function typed(text) {
   return isNumber && Number.isFinite(value) ? { value } : { why: `"${plain}" is no number: write one like 2.5` };
 }
 
-/** A value in the unit that is shown; what is a rounding of `scale` is zero. */
+/** A value in the displayed unit; a rounding of `scale` becomes zero. */
 function figure(value, unit, digits = 4, scale = 0) {
   if (value === null) return "-";
   const shown = Math.abs(value) <= 1e-9 * scale ? 0 : value * unit.factor;
@@ -50,7 +50,7 @@ function percent(share) {
   return `${share >= 0 ? "+" : "−"}${text.replace("-", "")} %`;
 }
 
-/** Ends of an axis, a round number of 1, 1.5, 2, 3, 5 or 7 that is not under a value. */
+/** Round up to 1, 1.5, 2, 3, 5 or 7 times a power of ten. */
 function roundUp(value) {
   if (!(value > 0)) return 1;
   const power = 10 ** Math.floor(Math.log10(value));

@@ -1,4 +1,4 @@
-// The page: a model, a state and a drawing, kept apart. `show` brings them together.
+// The page: connects a model, a state and a drawing.
 
 /** A page of a model in an element, and a handle to it. */
 class Page {
@@ -21,7 +21,7 @@ class Page {
     this.withdrawn = "";
     this.exact = { values: this.optimum ?? this.given, objective: this.reference?.value ?? null, limits: {} };
     this.size = sizeOf(this.model);
-    // the address is that of the first model, whatever was moved since stays
+    // the address belongs to the first model; later changes stay
     this.values = fitting(this.model, this.history ? this.values : fromAddress() ?? {}, this.optimum ?? this.given);
     this.history = new History({ ...this.values });
     this.build();
@@ -39,7 +39,7 @@ class Page {
     return found ? valuesOf(this.model, found.x) : null;
   }
 
-  // what is shown
+  // display
 
   build() {
     const told = (name, value, isLast) => this.move({ [name]: value }, isLast);
@@ -61,7 +61,7 @@ class Page {
     this.draw = this.drawing();
   }
 
-  /** The objective, and how it stands to the optimum. */
+  /** Show the objective and its comparison with the optimum. */
   card() {
     const name = element("p", { class: "live-name" }, this.model.objective.name || "No objective");
     this.value = element("output", { class: "live-value", "data-measure": "objective" });
@@ -90,7 +90,7 @@ class Page {
     return element("div", { class: "live-buttons", role: "toolbar", "aria-label": "Designs" }, ...made);
   }
 
-  /** What leads back to the design decided, by what is known of it. */
+  /** The button back to the decided design. */
   back() {
     return this.reference?.isProven ? "Back to the optimum" : "Back to the best design";
   }
@@ -103,7 +103,7 @@ class Page {
     return element("div", { class: "live-choices" }, curves, points);
   }
 
-  /** The figures of the load that is chosen, and what brings them to a design. */
+  /** Create the figures of the selected load. */
   drawing() {
     const { model, point } = this, signal = model.signals[model.curves[this.curve]?.signal];
     if (!signal) return { compare() {}, update() {}, say() {} };
@@ -129,7 +129,7 @@ class Page {
     };
   }
 
-  /** The design that figures are compared with. */
+  /** The reference design of the figures. */
   markedAt() {
     return vectorOf(this.model, this.optimum ?? this.given);
   }
@@ -155,7 +155,7 @@ class Page {
     return element("div", { class: "live-notes" }, ...notes.map((text) => element("p", {}, text)), this.accuracy);
   }
 
-  /** Hold the page's own numbers against those that came with the model. */
+  /** Check the page's numbers against those of the model. */
   check() {
     this.error = difference(this.model);
     const size = this.error < 1e-15 ? "less than 1e-15" : exponential(this.error, 2);
@@ -169,14 +169,14 @@ class Page {
     return this.error;
   }
 
-  // what is done
+  // actions
 
-  /** Some values changed; the last of a drag can be gone back from. */
+  /** Change some values; the end of a drag is an undo step. */
   move(values, isLast) {
     this.set({ ...this.values, ...values }, { isPassing: !isLast });
   }
 
-  /** A whole design; drawn at the next frame. */
+  /** Set a design and draw it at the next frame. */
   set(values, { isPassing = false, isOld = false, quiet = false } = {}) {
     this.values = fitting(this.model, values, this.values);
     if (!isPassing && !isOld) this.history.add({ ...this.values });
@@ -190,7 +190,7 @@ class Page {
     if (!this.frame) this.frame = requestAnimationFrame(() => { this.frame = 0; this.drawNow(); });
   }
 
-  /** After a change: the address, and what is read aloud. */
+  /** Update the address and the text for screen readers. */
   settle(quiet) {
     clearTimeout(this.waiting);
     this.waiting = setTimeout(() => {
@@ -235,12 +235,12 @@ class Page {
     this.regret.textContent = limits + against(reference, (value) => this.told(value), at);
   }
 
-  /** The objective in words; what is a rounding beside the designs known is nothing. */
+  /** The objective in words; a rounding of the known designs is zero. */
   told(value) {
     return figure(value, this.model.objective, 4, this.size);
   }
 
-  /** Names of the limits that are kept (true), broken (false), or not known (null). */
+  /** Names of limits that are kept (true), broken (false) or unknown (null). */
   standingSo(met) {
     return ofRole(this.model, "limit").filter((_, k) => this.found.limits[k].met === met).map((measure) => measure.name);
   }
@@ -281,7 +281,7 @@ class Page {
     this.said.textContent = `${name} is saved. ${this.model.save.note}`;
   }
 
-  // the handle
+  // interface for the served page
 
   design() { return { ...this.values }; }
   setDesign(values, { quiet = false } = {}) { this.set({ ...this.values, ...values }, { quiet, isPassing: quiet }); }
@@ -297,23 +297,23 @@ class Page {
     return [{ ...unitOf(objective), name: "objective", ...whole }, ...limits];
   }
 
-  /** Whether something is asked of a design that does not follow sliders. */
+  /** True if some measures do not follow sliders. */
   get isAside() { return this.model.measures.some((measure) => !measure.followed); }
 
-  /** What the exact model says of a design, where that does not follow. */
+  /** Set values of the exact model for measures that do not follow. */
   setExact(exact) {
     this.exact = exact;
     this.askFrame();
   }
 
-  /** Say nothing of how good a design is, but this, until the next update; at once. */
+  /** Replace the comparison by this text until the next update. */
   withdraw(words) {
     this.withdrawn = words;
     this.root.classList.add("withdrawn");
     this.showRegret(this.found);
   }
 
-  /** Other edges of limits, and values of those that no slider moves. */
+  /** Set edges of limits, and values of constant ones. */
   setLimits(limits) {
     for (const { name, sides, value } of limits) {
       const measure = ofRole(this.model, "limit").find((own) => own.name === name);
@@ -322,7 +322,7 @@ class Page {
   }
 
   /**
-   * All that is known for other settings of the same loads, drawn in one frame.
+   * Set limits, reference and design for other settings of the same loads, in one frame.
    * @param {{limits: object[], reference: {value: number, name: string, isProven: boolean} | null,
    *   decided: object | null, follows: boolean}} told limits, what designs are compared with, the design that was decided,
    *   and whether it is shown
@@ -341,7 +341,7 @@ class Page {
     this.askFrame();
   }
 
-  /** Another model; values of sliders that it still has stay. */
+  /** Replace the model; values of common sliders stay. */
   async setModel(model) {
     this.end();
     return this.open(model);

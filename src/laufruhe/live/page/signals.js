@@ -1,4 +1,4 @@
-// Loads over the cycle: constant + slope x, order by order, at the same angles at which results are measured.
+// Loads over the cycle: constant + slope x, order by order, at the sample angles of results.
 
 const TURN = 2 * Math.PI;
 
@@ -13,7 +13,7 @@ async function inflated(text) {
   return new Float64Array(await new Response(stream).arrayBuffer());
 }
 
-/** An array of the block by its place and shape. */
+/** An array of the block by offset and shape. */
 function arrayOf(block, [start, shape]) {
   return { values: block.subarray(start, start + shape.reduce((a, b) => a * b, 1)), shape };
 }
@@ -24,7 +24,7 @@ function wavesOf(block, waves) {
   return { orders: arrayOf(block, waves.orders).values, values, shape };
 }
 
-/** A smooth series, and pieces of polynomials between corners. */
+/** A smooth series, and polynomials between kinks. */
 function bendsOf(block, bends) {
   return {
     smooth: wavesOf(block, bends.smooth),
@@ -64,7 +64,7 @@ function summed(orders, coefficient, n) {
   return any ? transformed(re, im)[0] : null;
 }
 
-/** Lengths up to which a transform is summed as it stands. */
+/** Length up to which a transform is summed directly. */
 const SHORT = 32;
 
 /** Discrete Fourier transform with e^(+), of any length, by the smallest factors first. */
@@ -80,7 +80,7 @@ function transformed(re, im) {
   return joined(parts, n, m);
 }
 
-/** A transform as it stands. */
+/** A transform by direct summation. */
 function summedUp(re, im) {
   const n = re.length, { cosine, sine } = tableOf(n);
   const out = [new Float64Array(n), new Float64Array(n)];
@@ -98,7 +98,7 @@ function summedUp(re, im) {
   return out;
 }
 
-/** Parts of a transform put together. */
+/** Combine the parts of a transform. */
 function joined(parts, n, m) {
   const { cosine, sine } = tableOf(n);
   const re = new Float64Array(n), im = new Float64Array(n);
@@ -134,7 +134,7 @@ function tableOf(n) {
 }
 
 /**
- * The rows of a signal at so many times its steps and, between these, where peaks may stand.
+ * Prepare the rows of a signal at refined steps, and at possible peaks between them.
  * @returns per point the constant by place and component (null where it is nothing), and waves of the slope
  */
 function gridOf(signal, times) {
@@ -159,7 +159,7 @@ function pointGrid(signal, point, steps, isFine) {
   return { share: point.share, length, constant, bent, waves, point };
 }
 
-/** One component without the columns, at equal steps and at the angles between. */
+/** Constant part of one component, at equal steps and at the angles between. */
 function constantOf(signal, point, bends, at, steps, between) {
   const waves = bends ? bends.smooth : point.series;
   const stride = signal.count * signal.parts;
@@ -178,10 +178,10 @@ function constantOf(signal, point, bends, at, steps, between) {
   return out;
 }
 
-/** A step on a jump is read behind it, by this angle [rad]. */
+/** A step on a jump is read this angle behind it [rad]. */
 const BEHIND = 1e-13;
 
-/** Adds the pieces of polynomials between the corners (L5a). */
+/** Add the polynomials between the kinks (L5a). */
 function addCorners(out, signal, bends, at, steps, between) {
   const period = TURN / signal.base, [powers, corners] = bends.pieces.shape, stride = signal.count * signal.parts;
   const piece = (power, k) => bends.pieces.values[(power * corners + k) * stride + at];
@@ -224,7 +224,7 @@ function slopeAt(signal, point, j, at, x) {
   return [a, b];
 }
 
-/** One component of a point's rows at x, written into `out`; false where it is nothing. */
+/** Write one component of a point's rows at x into `out`; return false if it is zero. */
 function component(signal, own, at, x, out) {
   const constant = own.constant[at];
   let any = constant !== null;
@@ -249,14 +249,14 @@ function component(signal, own, at, x, out) {
 }
 
 /**
- * Rows of a signal at x. They stand in arrays that the next design writes over.
+ * Rows of a signal at x, in arrays that the next call overwrites.
  * @returns {{adds: boolean, points: {share: number, groups: {lengths: Float64Array, rows: Float64Array[]}[]}[]}}
  */
 function rowsAt(signal, times, x) {
   return { adds: signal.adds, points: gridOf(signal, times).points.map((own) => pointAt(signal, own, x)) };
 }
 
-/** Rows of one operating point, taken once for one design. */
+/** Rows of one operating point, computed once per design. */
 function pointAt(signal, own, x) {
   if (own.x === x) return own;
   own.x = x;
@@ -283,12 +283,12 @@ function fill(signal, own, place, x, { lengths, rows }) {
   for (let i = 0; i < own.length; i++) lengths[i] = Math.sqrt(lengths[i]);
 }
 
-/** Number of the wave of an order among waves; -1 where they have none. */
+/** Index of an order among waves, or -1. */
 function waveNumber(signal, waves, order) {
   return waves.orders.findIndex((own) => Math.abs(own * signal.base - order) < 1e-9);
 }
 
-/** All orders of a point that are not nothing. */
+/** Non-zero orders of a point. */
 function ordersOf(signal, point) {
   return [...new Set([...point.series.orders, ...point.slope.orders])].map((order) => order * signal.base);
 }

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.plots.style import Series, headed, page, series_of, styled, thin
-from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, ink_on
+from laufruhe.plots.style import Series, axis_end, finish_page, page, series_of, styled
+from laufruhe.plots.words import FAINT, INK, SMALL, fit_line, in_thousands, ink_on
 from laufruhe.present.measures import hardest_point, has_mount_forces
 from laufruhe.present.numbers import number
 from laufruhe.present.pictures import rows_of
@@ -36,7 +36,7 @@ def figure(result: Result) -> Figure:
     drawn = page(len(rows), 1, (max(GROUP * (side + 0.3), 4.2), high), lead=0.12 if len(points) > 1 else 0.0)
     series = series_of(result, loads=True)
     values = {k: [_measures(one.design, k) for one in series] for k in points}
-    top = thin(float(table.max(initial=0.0)) for tables in values.values() for table in tables)
+    top = axis_end(float(table.max(initial=0.0)) for tables in values.values() for table in tables)
     for axes, (k, part) in zip(drawn.panels, rows, strict=True):
         _groups(axes, values[k], series, part, top)
         _frame(axes, names, part, side, top)
@@ -47,7 +47,7 @@ def figure(result: Result) -> Figure:
     legend = [Patch(facecolor=one.colour, edgecolor=one.colour, label=one.name) for one in series]
     legend.append(Patch(facecolor=FAINT, edgecolor=FAINT, label="full: mean"))
     legend.append(Patch(facecolor="none", edgecolor=FAINT, linewidth=1.4, label="outline: maximum"))
-    return headed(drawn, result, "Mean and maximum mount forces", lines, legend)
+    return finish_page(drawn, result, "Mean and maximum mount forces", lines, legend)
 
 
 def _measures(design: Evaluation, k: int) -> Array:
@@ -81,7 +81,7 @@ def _groups(axes: Axes, values: list[Array], series: list[Series], part: range, 
 
 def _frame(axes: Axes, names: list[str], part: range, side: int, top: float) -> None:
     factor, unit = in_thousands(top, "N")
-    axes.set_xticks(axes.get_xticks(), [fitted(names[k], GROUP - 0.08) for k in part])
+    axes.set_xticks(axes.get_xticks(), [fit_line(names[k], GROUP - 0.08) for k in part])
     axes.tick_params(axis="x", length=0)
     axes.grid(axis="x", visible=False)
     # for a number over the highest bar

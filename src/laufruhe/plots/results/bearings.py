@@ -13,9 +13,19 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from laufruhe.physics.bearing_wear import wear_of
-from laufruhe.plots.style import ORANGE, Series, entry_of_dots, headed, page, point_name, series_of, styled, thin
-from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_ticks
-from laufruhe.present.measures import BEARINGS, as_crank_turns, bearing_paths, has_bearings, load_designs
+from laufruhe.plots.style import (
+    ORANGE,
+    Series,
+    axis_end,
+    entry_of_dots,
+    finish_page,
+    page,
+    point_name,
+    series_of,
+    styled,
+)
+from laufruhe.plots.words import FAINT, INK, SMALL, fit_line, in_thousands, round_ticks
+from laufruhe.present.measures import BEARINGS, as_crank_turns, bearing_paths, evaluations_with_loads, has_bearings
 from laufruhe.present.pictures import rows_of
 from laufruhe.solvers.result import Result
 
@@ -29,7 +39,7 @@ applies = has_bearings
 @styled()
 def figure(result: Result) -> Figure:
     """Draw a column per bearing, to one scale: above the force on the block, below on the crankshaft."""
-    first = load_designs(result)[0]
+    first = evaluations_with_loads(result)[0]
     # the operating point with the largest force on a bearing
     k = int(np.argmax([np.abs(bearing_paths(first, j)).max() for j in range(len(first.loads))]))
     series = series_of(result, loads=True)
@@ -37,7 +47,7 @@ def figure(result: Result) -> Figure:
     names = BEARINGS.channel.places(result.final.engine)
     sizes = np.abs(planes[-1]).max(axis=0)
     chosen = sorted(np.argsort(-sizes, kind="stable")[:MOST_BEARINGS].tolist())
-    largest = thin(float(np.abs(plane[:, chosen]).max()) for plane in planes)
+    largest = axis_end(float(np.abs(plane[:, chosen]).max()) for plane in planes)
     factor, unit = in_thousands(largest, "N")
     turned = as_crank_turns(result.final, len(planes[0]))
     rows, side = rows_of(len(chosen), MOST_COLUMNS)
@@ -52,7 +62,7 @@ def figure(result: Result) -> Figure:
             _draw(axes, [factor * plane[:, m] * seen for plane in planes], series, factor * largest / FILLED)
             # under the panel of its bearing
             name = "on the crankshaft" if on_crank else f"bearing {names[m]}"
-            axes.set_title(fitted(name, PANEL + 0.2), loc="left", size=SMALL, color=INK)
+            axes.set_title(fit_line(name, PANEL + 0.2), loc="left", size=SMALL, color=INK)
             across, up = ("across", "along") if on_crank else ("lateral", "vertical")
             axes.set(xlabel=f"{across} [{unit}]", ylabel="" if column else f"{up} [{unit}]")
             axes.tick_params(labelleft=column == 0, length=2)
@@ -61,7 +71,7 @@ def figure(result: Result) -> Figure:
     dot = entry_of_dots("at 0°", color=INK, markersize=4.0)
     wear: Artist = Patch(color=ORANGE, alpha=0.6, label="where it wears" + (", as decided" if len(series) > 1 else ""))
     legend = [*(one.entry() for one in series), dot, wear]
-    return headed(drawn, result, "Main-bearing loads over one working cycle", lines, legend, some)
+    return finish_page(drawn, result, "Main-bearing loads over one working cycle", lines, legend, some)
 
 
 def _draw(axes: Axes, paths: Sequence[Plane], series: Sequence[Series], size: float) -> None:

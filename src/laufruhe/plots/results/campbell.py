@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from laufruhe.plots.speed_axis import LIMIT, STYLES, limits_on, mark_points, order_entries
-from laufruhe.plots.style import AFTER, BEFORE, entry, entry_of_dots, headed, page, styled
-from laufruhe.plots.words import FAINT, INK, beside
-from laufruhe.present.measures import changed
-from laufruhe.present.mounting import MountingFacts, at_which_stiffness, critical_speed, facts_of, is_elastic
+from laufruhe.plots.style import AFTER, BEFORE, entry, entry_of_dots, finish_page, page, styled
+from laufruhe.plots.words import FAINT, INK, label_lines
+from laufruhe.present.curves import highest_speed
+from laufruhe.present.measures import is_changed
+from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic, stiffness_sentence
 from laufruhe.present.numbers import RPM, number
-from laufruhe.present.speed_curves import fastest
 from laufruhe.problem import channels
 from laufruhe.solvers.result import Result
 
@@ -26,7 +26,7 @@ applies = is_elastic
 @styled()
 def figure(result: Result) -> Figure:
     """Draw orders and natural frequencies; critical speeds are their intersections."""
-    facts, top = facts_of(result.final), fastest(result)
+    facts, top = facts_of(result.final), highest_speed(result)
     drawn = page(1, 1, (6.2, 4.2))
     axes = drawn.panels[0]
     limits = limits_on(result, channels.FREQUENCIES)
@@ -41,10 +41,10 @@ def figure(result: Result) -> Figure:
     _modes(axes, facts)
     mark_points(axes, result)
     critical = entry_of_dots("critical speed", color=AFTER, markersize=4.5)
-    which = "of the design as decided" if changed(result) else "as given"
-    lines = f"Natural frequencies {which}, and the orders that excite each most.{at_which_stiffness(facts)}"
+    which = "of the design as decided" if is_changed(result) else "as given"
+    lines = f"Natural frequencies {which}, and the orders that excite each most.{stiffness_sentence(facts)}"
     legend = [*order_entries(facts, AFTER), critical, *legend, *_with_fluid(axes, facts)]
-    return headed(drawn, result, "Critical speeds", lines, legend)
+    return finish_page(drawn, result, "Critical speeds", lines, legend)
 
 
 def _with_fluid(axes: Axes, facts: MountingFacts) -> list[Artist]:
@@ -64,7 +64,7 @@ def _modes(axes: Axes, facts: MountingFacts) -> None:
         names.append(f"{name}, {number(frequency, 3)} Hz" + ("" if excited else " (not excited)"))
         for order in facts.orders if excited else ():
             axes.plot(critical_speed(frequency, order) * RPM, frequency, "o", color=AFTER, markersize=4.5, zorder=5)
-    beside(axes, facts.modes.frequencies.tolist(), names)
+    label_lines(axes, facts.modes.frequencies.tolist(), names)
 
 
 def _marked(axes: Axes, edges: list[float], bands: list[tuple[float, float]]) -> list[Artist]:

@@ -16,8 +16,18 @@ from matplotlib.ticker import MultipleLocator
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.plots.style import Series, entry, headed, page, series_of, styled
-from laufruhe.plots.words import FAINT, INK, aligned, empty, fitted, in_thousands, left_out, round_ticks, width_of
+from laufruhe.plots.style import Series, entry, finish_page, page, series_of, styled
+from laufruhe.plots.words import (
+    FAINT,
+    INK,
+    align_labels,
+    empty,
+    fit_line,
+    in_thousands,
+    omitted_words,
+    round_ticks,
+    width_of,
+)
 from laufruhe.present.measures import firing_words, hardest_point, has_loads
 from laufruhe.problem.evaluation import over
 from laufruhe.solvers.result import Result
@@ -79,9 +89,9 @@ def figure(result: Result) -> Figure:
         _mark_firings(panels, result.final.engine, wide)
         panels[-1].set_xlabel("crank angle [°]")
         if len(points) > 1:
-            name = fitted(result.problem.points[k].name, wide, 10)
+            name = fit_line(result.problem.points[k].name, wide, 10)
             panels[0].annotate(name, (0, 1), (0, 20), "axes fraction", "offset points", size=10)
-    aligned(drawn.panels[:: len(points)])
+    align_labels(drawn.panels[:: len(points)])
     at = "" if len(result.problem.points) > 1 else f" at {result.problem.points[0].name}"
     what = "Loads on the block and forces on the mounts" if mounts else "Loads on the block"
     largest = [max(row, key=lambda each: each.ends[1]) for row in balanced]
@@ -90,7 +100,7 @@ def figure(result: Result) -> Figure:
     lines = f"{what}{at}; above, the {firings} by cylinder.{none}"
     firing = entry(mark, color=FAINT, linewidth=0.8, linestyle=STYLES[2])
     legend = [*(one.entry() for one in series), firing]
-    return headed(
+    return finish_page(
         drawn, result, "Forces and moments over one working cycle", lines, legend, _left_out(result, points, mounts)
     )
 
@@ -109,7 +119,7 @@ def _beside(panels: Sequence[Axes], row: Sequence[Row], degrees: Array, colours:
     for axes in panels:
         axes.set_ylim(top=max(other.get_ylim()[1] for other in panels))
     first = panels[0]
-    first.set_ylabel(f"{fitted(richest.words, HIGH + 0.1)}\n[{unit}]", va="center")
+    first.set_ylabel(f"{fit_line(richest.words, HIGH + 0.1)}\n[{unit}]", va="center")
 
 
 def _points(result: Result) -> list[int]:
@@ -160,7 +170,7 @@ def _closed(signal: Spectrum, base: Fraction) -> Array:
 def _row(label: str, unit: str, curves: Mapping[str, Array], most: float) -> Row:
     size = {name: float(np.abs(curve).max()) for name, curve in curves.items()}
     top = max(size.values())
-    if words := left_out(top, most, unit):
+    if words := omitted_words(top, most, unit):
         return Row(label, unit, {}, (0.0, top), words)
     least = SHARE * top
     visible = {name: curve for name, curve in curves.items() if size[name] > least}

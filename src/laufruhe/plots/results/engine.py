@@ -7,7 +7,7 @@ import math
 from matplotlib.figure import Figure
 
 from laufruhe.plots.machine_view import Scene, draw_views, legend_of, views
-from laufruhe.plots.style import headed, styled
+from laufruhe.plots.style import finish_page, styled
 from laufruhe.present.measures import has_firing
 from laufruhe.present.poses import THICKNESS
 from laufruhe.solvers.result import Result
@@ -21,7 +21,7 @@ def applies(result: Result) -> bool:
 @styled()
 def figure(result: Result) -> Figure:
     """Draw end and side view at a crank angle of zero."""
-    scene = Scene.of(result)
+    scene = Scene.from_result(result)
     drawn = views(scene)
     draw_views(drawn, scene)
     weights = f" Weights as half discs of steel, {1e3 * THICKNESS:g} mm thick, of the same unbalance."
@@ -30,4 +30,4 @@ def figure(result: Result) -> Figure:
     firing = "firing " if has_firing(result) else ""
     centre = f", the {firing}dead centre of {' and '.join(fires)}" if fires else ""
     lines = f"To scale, at a crank angle of 0°{centre}.{weights if scene.weights else ''}"
-    return headed(drawn, result, "The engine", lines, legend_of(scene))
+    return finish_page(drawn, result, "The engine", lines, legend_of(scene))

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from laufruhe.plots.style import AFTER, BEFORE, PALE, WIDEST, headed, page, styled
+from laufruhe.plots.style import AFTER, BEFORE, PALE, WIDEST, finish_page, page, styled
 from laufruhe.plots.words import SMALL, ink_on, width_of
 from laufruhe.present.measures import has_firing, has_ranking, ranking_of
 from laufruhe.solvers.result import Result
@@ -43,7 +43,7 @@ def figure(result: Result) -> Figure:
     fires, stands = ("Firing orders", "Cylinder that fires"), ("Orders of dead centres", "Piston at the head end")
     title, who = fires if has_firing(result) else stands
     lines = f"{who}, and the crank angle to the next{intervals}"
-    return headed(drawn, result, title, lines, legend[: 1 + any(k for k, _ in orders)])
+    return finish_page(drawn, result, title, lines, legend[: 1 + any(k for k, _ in orders)])
 
 
 def _selected(phasing: PhasingResult) -> list[tuple[int, RankedOrder]]:

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from laufruhe.machine import Chambers, OperatingPoint, SliderCrank
 from laufruhe.physics.cylinder_volume import dead_centres
-from laufruhe.plots.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, entry, headed, page, styled
+from laufruhe.plots.style import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, entry, finish_page, page, styled
 from laufruhe.plots.words import FAINT, INK
-from laufruhe.present.chambers import indicator_of, points_with_chambers
+from laufruhe.present.curves import indicator_of, points_with_chambers
 from laufruhe.solvers.result import Result
 
 STEPS, MOST_ROWS = 1440, 6
@@ -47,7 +47,7 @@ def figure(result: Result) -> Figure:
     lines = "Left: absolute pressure in every chamber. Right: force towards the crank, on the way out and back."
     legend = [entry("force of the chambers", color=INK, linewidth=1.4)]
     legend += [entry("what accelerates the rod", color=FAINT, linestyle=(0, (4, 1.6)))]
-    return headed(drawn, result, f"Indicator diagrams at {point.name}", lines, legend)
+    return finish_page(drawn, result, f"Indicator diagrams at {point.name}", lines, legend)
 
 
 def _diagrams(axes: Axes, gas: Chambers, part: SliderCrank, point: OperatingPoint) -> None:

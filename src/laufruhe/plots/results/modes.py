@@ -9,9 +9,9 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from laufruhe.physics.modes import MOTIONS
-from laufruhe.plots.style import headed, page, series_of, styled
+from laufruhe.plots.style import finish_page, page, series_of, styled
 from laufruhe.plots.words import SMALL, ink_on
-from laufruhe.present.mounting import MountingFacts, at_which_stiffness, facts_of, is_elastic
+from laufruhe.present.mounting import MountingFacts, facts_of, is_elastic, stiffness_sentence
 from laufruhe.present.numbers import number
 from laufruhe.solvers.result import Result
 
@@ -27,8 +27,8 @@ def figure(result: Result) -> Figure:
         _shares(axes, facts_of(one.design))
         axes.set_title(one.name, loc="left", size=10, pad=8, parse_math=False)
     lines = "Percent of each mode's kinetic energy; a motion apart from all others has 100. Bold: excited."
-    lines += at_which_stiffness(facts_of(result.final))
-    return headed(drawn, result, "Natural modes", lines, [])
+    lines += stiffness_sentence(facts_of(result.final))
+    return finish_page(drawn, result, "Natural modes", lines, [])
 
 
 def _shares(axes: Axes, facts: MountingFacts) -> None:

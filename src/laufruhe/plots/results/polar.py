@@ -15,8 +15,8 @@ from matplotlib.ticker import MultipleLocator
 
 from laufruhe.machine import Mount
 from laufruhe.numerics.arrays import Array
-from laufruhe.plots.style import Page, Series, entry_of_dots, headed, page, point_name, series_of, styled, thin
-from laufruhe.plots.words import FAINT, INK, SMALL, fitted, in_thousands, round_ticks
+from laufruhe.plots.style import Page, Series, axis_end, entry_of_dots, finish_page, page, point_name, series_of, styled
+from laufruhe.plots.words import FAINT, INK, SMALL, fit_line, in_thousands, round_ticks
 from laufruhe.present.measures import hardest_point, has_mount_forces
 from laufruhe.present.numbers import figure as words
 from laufruhe.present.numbers import trimmed
@@ -32,7 +32,7 @@ ENLARGED = (20, 10, 5, 2, 1)
 STEADY = 0.25
 """Share of the largest force: what moves less about a steady part is shown without it."""
 NEEDLE = 1.0 / 24.0
-"""Of the larger force: where the smaller one is less than this, the path is a needle and is unrolled."""
+"""Ratio of the smaller to the larger force below which the path is drawn over the crank angle."""
 LATERAL, VERTICAL = 1, 2
 NAMES = {LATERAL: "lateral", VERTICAL: "vertical"}
 applies = has_mount_forces
@@ -47,7 +47,7 @@ class Frame:
     size
         The largest force [N].
     times
-        How many times larger forces are drawn, by direction.
+        Magnification of the forces, by direction.
     along
         The only direction that counts, whose force is shown over the crank angle; None for paths.
     others
@@ -60,14 +60,14 @@ class Frame:
     others: float
 
     @classmethod
-    def of(cls, paths: Sequence[Array], count: int) -> Frame:
+    def from_paths(cls, paths: Sequence[Array], count: int) -> Frame:
         """Return the frame of the paths of the first `count` mounts."""
         most = {c: max(float(np.abs(path[:, :count, c]).max(initial=0.0)) for path in paths) for c in NAMES}
         small, large = sorted(NAMES, key=lambda c: most[c])
-        share = most[small] / thin([most[large]])
+        share = most[small] / axis_end([most[large]])
         times = next(factor for factor in ENLARGED if factor * share <= 1.0)
         along = large if share < NEEDLE else None
-        return cls(1.08 * thin([most[large]]), {large: 1, small: times}, along, most[small])
+        return cls(1.08 * axis_end([most[large]]), {large: 1, small: times}, along, most[small])
 
 
 @styled()
@@ -76,7 +76,7 @@ def figure(result: Result) -> Figure:
     k, series = hardest_point(result), series_of(result, loads=True)
     paths, steady = _moving([_closed(samples_of(one.design, k)) for one in series])
     mounts = result.problem.engine.mounts[:MOST_PANELS]
-    frame, columns = Frame.of(paths, len(mounts)), rows_of(len(mounts), MOST_COLUMNS)[1]
+    frame, columns = Frame.from_paths(paths, len(mounts)), rows_of(len(mounts), MOST_COLUMNS)[1]
     drawn = page(math.ceil(len(mounts) / columns), columns, (PANEL, PANEL), len(mounts), GAP, LEAD, 0.44)
     cycle = result.problem.engine.cycle
     quarters = (len(paths[0]) - 1) // (4 * cycle.turns)
@@ -95,7 +95,7 @@ def figure(result: Result) -> Figure:
     _label(drawn, columns, frame, unit)
     lines = f"Force on each mount at {point_name(result, k)}, seen from the front.{_explanation(frame)}{steady}"
     title = "Mount forces over one working cycle"
-    return headed(drawn, result, title, lines, _legend(series, frame, first.name), _left_out(paths, frame))
+    return finish_page(drawn, result, title, lines, _legend(series, frame, first.name), _left_out(paths, frame))
 
 
 def _closed(samples: Array) -> Array:
@@ -137,8 +137,8 @@ def _name(axes: Axes, mount: Mount, moved: Mount) -> None:
     is_moved = mount.position != moved.position
     place = ", ".join(trimmed(1e3 * value).replace("-", "−") for value in moved.position)
     over: Any = {"xycoords": "axes fraction", "textcoords": "offset points"}
-    axes.annotate(fitted(mount.name, PANEL + 0.2, 10), (0, 1), (0, 18), size=10, color=INK, **over)
-    words = fitted(f"{'moved to' if is_moved else 'at'} {place} mm", PANEL + 0.3)
+    axes.annotate(fit_line(mount.name, PANEL + 0.2, 10), (0, 1), (0, 18), size=10, color=INK, **over)
+    words = fit_line(f"{'moved to' if is_moved else 'at'} {place} mm", PANEL + 0.3)
     axes.annotate(words, (0, 1), (0, 5), size=SMALL, color=FAINT, **over)
 
 

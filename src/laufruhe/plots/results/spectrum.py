@@ -1,4 +1,4 @@
-"""What orders of crank speed the loads are made of."""
+"""Amplitudes of the loads by order of crank speed."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from matplotlib.ticker import MaxNLocator
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import order_amplitude
-from laufruhe.plots.style import headed, page, point_name, series_of, styled
-from laufruhe.plots.words import empty, in_thousands, left_out, round_ticks
-from laufruhe.present.measures import hardest_point, has_loads, main_load, mount_orders, padded
+from laufruhe.plots.style import finish_page, page, point_name, series_of, styled
+from laufruhe.plots.words import empty, in_thousands, omitted_words, round_ticks
+from laufruhe.present.measures import hardest_point, has_loads, main_load, mount_orders, pad_orders
 from laufruhe.problem.loads import PointLoads
 from laufruhe.solvers.result import Result
 
@@ -39,7 +39,7 @@ def figure(result: Result) -> Figure:
     tops = [max(float(each.max(initial=0.0)) for each in values) for values in amplitudes]
     drawn = page(len(panels), 1, (6.8, 3.2 if len(panels) == 1 else 1.5), gap=0.25)
     for axes, (label, unit, _), values, top in zip(drawn.panels, panels, amplitudes, tops, strict=True):
-        words, (factor, symbol) = left_out(top, max(tops), unit), in_thousands(top, unit)
+        words, (factor, symbol) = omitted_words(top, max(tops), unit), in_thousands(top, unit)
         _frame(axes, f"{label} [{symbol}]", factor * top, last)
         if words:
             empty(axes, words)
@@ -51,7 +51,7 @@ def figure(result: Result) -> Figure:
     what = "Amplitude of the force on a mount" if with_mounts else "Amplitude of the load on the block"
     lines = f"{what} at {point_name(result, k)}; order 0 is the steady part."
     legend = [Patch(facecolor=one.colour, label=one.name) for one in series]
-    return headed(drawn, result, title, lines, legend)
+    return finish_page(drawn, result, title, lines, legend)
 
 
 def _panels(mounts: int) -> list[Panel]:
@@ -71,7 +71,7 @@ def _panels(mounts: int) -> list[Panel]:
 
 def _visible(series: list[Array], base: float) -> list[Array]:
     length = max(len(values) for values in series)
-    table = np.stack([padded(values, length) for values in series])
+    table = np.stack([pad_orders(values, length) for values in series])
     seen = np.flatnonzero(table.max(axis=0) > SHARE * float(table.max(initial=0.0)))
     last = min(int(seen[-1]) if len(seen) else 0, int(LAST_ORDER / base))
     return list(table[:, : last + 1])

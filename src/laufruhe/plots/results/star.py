@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
-from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled
+from laufruhe.plots.style import AFTER, BEFORE, entry, finish_page, page, styled
 from laufruhe.plots.words import FAINT, INK, SMALL
 from laufruhe.present.measures import has_ranking, ranking_of
 from laufruhe.present.numbers import figure as told
@@ -42,7 +42,7 @@ def figure(result: Result) -> Figure:
         "From the front, turning clockwise; and from the left: full pins point to you, crossed ones away. "
         "Free forces over that of one throw, couples over that times the spacing of throws."
     )
-    return headed(drawn, result, "Crank stars", lines, legend[: min(len(stars), 2)])
+    return finish_page(drawn, result, "Crank stars", lines, legend[: min(len(stars), 2)])
 
 
 def _title(result: Result, star: RankedStar, k: int) -> str:

@@ -16,7 +16,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.irregularity import swing_of
 from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.torque import TorqueFacts, torque_facts, torque_parts
-from laufruhe.plots.style import GREEN, ORANGE, PALE, SKY, Series, entry, headed, page, series_of, styled
+from laufruhe.plots.style import GREEN, ORANGE, PALE, SKY, Series, entry, finish_page, page, series_of, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, in_thousands, round_ticks
 from laufruhe.present.measures import asks_torque, has_loads
 from laufruhe.present.numbers import RPM, number
@@ -69,7 +69,7 @@ def figure(result: Result) -> Figure:
     legend = [entry(name, color=COLOURS[name], linewidth=2.6 - 1.2 * (name == "all")) for name in visible]
     legend.append(entry(f"mean, {number(facts[k].mean, scale=largest)} N m", **_MEAN))
     legend += [entry(f"speed {one.name}", color=one.colour, linewidth=1.8) for one in turning]
-    return headed(drawn, result, "Torque over one working cycle", lines, legend)
+    return finish_page(drawn, result, "Torque over one working cycle", lines, legend)
 
 
 def _lower(axes: Axes, inches: float) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from laufruhe.plots.style import AFTER, BEFORE, entry, headed, page, styled
+from laufruhe.plots.style import AFTER, BEFORE, entry, finish_page, page, styled
 from laufruhe.plots.words import FAINT, SMALL, label_of
 from laufruhe.present.measures import has_ranking, ranking_of
 from laufruhe.present.numbers import number
@@ -50,4 +50,4 @@ def figure(result: Result) -> Figure:
     )  # fmt: skip
     legend = [entry("best local optimum found", color=AFTER, marker="o"), entry("proven: no design below", **_BOUND)]
     lines = "What slightly uneven crank angles buy; each point is a design, evaluated by the exact model."
-    return headed(drawn, result, "Balance against even firing", lines, legend)
+    return finish_page(drawn, result, "Balance against even firing", lines, legend)

@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator
 
 from laufruhe.plots.speed_axis import LIMIT, STYLES, limits_on, mark_points, order_entries
-from laufruhe.plots.style import entry, headed, page, series_of, styled
+from laufruhe.plots.style import entry, finish_page, page, series_of, styled
 from laufruhe.plots.words import FAINT, INK
+from laufruhe.present.curves import highest_speed, transmissibility_of, transmissibility_speeds
 from laufruhe.present.measures import hardest_point
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.present.numbers import RPM
-from laufruhe.present.speed_curves import fastest, speeds_of, transmissibility_of
 from laufruhe.problem import channels
 from laufruhe.solvers.result import Result
 
@@ -28,8 +28,8 @@ LEAST = 1e-4
 def figure(result: Result) -> Figure:
     """Draw transmissibility by order and speed, with limits and operating points."""
     facts, series = facts_of(result.final), series_of(result, loads=True)
-    point, top = result.problem.points[hardest_point(result)], fastest(result)
-    speeds = speeds_of(result)
+    point, top = result.problem.points[hardest_point(result)], highest_speed(result)
+    speeds = transmissibility_speeds(result)
     drawn = page(1, 1, (6.8, 4.0))
     axes = drawn.panels[0]
     highest, lowest = 1.0, 1e-2
@@ -52,7 +52,7 @@ def figure(result: Result) -> Figure:
     )
     mark_points(axes, result)
     lines = f"Ratio to the force on rigid mounts; loads of {point.name}."
-    return headed(drawn, result, "Transmissibility over speed", lines, legend)
+    return finish_page(drawn, result, "Transmissibility over speed", lines, legend)
 
 
 def _limits(axes: Axes, result: Result, top: float) -> list[Artist]:

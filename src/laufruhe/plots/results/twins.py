@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 
 from laufruhe.machine import Engine
 from laufruhe.machine.crank_names import name_of_crank
-from laufruhe.plots.style import BLUE, VERMILION, entry, headed, page, point_name, styled
+from laufruhe.plots.style import BLUE, VERMILION, entry, finish_page, page, point_name, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, UNSEEN, in_thousands
+from laufruhe.present.curves import KINDS, ORDERS, Parts, is_twin, parts_of
 from laufruhe.present.measures import firing_words, hardest_point
 from laufruhe.present.numbers import number
-from laufruhe.present.twins import KINDS, ORDERS, Parts, is_twin, parts_of
 from laufruhe.solvers.result import Result
 
 FORWARD, BACKWARD = BLUE, VERMILION
@@ -49,7 +49,7 @@ def figure(result: Result) -> Figure:
     ]
     lines = f"At {point_name(result, k)}, seen from the front{_crank(engine)}."
     title = f"{firing_words(result)[0].capitalize()}, and what turns forward and backward"
-    return headed(drawn, result, title, lines, legend)
+    return finish_page(drawn, result, title, lines, legend)
 
 
 def _crank(engine: Engine) -> str:

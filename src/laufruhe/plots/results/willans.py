@@ -1,4 +1,4 @@
-"""What was measured of the friction: fuel over load with its Willans line, or drag over speed (W2, W3)."""
+"""Friction readings: fuel over load with the Willans line, or drag over speed (W2, W3)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from laufruhe.physics.willans import FrictionTest
-from laufruhe.plots.style import AFTER, SKY, entry, entry_of_dots, headed, page, styled
+from laufruhe.plots.style import AFTER, SKY, entry, entry_of_dots, finish_page, page, styled
 from laufruhe.plots.words import INK
 from laufruhe.present.numbers import RPM
 from laufruhe.solvers.result import Result
@@ -35,7 +35,7 @@ def figure(result: Result) -> Figure:
         f"at {test.at} {BAR * test.friction.mean:.3g} bar, deviation {BAR * test.friction.deviation:.2g}"
         for test in tests
     )
-    return headed(drawn, result, "Friction by measurement", f"Friction mean pressure {text}.", legend)
+    return finish_page(drawn, result, "Friction by measurement", f"Friction mean pressure {text}.", legend)
 
 
 def _fuelled(axes: Axes, test: FrictionTest) -> None:

@@ -1,11 +1,11 @@
-"""What was open, and what was decided of it."""
+"""Table of decisions."""
 
 from __future__ import annotations
 
 from itertools import pairwise
 
 from laufruhe.present.measures import objective_unit
-from laufruhe.present.numbers import DASH, figure, in_grams, prices_of, trimmed, with_unit
+from laufruhe.present.numbers import DASH, figure, in_grams, prices_of, share, trimmed, with_unit
 from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.values import DecisionValue
@@ -25,8 +25,8 @@ def _free(result: Result) -> str:
     if not result.free:
         return ""
     ends = (f"{d.name} from {with_unit(d.low, d.unit)} to {with_unit(d.high, d.unit)}" for d in result.free)
-    share, ranges = f"{trimmed(100.0 * result.problem.tolerance, 1)} %", ", ".join(ends)
-    return f"The optimum is not unique. Equally good within {share}, other decisions adapted: {ranges}."
+    tolerance, ranges = share(result.problem.tolerance, 1), ", ".join(ends)
+    return f"The optimum is not unique. Equally good within {tolerance}, other decisions adapted: {ranges}."
 
 
 def _row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str, ...]:

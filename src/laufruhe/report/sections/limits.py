@@ -1,8 +1,8 @@
-"""What is forbidden, and how the design stands to it."""
+"""Table of limits."""
 
 from __future__ import annotations
 
-from laufruhe.present.measures import changed, is_met, limits_of, objective_unit
+from laufruhe.present.measures import is_changed, is_met, limits_of, objective_unit
 from laufruhe.present.numbers import DASH, number, prices_of, with_unit
 from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
@@ -23,7 +23,7 @@ def tables(result: Result) -> list[Table]:
     rows = tuple(_row(limit, objective_unit(result), decided) for limit in limits)
     sides = {limit.side for limit in limits}
     head = ("limit", "value", sides.pop() if len(sides) == 1 else "bound", "state", "shadow price")
-    title = "Limits" if changed(result) else "Limits, and the design as given"
+    title = "Limits" if is_changed(result) else "Limits, and the design as given"
     notes = [PRICES] if decided and any(limit.shadow_price or limit.tightening_price for limit in limits) else []
     notes += [BOTH] if any(limit.tightening_price is not None for limit in limits) else []
     notes += [

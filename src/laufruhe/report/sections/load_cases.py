@@ -1,4 +1,4 @@
-"""How far mounts give way under loads that are held, and what they carry."""
+"""Table of static load cases."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from laufruhe.machine.mount import every_spring
 from laufruhe.physics.modes import MOTIONS
-from laufruhe.present.measures import changed
+from laufruhe.present.measures import is_changed
 from laufruhe.present.mounting import MountingFacts, critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import DASH, RPM, figure, number, trimmed
 from laufruhe.present.tables import Table
@@ -18,7 +18,7 @@ def tables(result: Result) -> list[Table]:
     if not is_elastic(result):
         return []
     found = [facts_of(design) for design in result.designs.values()]
-    words = (" as given", " as decided") if changed(result) else ("",)
+    words = (" as given", " as decided") if is_changed(result) else ("",)
     modes = [_modes(facts, f"Natural modes{which}") for facts, which in zip(found, words, strict=True)]
     return [*modes, _mounts(result, found[-1])]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from laufruhe.physics.metrics import CycleMeasures
-from laufruhe.present.measures import Places, load_designs, places_of
+from laufruhe.present.measures import Places, evaluations_with_loads, places_of
 from laufruhe.present.numbers import DASH, number, percent
 from laufruhe.present.tables import Table
 from laufruhe.problem.evaluation import measured
@@ -20,7 +20,7 @@ def tables(result: Result) -> list[Table]:
 
 
 def _table(result: Result, places: Places) -> Table:
-    points, designs = result.problem.points, load_designs(result)
+    points, designs = result.problem.points, evaluations_with_loads(result)
     names = places.channel.places(result.problem.engine)
     measures = [
         ((point.name, name) if len(points) > 1 else (name,), each)

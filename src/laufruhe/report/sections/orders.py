@@ -6,13 +6,13 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.present.measures import (
+    evaluations_with_loads,
     hardest_point,
     has_loads,
     has_mounts,
-    load_designs,
     moment_orders,
     mount_orders,
-    padded,
+    pad_orders,
     shaking_orders,
 )
 from laufruhe.present.numbers import aligned
@@ -28,11 +28,11 @@ def tables(result: Result) -> list[Table]:
     """Return the orders above a small share of the largest, at the hardest operating point."""
     if not has_loads(result):
         return []
-    k, designs = hardest_point(result), load_designs(result)
+    k, designs = hardest_point(result), evaluations_with_loads(result)
     pairs = zip(*(_columns(design.loads[k]) for design in designs), strict=True)
     series = [column for pair in pairs for column in pair]
     length = max(len(column) for column in series)
-    table = np.stack([padded(column, length) for column in series], axis=1)
+    table = np.stack([pad_orders(column, length) for column in series], axis=1)
     # a quantity has one scale, before and after
     scale = np.repeat(table.max(axis=0).reshape(-1, len(designs)).max(axis=1), len(designs))
     weight = (table / np.where(scale > 0.0, scale, 1.0)).max(axis=1)

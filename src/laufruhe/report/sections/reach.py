@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from laufruhe.present.numbers import DASH, figure, trimmed, with_unit
+from laufruhe.present.numbers import DASH, figure, share, with_unit
 from laufruhe.present.tables import Table
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.result import Result
@@ -62,7 +62,7 @@ def _sentence(limit: Reached, lead: str) -> str:
 
 def _nearest(design: Nearest) -> str:
     value, required = figure(design.value, design.unit), with_unit(design.limit, design.unit)
-    share = f", {trimmed(100.0 * design.excess, 3)} % beyond" if design.limit else ""
+    beyond = f", {share(design.excess, 3)} beyond" if design.limit else ""
     return (
-        f"The nearest design found breaks '{design.name}' most: {value} where {design.side} {required} is asked{share}."
+        f"The nearest design found breaks '{design.name}' most: {value}, but {design.side} {required} is asked{beyond}."
     )

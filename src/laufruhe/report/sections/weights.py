@@ -7,7 +7,7 @@ import math
 
 from laufruhe.machine import Role, Rotor
 from laufruhe.physics.balance_factor import balance_factors
-from laufruhe.present.measures import changed
+from laufruhe.present.measures import is_changed
 from laufruhe.present.numbers import DASH, number, trimmed
 from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
@@ -31,7 +31,7 @@ def _weights(result: Result) -> Table:
     before = {rotor.name: rotor for rotor in result.initial.engine.rotors}
     made = [r for r in result.final.engine.rotors if r.role in (Role.COUNTERWEIGHT, Role.BALANCER)]
     scale = max((abs(rotor.unbalance) for rotor in made), default=0.0)
-    two = changed(result)
+    two = is_changed(result)
     rows = []
     for rotor in made:
         initial = before.get(rotor.name, rotor)
@@ -58,7 +58,7 @@ def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
 
 
 def _factors(result: Result) -> Table:
-    designs = [result.initial, result.final] if changed(result) else [result.final]
+    designs = [result.initial, result.final] if is_changed(result) else [result.final]
     names = dict.fromkeys(one.cylinders for design in designs for one in balance_factors(design.engine))
     # a weight that one of the designs has is in the other a weight of nothing
     factors = [{one.cylinders: one.factor for one in balance_factors(design.engine, True)} for design in designs]

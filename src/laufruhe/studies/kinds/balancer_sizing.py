@@ -16,8 +16,8 @@ from laufruhe.problem.measure import Measure, counted_rotors
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Record
 from laufruhe.studies.scenes import Point, Scenes, shafts_of
-from laufruhe.studies.swept import SweptPart, solved
-from laufruhe.studies.swept_shown import bars, by_point, over_sweep, swept_names
+from laufruhe.studies.swept import SweptPart, solve_scene
+from laufruhe.studies.swept_report import bars, by_point, over_sweep, swept_names
 from laufruhe.studies.text import Text
 
 MOST_GROUPS = 6
@@ -65,7 +65,7 @@ class BalancerSizing(SweptPart):
 
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """Return the record of one set of shafts at its proven optimum."""
-        return solved(_counting(scenes.problem(point)))
+        return solve_scene(_counting(scenes.problem(point)))
 
     def dataset(self, points: Sequence[Point], records: Sequence[Mapping[str, Any]]) -> xr.Dataset:
         """Return the dataset of a sweep with the shafts of every point."""

@@ -14,9 +14,9 @@ from laufruhe.files.study_tables import Axis, at
 from laufruhe.present import picture as p
 from laufruhe.studies.scenes import Point, Scenes
 from laufruhe.studies.swept import SweptPart, coordinates, dataset
-from laufruhe.studies.swept_shown import (
+from laufruhe.studies.swept_report import (
     bars,
-    claimed,
+    claim_of,
     groups,
     lines,
     metric_axis,
@@ -92,7 +92,7 @@ class CounterweightFraction(SweptPart):
             ]
             legend.append(p.Line(colour=colour, marker="o", label=label))
         panel = p.Panel(marks, p.Axis("balance factor"), metric_axis(data))
-        words = f"Dot: {claimed(data)}, the balance factor left open."
+        words = f"Dot: {claim_of(data)}, the balance factor left open."
         return p.Picture(data.attrs["title"], words, [panel], p.credit(data), legend=legend)
 
 
@@ -120,6 +120,6 @@ def _best_fraction(data: xr.Dataset) -> p.Picture:
         for k in fractions
     ]
     upper = p.Panel(lines(data, names), swept_axis(data, names[-1], named=False), metric_axis(data))
-    words = f"Every point: {claimed(data)}."
+    words = f"Every point: {claim_of(data)}."
     panels = [upper, p.Panel(lower, axis, p.Axis("best balance factor"))]
     return p.Picture(data.attrs["title"], words, panels, p.credit(data), size=(p.WIDE, 2.4))

@@ -23,8 +23,8 @@ from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Record
 from laufruhe.studies.ranked import side_by_side
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.swept import SweptPart, solved
-from laufruhe.studies.swept_shown import MOST_ROWS, bars, by_point, claimed, over_sweep, swept_names
+from laufruhe.studies.swept import SweptPart, solve_scene
+from laufruhe.studies.swept_report import MOST_ROWS, bars, by_point, claim_of, over_sweep, swept_names
 from laufruhe.studies.text import NOTHING, Text, marked_table, number
 from laufruhe.units import readable
 
@@ -83,7 +83,7 @@ class LayoutComparison(SweptPart):
         further = {n: partial(_value, m) for n, m in self._measures(problem, point.case, scenes).items()}
         if self.flywheel_for is not None:
             further[_LEAST_FLYWHEEL] = partial(_least_flywheel, self.flywheel_for)
-        return solved(problem, further)
+        return solve_scene(problem, further)
 
     def _check_cylinders(self, scenes: Scenes) -> None:
         """Refuse layouts of different cylinders, where a difference in size would pass for one of layout."""
@@ -133,7 +133,7 @@ class LayoutComparison(SweptPart):
         at, alike = data.attrs["at"], data.attrs["at"] == EQUAL
         if swept_names(data):
             decided = (data["proof"].values != "as given").any()
-            words = f"Every point: {claimed(data)}." if decided else "As given."
+            words = f"Every point: {claim_of(data)}." if decided else "As given."
             return over_sweep(data, [], words if alike else f"At {at}. {words}")
         words = f"Engines of {at}." if alike else f"At {at}."
         return side_by_side(data, words) if "further" in data else bars(data, data["case"].values, words)

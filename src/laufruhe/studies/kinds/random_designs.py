@@ -16,9 +16,9 @@ from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import decision_values
 from laufruhe.studies.part import Column, Record, variable
 from laufruhe.studies.regions import VALUES
-from laufruhe.studies.sampled import Sampled, in_unit, listed, share_below
+from laufruhe.studies.sampled import Sampled, in_unit, percentiles_of, share_below
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.swept import solved
+from laufruhe.studies.swept import solve_scene
 from laufruhe.studies.text import Text, marked_table, number
 
 WITHIN = "within_limits"
@@ -60,7 +60,7 @@ class RandomDesigns(Sampled):
     def answer(self, point: Point, scenes: Scenes) -> Record:
         """Return the record of the proven optimum, or the values of a piece."""
         if point.span is None:
-            return solved(scenes.problem(point))
+            return solve_scene(scenes.problem(point))
         problem, designs, names = self._prepared(point, scenes)
         u = self.random(point.span, 2 * len(problem.unbalances))
         sizes, angles = u[:, ::2].copy(), u[:, 1::2].copy()
@@ -106,7 +106,7 @@ class RandomDesigns(Sampled):
         rows = []
         for k, name in enumerate(data["case"].values):
             feasible = _feasible(data, objective, k)
-            _, middle, most = listed(feasible)
+            _, middle, most = percentiles_of(feasible)
             cells = [str(name), f"{objective.shape[1]:,}", f"{100.0 * len(feasible) / objective.shape[1]:.3g} %"]
             cells += [
                 number(float(feasible.min(initial=math.inf)) if len(feasible) else math.nan),

@@ -18,9 +18,9 @@ from laufruhe.present import picture as p
 from laufruhe.solvers.conclusion import decision_values
 from laufruhe.studies.part import Column, Record
 from laufruhe.studies.regions import VALUES
-from laufruhe.studies.sampled import Sampled, in_unit, listed, share_below
+from laufruhe.studies.sampled import Sampled, in_unit, percentiles_of, share_below
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.swept import solved
+from laufruhe.studies.swept import solve_scene
 from laufruhe.studies.text import Text, marked_table, number
 
 STATUSES = ("optimal", "feasible", "infeasible", "failed", "impossible")
@@ -80,7 +80,7 @@ class RandomScenes(Sampled):
         for numbers in drawn:
             changes = {span.quantity: span.value(x) for span, x in zip(spans, numbers, strict=True)}
             try:
-                record = solved(scenes.problem(replace(point, changes=changes, span=None)))
+                record = solve_scene(scenes.problem(replace(point, changes=changes, span=None)))
             except (InputError, ModelError):
                 # among so many some engine cannot be built: it is counted, and no reason to stop
                 record = IMPOSSIBLE
@@ -115,7 +115,7 @@ class RandomScenes(Sampled):
             initial, decided = (in_unit(part[key])[0] for key in SIZES[:2])
             cells = [str(name), f"{len(status):,}", f"{int(best.sum()):,}", f"{int((solved_ & ~best).sum()):,}"]
             cells += [f"{int((status == code).sum()):,}" for code in (2, 3, 4)]
-            cells += [number(x) for values in (initial, decided) for x in listed(values)]
+            cells += [number(x) for values in (initial, decided) for x in percentiles_of(values)]
             proven = part.isel(draw=np.flatnonzero(status == 0))
             gap = (proven["objective"] - proven["lower_bound"]) / np.maximum(proven["objective"], 1e-300)
             rows.append([*cells, f"{float(gap.max()):.1e}" if gap.notnull().any() else "–"])

@@ -26,7 +26,7 @@ from laufruhe.problem.measure import Measure, selected
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.part import Part, Record, variable
 from laufruhe.studies.scenes import Point, Scenes
-from laufruhe.studies.swept import AS_GIVEN, FAILED, decided
+from laufruhe.studies.swept import AS_GIVEN, FAILED, decide_scene
 from laufruhe.studies.text import NOTHING, Text, marked_table, number
 from laufruhe.units import readable
 
@@ -137,7 +137,7 @@ class SpeedMap(Part):
         if "as given" in self.designs or not is_open:
             yield "as given", problem.engine, AS_GIVEN
         if "as decided" in self.designs and is_open:
-            result, status, proof = decided(problem)
+            result, status, proof = decide_scene(problem)
             has_design = status in ("optimal", "feasible")
             yield "as decided", result.final.engine if has_design else None, proof if has_design else status
 

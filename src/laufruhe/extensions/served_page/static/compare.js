@@ -8,12 +8,10 @@ import { byId, element, shown } from "./parts.js";
 /** The design that is kept. */
 export class Comparison {
   constructor() {
-    /** @type {{measures: Measured[], state: object} | null} */
     this.kept = null;
   }
 
   /**
-   * @param {Measured[]} measures
    * @param {object} state whatever shows it again
    * @param {HTMLElement} live whose pictures are kept
    */
@@ -39,26 +37,18 @@ export class Comparison {
   }
 }
 
-/**
- * @param {Measured} a
- * @param {Measured | undefined} b
- */
 function row(a, b) {
   const change = b && b.value !== null && a.value ? `${b.value >= a.value ? "+" : ""}${shown((100 * (b.value - a.value)) / a.value, 3)} %` : "-";
   return element("tr", {}, element("th", { scope: "row" }, a.words ?? a.name), ...[a, b].map(cell), element("td", {}, change));
 }
 
-/** @param {Measured | undefined} measured */
 function cell(measured) {
   const broken = measured?.met === false ? ", broken" : "";
   const [unit, factor] = [measured?.shown ?? measured?.unit, measured?.factor ?? 1];
   return element("td", {}, measured && measured.value !== null ? `${shown(measured.value * factor, 5)} ${unit}${broken}` : "-");
 }
 
-/**
- * A picture as it is now.
- * @param {Element} figure
- */
+/** A picture as it is now. */
 function copied(figure) {
   const copy = /** @type {HTMLElement} */ (figure.cloneNode(true));
   copy.removeAttribute("data-figure");

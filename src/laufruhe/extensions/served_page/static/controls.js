@@ -13,23 +13,14 @@ const ORDER = ["Limits", "Engine", "Open numbers", "Mounts"];
 
 /** All sliders of a problem, in groups. */
 export class Controls {
-  /**
-   * @param {HTMLElement} root
-   * @param {(edit: Edit | null, control: Control) => void} moved
-   * @param {(why: string) => void} complain of what was typed
-   */
+  /** @param {(why: string) => void} complain of what was typed */
   constructor(root, moved, complain) {
     this.root = root;
     this.complain = complain;
     this.moved = moved;
-    /** @type {Map<string, {control: Control, box: HTMLElement, range: any, number: any, free: any, said: HTMLElement}>} */
     this.rows = new Map();
   }
 
-  /**
-   * @param {Control[]} controls
-   * @param {Map<string, Edit>} edits
-   */
   build(controls, edits) {
     this.rows.clear();
     this.root.querySelectorAll("fieldset.numbers").forEach((old) => old.remove());
@@ -45,11 +36,7 @@ export class Controls {
     }
   }
 
-  /**
-   * One number: slider, figure, and the way back.
-   * @param {Control} control
-   * @param {Edit | undefined} edit
-   */
+  /** One number: slider, figure, and the way back. */
   row(control, edit) {
     const id = `c-${control.name}`;
     const value = edit ? parseFloat(edit[2]) : control.value;
@@ -71,11 +58,7 @@ export class Controls {
     return box;
   }
 
-  /**
-   * Take a number that was typed, or say why it is refused.
-   * @param {Control} control
-   * @param {any} number
-   */
+  /** Take a number that was typed, or say why it is refused. */
   typed(control, number) {
     const { value, why } = typed(number.value);
     number.setAttribute("aria-invalid", String(Boolean(why)));
@@ -83,10 +66,6 @@ export class Controls {
     else this.set(control, value ?? NaN);
   }
 
-  /**
-   * @param {Control} control
-   * @param {number} value
-   */
   set(control, value) {
     const row = this.rows.get(control.name);
     if (!row || !Number.isFinite(value)) return;
@@ -98,7 +77,6 @@ export class Controls {
     this.moved([control.way, control.name, control.unit ? `${text} ${control.unit}` : Number(text)], control);
   }
 
-  /** @param {Control} control */
   release(control) {
     this.place(control.name, control.value);
     this.mark(control.name, false);
@@ -106,11 +84,7 @@ export class Controls {
     this.moved(null, control);
   }
 
-  /**
-   * Move a slider without asking for anything.
-   * @param {string} name
-   * @param {number} value
-   */
+  /** Move a slider without asking for anything. */
   place(name, value) {
     const row = this.rows.get(name);
     if (!row) return;
@@ -118,21 +92,13 @@ export class Controls {
     row.number.value = shown(value, 6);
   }
 
-  /**
-   * @param {string} name
-   * @param {boolean} changed
-   */
   mark(name, changed) {
     const row = this.rows.get(name);
     row?.box.classList.toggle("changed", changed);
     if (row) row.free.hidden = !changed;
   }
 
-  /**
-   * How a design stands to its limits, what they cost, and which contradict each other.
-   * @param {{name: string, words: string, broken: boolean}[]} limits
-   * @param {string[]} conflict
-   */
+  /** How a design stands to its limits, what they cost, and which contradict each other. */
   tell(limits, conflict) {
     for (const { control, box, said } of this.rows.values()) {
       if (!control.limit) continue;

@@ -8,10 +8,6 @@ import { element } from "./parts.js";
 
 /** The list of cranks. */
 export class Crank {
-  /**
-   * @param {HTMLElement} root
-   * @param {(edit: [string, string, any] | null) => void} moved
-   */
   constructor(root, moved) {
     this.moved = moved;
     /** @type {string | null} what the ranking is about */
@@ -37,7 +33,6 @@ export class Crank {
   }
 
   /**
-   * @param {Star[]} ranking
    * @param {string} chosen the star of the state, as JSON
    * @param {string} about what they were ranked for
    */
@@ -49,10 +44,7 @@ export class Crank {
     this.choose(chosen);
   }
 
-  /**
-   * Say whether the ranking is about the settings that stand now.
-   * @param {string} about
-   */
+  /** Say whether the ranking is about the settings that stand now. */
   check(about) {
     if (this.about === null) return;
     const isOld = about !== this.about;
@@ -60,14 +52,12 @@ export class Crank {
     this.said.textContent = isOld ? "Ranked for earlier settings:" : "Best cranks found, all else decided for each:";
   }
 
-  /** @param {string} chosen */
   choose(chosen) {
     this.list.querySelectorAll("button").forEach((button) => {
       button.setAttribute("aria-pressed", String(button.dataset.star === chosen));
     });
   }
 
-  /** @param {Star} star */
   entry(star) {
     const bank = star.bank ? `, banks at ${star.bank}°` : "";
     const told = `${star.throws}°${bank}: ${star.text}${star.proven ? "" : `, at least ${star.bound}`} `;

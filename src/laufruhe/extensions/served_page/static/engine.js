@@ -16,12 +16,9 @@ const PACE = 120;
 
 /** A picture of one engine. */
 export class EngineView {
-  /** @param {HTMLElement} root */
   constructor(root) {
     this.root = root;
-    /** @type {Engine | null} */
     this.engine = null;
-    /** @type {Record<string, number>} */
     this.design = {};
     this.angle = 0;
     this.turning = 0;
@@ -47,10 +44,6 @@ export class EngineView {
     if (runs) this.step(this.turning, performance.now());
   }
 
-  /**
-   * @param {number} mine
-   * @param {number} before
-   */
   step(mine, before) {
     requestAnimationFrame((now) => {
       if (mine !== this.turning || !this.engine) return;
@@ -67,7 +60,6 @@ export class EngineView {
     this.draw();
   }
 
-  /** @param {Engine | null} engine */
   load(engine) {
     this.engine = engine;
     byId("turning").hidden = !engine;
@@ -75,7 +67,6 @@ export class EngineView {
     this.draw();
   }
 
-  /** @param {Record<string, number>} design */
   follow(design) {
     this.design = design;
     this.draw();
@@ -98,18 +89,12 @@ export class EngineView {
   }
 }
 
-/**
- * How far the angle moves in so many milliseconds.
- * @param {number} angle
- * @param {number} milliseconds
- * @param {number} cycle
- */
+/** How far the angle moves in so many milliseconds. */
 export function turned(angle, milliseconds, cycle) {
   // a frame may have begun before it was asked for
   return (angle + (PACE * Math.max(milliseconds, 0)) / 1000) % cycle;
 }
 
-/** @param {Engine} engine */
 function frame(engine) {
   const room = 0.8 * engine.bore;
   const places = [...engine.parts.flatMap((p) => [...p.pins, ...p.pistons, ...p.bodies.flatMap((b) => b.shapes.flat())]),
@@ -119,15 +104,8 @@ function frame(engine) {
   return [left, top, Math.max(...ys) + room - left, Math.max(...zs) + room - top].map((v) => v.toFixed(1)).join(" ");
 }
 
-/** @param {number[]} place */
 const up = (place) => [place[0], -place[1]];
 
-/**
- * @param {Engine} engine
- * @param {Part} part
- * @param {number} step
- * @param {number} angle
- */
 function slider(engine, part, step, angle) {
   const bore = engine.bore;
   if (part.bodies.length) return [...part.bodies.map((body) => shape(body, step)), ...crank(engine, part, step)];
@@ -145,11 +123,6 @@ function slider(engine, part, step, angle) {
   return found;
 }
 
-/**
- * @param {Engine} engine
- * @param {Part} part
- * @param {number} step
- */
 function crank(engine, part, step) {
   const [[cx, cy], [px, py], bore] = [up(part.crank), up(part.pins[step]), engine.bore];
   return [drawn("line", { class: "web", x1: cx, y1: cy, x2: px, y2: py, "stroke-width": 0.3 * bore }),
@@ -157,19 +130,11 @@ function crank(engine, part, step) {
     drawn("circle", { class: "metal", cx, cy, r: 0.08 * bore, "stroke-width": 0.015 * bore })];
 }
 
-/**
- * @param {{moves: boolean, shapes: number[][][]}} body
- * @param {number} step
- */
 function shape(body, step) {
   const points = body.shapes[step].map((place) => up(place).join(",")).join(" ");
   return drawn("polygon", { class: body.moves ? "piston" : "fixed", points, "stroke-width": 1 });
 }
 
-/**
- * @param {Engine} engine
- * @param {Part} part
- */
 function walls(engine, part) {
   const turn = (part.bank * Math.PI) / 180;
   const [along, side] = [[Math.sin(turn), -Math.cos(turn)], [Math.cos(turn), Math.sin(turn)]];
@@ -185,13 +150,7 @@ function walls(engine, part) {
   });
 }
 
-/**
- * A half disc of steel with the weight's unbalance (zeta = z + i y).
- * @param {Engine} engine
- * @param {Rotor} rotor
- * @param {Record<string, number>} design
- * @param {number} angle
- */
+/** A half disc of steel with the weight's unbalance (zeta = z + i y). */
 function weight(engine, rotor, design, angle) {
   let [re, im] = rotor.unbalance;
   for (const own of rotor.by) {
@@ -210,10 +169,6 @@ function weight(engine, rotor, design, angle) {
   drawn("title", {}, rotor.name));
 }
 
-/**
- * @param {Engine} engine
- * @param {{name: string, at: number[]}} mount
- */
 function stand(engine, mount) {
   const [[x, y], size] = [up(mount.at), 0.14 * engine.bore];
   return drawn("polygon", { class: "mount", points: `${x},${y - size} ${x - size},${y + size} ${x + size},${y + size}` },

@@ -8,12 +8,7 @@ const [WIDE, HIGH, LEFT, LOW, TOP] = [640, 376, 74, 44, 28];
  *   axes: {across: [string, number], value: [string, number]}, name: string, design: Record<string, number>}} Point
  */
 
-/**
- * @param {HTMLElement} root
- * @param {Point[]} points
- * @param {string} across its name
- * @param {(point: Point) => void} picked
- */
+/** @param {string} across its name */
 export function drawFront(root, points, across, picked) {
   if (!points.length) {
     root.replaceChildren();
@@ -32,11 +27,6 @@ export function drawFront(root, points, across, picked) {
   root.replaceChildren(svg);
 }
 
-/**
- * @param {number[]} values
- * @param {number} from
- * @param {number} to
- */
 function scale(values, from, to) {
   const [least, most] = [Math.min(...values), Math.max(...values)];
   const room = 0.05 * (most - least || Math.abs(most) || 1);
@@ -45,12 +35,6 @@ function scale(values, from, to) {
   return { low, high, at };
 }
 
-/**
- * @param {{low: number, high: number, at: (value: number) => number}} x
- * @param {{low: number, high: number, at: (value: number) => number}} y
- * @param {Point} point
- * @param {string} across
- */
 function axes(x, y, point, across) {
   const found = [];
   const [unit, factor] = point.axes.across;
@@ -70,12 +54,6 @@ function axes(x, y, point, across) {
   return found;
 }
 
-/**
- * @param {Point} point
- * @param {{at: (value: number) => number}} x
- * @param {{at: (value: number) => number}} y
- * @param {(point: Point) => void} picked
- */
 function dot(point, x, y, picked) {
   const made = drawn("circle", { cx: x.at(point.across), cy: y.at(point.value), r: 4.5, tabindex: 0, role: "button",
     "aria-label": `Show the design with ${point.words}` }, drawn("title", {}, point.words));

@@ -1,27 +1,20 @@
-// What the page and its server say to each other.
+// Communication between page and server.
 
 const KEPT = "laufruhe-token";
 
-/** An answer that says why there is none. */
+/** An error answer. */
 export class Refusal extends Error {}
-/** Nobody answers any more. */
+/** The server has ended. */
 export class Gone extends Error {}
 
 let token = "";
 
-/**
- * Keys of the address behind #.
- * @returns {URLSearchParams}
- */
+/** Keys of the address behind #. */
 export function addressed() {
   return new URLSearchParams(location.hash.slice(1));
 }
 
-/**
- * Write one key of the address; the others stay.
- * @param {string} key
- * @param {string | null} value
- */
+/** Write one key of the address; the others stay. */
 export function address(key, value) {
   const keys = addressed();
   if (value === null) keys.delete(key);
@@ -29,10 +22,7 @@ export function address(key, value) {
   history.replaceState(null, "", `#${keys}`);
 }
 
-/**
- * What was changed in the state of another time, or of a link.
- * @returns {[string, string, any][]}
- */
+/** Edits of a stored state or of a link. */
 export function recalled() {
   try {
     return JSON.parse(addressed().get("e") || "[]");
@@ -41,7 +31,7 @@ export function recalled() {
   }
 }
 
-/** Take the token out of the address, or out of what this tab keeps, so that a link that is handed on has none. */
+/** Move the token from the address into the tab's storage, so that shared links contain none. */
 export async function enter() {
   const keys = addressed();
   const [told, ticket] = [keys.get("t"), keys.get("o")];
@@ -57,12 +47,6 @@ export async function enter() {
   sessionStorage.setItem(KEPT, token);
 }
 
-/**
- * @param {string} path
- * @param {object} body
- * @param {AbortSignal} [signal]
- * @returns {Promise<Response>}
- */
 async function sent(path, body, signal) {
   try {
     return await fetch(path, {
@@ -76,10 +60,8 @@ async function sent(path, body, signal) {
 }
 
 /**
- * Ask once.
- * @param {string} path
- * @param {object} body
- * @returns {Promise<any>} what is answered; `dropped` where a newer request came
+ * Send one request.
+ * @returns {Promise<any>} the answer; `dropped` if a newer request came
  */
 export async function ask(path, body) {
   const response = await sent(path, body);
@@ -93,13 +75,7 @@ export async function ask(path, body) {
   return answer;
 }
 
-/**
- * Ask for lines that come as they are made.
- * @param {string} path
- * @param {object} body
- * @param {(line: any) => void} each
- * @param {AbortSignal} [signal]
- */
+/** Request lines that arrive as they are made. */
 export async function listen(path, body, each, signal) {
   const response = await sent(path, body, signal);
   if (!response.ok || !response.body) throw new Refusal((await response.json()).error);

@@ -1,12 +1,7 @@
-// Which of several objectives comes first.
+// Selection of the first objective.
 import { element } from "./parts.js";
 
-/**
- * @param {HTMLElement} root
- * @param {string[]} names in order
- * @param {number} first
- * @param {(edit: [string, string, number] | null) => void} moved
- */
+/** @param {string[]} names in order */
 export function offerObjectives(root, names, first, moved) {
   root.querySelector("#objectives")?.remove();
   if (names.length < 2) return;

@@ -1,4 +1,4 @@
-// The page of a problem: what is asked, when, and where answers are shown.
+// The page of a problem: sends requests and shows answers.
 import { address, addressed, ask, enter, Gone, listen, recalled, Refusal } from "./link.js";
 import { Comparison } from "./compare.js";
 import { Controls } from "./controls.js";
@@ -11,13 +11,11 @@ import { byId, download, element } from "./parts.js";
 import { latencies, state } from "./state.js";
 import { busy, complain, tellClaim, tellFile, tellGone, tellMark, tellPending } from "./words.js";
 
-/** Milliseconds of rest after which the whole problem is solved, and before something is asked again. */
+/** Rest before the whole problem is solved, and before a repeated request [ms]. */
 const [REST, RETRY, MOST_RETRIES] = [350, 100, 3];
-/** Milliseconds beyond which a model is opened when sliders rest. */
+/** Duration of a model above which it is opened only when sliders rest [ms]. */
 const SLOW = 40;
 const CRANK = ["star", "crank"];
-
-/** @typedef {import("./controls.js").Edit} Edit */
 
 let inputAt = 0;
 
@@ -36,23 +34,19 @@ const comparison = new Comparison();
 const trade = new Trade(picked);
 const pictures = new Pictures();
 
-/**
- * A number has another value, or that of the file again.
- * @param {string} name
- * @param {Edit | null} edit
- */
+/** Change a number, or reset it to the file's value. */
 function changed(name, edit) {
   if (!inputAt) inputAt = performance.now();
   if (edit) state.edits.set(name, edit);
   else state.edits.delete(name);
-  // what is held by hand is held no other way
+  // a number fixed by hand is not fixed otherwise
   state.held = state.held.filter((held) => held[1] !== name);
   moved();
   remember();
   follow();
 }
 
-/** Other settings stand from now on: what is claimed is about earlier ones. */
+/** Start new settings; existing claims are about earlier ones. */
 function moved() {
   state.position += 1;
   state.refused = false;
@@ -63,7 +57,7 @@ function moved() {
   mark();
 }
 
-/** Say of all that is claimed which settings it is about, where that are not those that stand now. */
+/** Label claims about earlier settings. */
 function mark() {
   const isOld = state.claim !== null && state.claim.position !== state.position;
   const [words, why] = state.refused ? ["Last valid settings", "the new ones are refused"] : ["Earlier settings", "the new ones are being computed"];
@@ -71,10 +65,10 @@ function mark() {
   if (isOld) state.handle?.withdraw(`${words}; ${why}.`);
 }
 
-/** What a ranking of cranks is about: all settings but the crank. */
+/** Key of a ranking of cranks: all settings but the crank. */
 const ranked = () => JSON.stringify([state.version, [...state.edits.values()].filter((edit) => !CRANK.includes(edit[1]))]);
 
-/** The state in the address once nothing moves, so that a link shows it. */
+/** Write the state into the address when nothing moves. */
 function remember() {
   clearTimeout(state.writing);
   state.writing = setTimeout(written, REST);
@@ -86,11 +80,10 @@ function written() {
   crank.choose(star ? JSON.stringify(star[2]) : "");
 }
 
-/** @returns {{edits: Edit[], held: Edit[], has: string, position: number}} */
 const asked = () => ({ edits: [...state.edits.values()], held: state.held, has: state.isLater ? "later" : state.key,
   position: state.position });
 
-/** Ask for the optimum that follows; while an answer is on its way only the newest state waits. */
+/** Request the fast optimum; during a request only the newest state waits. */
 async function follow() {
   clearTimeout(state.resting);
   if (state.asking) {
@@ -113,7 +106,7 @@ async function follow() {
   } catch (error) {
     failed(error);
     if (error instanceof Refusal && state.held.length) {
-      // what was held may be what no longer fits
+      // a fixed value may no longer fit
       state.held = [];
       state.again = true;
     } else if (error instanceof Refusal && mine === state.position) {
@@ -128,13 +121,13 @@ async function follow() {
   }
 }
 
-/** The whole problem is solved when nothing has moved for a while. */
+/** Schedule the solution of the whole problem. */
 function rest() {
   clearTimeout(state.resting);
   state.resting = setTimeout(rested, REST);
 }
 
-/** Nothing has moved for a while: pictures that wait are drawn, then all of it is solved. */
+/** Draw waiting pictures, then solve the whole problem. */
 function rested() {
   if (!state.isLater) return settle();
   state.isLater = false;
@@ -158,10 +151,7 @@ async function settle() {
   }
 }
 
-/**
- * The whole problem was solved: its claim, with the model of what was decided beside weights.
- * @param {any} answer
- */
+/** Show the solution of the whole problem: its claim, and the model of its fixed numbers. */
 async function settled(answer) {
   crank.tell(answer.ranking, JSON.stringify(state.edits.get("star")?.[2] ?? answer.ranking[0]?.orders[0]?.star ?? ""), ranked());
   const isOther = JSON.stringify(answer.holds) !== JSON.stringify(state.held);
@@ -175,13 +165,10 @@ async function settled(answer) {
   answer.holds.filter((/** @type {Edit} */ edit) => edit[0] === "fix").forEach((/** @type {Edit} */ edit) => controls.place(edit[1], parseFloat(edit[2])));
   tell(answer);
   pictures.offer(Boolean(answer.design));
-  // where nothing slides they are all that there is to see
+  // without sliders the pictures are all there is
   if (answer.design && !state.handle) pictures.draw(asked().edits).catch(failed);
 }
 
-/**
- * @param {any} answer
- */
 async function show(answer) {
   if (answer.claim.position === state.position) complain("");
   const isDrawn = answer.engine !== undefined || answer.key === state.key;
@@ -190,10 +177,7 @@ async function show(answer) {
   tell(answer, isDrawn);
 }
 
-/**
- * Take over another model, where an answer has one.
- * @param {any} answer
- */
+/** Replace the model if an answer has one. */
 async function draw(answer) {
   if (answer.engine === undefined) return;
   const began = performance.now();
@@ -206,7 +190,6 @@ async function draw(answer) {
   state.opening = performance.now() - began;
 }
 
-/** @param {any} model */
 async function first(model) {
   state.handle = await window.laufruheLive.show(model, byId("live"));
   state.handle.onDesign(designed);
@@ -256,14 +239,13 @@ function drawDesign() {
   comparison.tell(state.handle.measures());
 }
 
-/** What of the design that is shown no slider moves in proportion, by the exact model. */
+/** Request exact values of measures that do not follow sliders. */
 async function measure() {
   const [values, mine] = [state.handle.design(), state.position];
   const found = await ask("measure", { edits: [...state.edits.values()], held: state.held, design: values });
   if (found.limits && mine === state.position && !state.gone) state.handle?.setExact({ ...found, values });
 }
 
-/** @param {unknown} error */
 function failed(error) {
   if (error instanceof Gone) lost();
   else if (error instanceof Refusal) {
@@ -271,7 +253,7 @@ function failed(error) {
   } else throw error;
 }
 
-/** The server has ended: what the page knows still moves. */
+/** Handle the end of the server: the loaded model still works. */
 function lost() {
   if (state.gone) return;
   state.gone = true;
@@ -281,14 +263,13 @@ function lost() {
   tellGone(byId("file").textContent);
 }
 
-/** @param {{design: Record<string, number>}} point */
 function picked(point) {
   byId("follows").checked = false;
   state.handle.setDesign(point.design, {});
   drawDesign();
 }
 
-/** Begin, or begin again with another file. */
+/** Load the problem, or reload a changed file. */
 async function begin() {
   const told = await ask("begin", {});
   state.version = told.version;
@@ -322,7 +303,7 @@ async function events() {
   lost();
 }
 
-/** As the file has it. */
+/** Reset to the file. */
 function back() {
   state.edits.clear();
   state.held = [];
@@ -338,7 +319,7 @@ async function save() {
   download(toml, file);
 }
 
-/** Keep what is shown, or show what was kept. */
+/** Store the displayed design, or show the stored one. */
 function keep() {
   const kept = { edits: new Map(state.edits), held: [...state.held], design: state.handle.design() };
   comparison.keep(state.handle.measures(), kept, byId("live"));
@@ -358,7 +339,6 @@ async function showKept() {
   drawDesign();
 }
 
-/** @param {string} id @param {() => any} work */
 function onClick(id, work) {
   byId(id).addEventListener("click", () => Promise.resolve(work()).catch(failed));
 }
@@ -375,7 +355,7 @@ async function start() {
   onClick("draw", () => trade.draw({ edits: asked().edits, held: state.held }));
   onClick("picture", () => pictures.draw(asked().edits));
   engine.listen();
-  // what sticks under the optimum has to know how high that is
+  // elements below the sticky optimum need its height
   new ResizeObserver(() => document.body.style.setProperty("--status", `${byId("status").offsetHeight}px`)).observe(byId("status"));
   byId("follows").addEventListener("change", () => {
     if (byId("follows").checked && state.design) state.handle?.setDesign(state.design, {});

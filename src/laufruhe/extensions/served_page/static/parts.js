@@ -1,9 +1,6 @@
-// Pieces of a page: elements with their words, and numbers as they are read.
+// Common helpers: elements with text, and numbers for display.
 
-/**
- * @param {string} id
- * @returns {any} the element, which has to be there
- */
+/** @returns {any} the element, which must exist */
 export function byId(id) {
   const found = document.getElementById(id);
   if (!found) throw new Error(`no #${id}`);
@@ -16,22 +13,13 @@ export function byId(id) {
  */
 export const { element, drawn, download, typed } = window.laufruheLive;
 
-/**
- * A number to so many figures, without zeros that say nothing.
- * @param {number} value
- * @param {number} [digits]
- */
+/** A number with some figures, without trailing zeros. */
 export function shown(value, digits = 4) {
   if (!Number.isFinite(value)) return "-";
   return String(Number(value.toPrecision(digits)));
 }
 
-/**
- * Round numbers between two ends, for an axis.
- * @param {number} low
- * @param {number} high
- * @param {number} [count]
- */
+/** Round numbers between two ends, for an axis. */
 export function ticks(low, high, count = 5) {
   const rough = (high - low) / count || 1;
   const size = 10 ** Math.floor(Math.log10(rough));

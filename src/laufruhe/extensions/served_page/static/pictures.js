@@ -1,15 +1,14 @@
-// Pictures of a report, drawn for the optimum that is proven now.
+// Pictures of the report of the last solution.
 import { listen, Refusal } from "./link.js";
 import { byId, element } from "./parts.js";
 
-/** What was solved last, in pictures. */
+/** Pictures of the last solution. */
 export class Pictures {
   constructor() {
-    /** @type {AbortController | null} */
     this.asking = null;
   }
 
-  /** @param {boolean} has whether there is an optimum to be drawn */
+  /** @param {boolean} has true if there is an optimum to draw */
   offer(has) {
     this.asking?.abort();
     if (!has && byId("pictures").hidden) return;
@@ -32,7 +31,6 @@ export class Pictures {
     }
   }
 
-  /** @param {{error?: string, image?: string, caption: string, of: number}} told */
   add(told) {
     if (told.error) throw new Refusal(told.error);
     if (!told.image) return;

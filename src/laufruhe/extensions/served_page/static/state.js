@@ -1,22 +1,18 @@
-// What the page knows of itself.
-
-/** @typedef {import("./controls.js").Edit} Edit */
+// State of the page.
 
 export const state = {
   /** @type {Map<string, Edit>} by the name of the number */
   edits: new Map(),
-  /** @type {Edit[]} */
   held: [],
   key: "",
-  /** @type {any} */
   handle: null,
-  /** Number of the settings that stand now: every change makes another one. */
+  /** Number of the current settings; every change increments it. */
   position: 1,
-  /** Whether these settings were refused. */
+  /** True if these settings were refused. */
   refused: false,
-  /** @type {import("./words.js").Claim | null} what is claimed on the page, maybe about other settings */
+  /** @type {import("./words.js").Claim | null} displayed claim, possibly about earlier settings */
   claim: null,
-  /** @type {Record<string, number> | null} the design that it is about */
+  /** @type {Record<string, number> | null} design of the claim */
   design: null,
   version: 0,
   gone: false,
@@ -27,10 +23,10 @@ export const state = {
   writing: 0,
   dropped: 0,
   isLater: false,
-  /** Milliseconds that the last model took. */
+  /** Duration of the last model [ms]. */
   opening: 0,
-  /** Whether a design was set by the page and not by the user. */
+  /** True if the page set the design, not the user. */
   setting: false,
 };
-/** For who measures: milliseconds from an input to the picture drawn, to the answer, and of the server's processor. */
+/** Measured durations: from input to picture, to answer, and of the server's processor [ms]. */
 export const latencies = /** @type {number[][]} */ ([]);

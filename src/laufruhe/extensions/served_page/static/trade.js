@@ -1,17 +1,14 @@
-// The front fills in while it is looked at.
+// The Pareto front, drawn point by point.
 import { drawFront } from "./front.js";
 import { listen, Refusal } from "./link.js";
 import { byId, element } from "./parts.js";
 
-/** @param {any[]} points */
 const counted = (points) => `${points.length} point${points.length === 1 ? "" : "s"}`;
 
-/** What the objective is traded against, and the points so far. */
+/** The other measure, and the points so far. */
 export class Trade {
-  /** @param {(point: import("./front.js").Point) => void} picked */
   constructor(picked) {
     this.picked = picked;
-    /** @type {AbortController | null} */
     this.asking = null;
   }
 
@@ -25,14 +22,14 @@ export class Trade {
     this.clear("");
   }
 
-  /** @param {string} why what is drawn no longer holds */
+  /** @param {string} why reason for discarding the drawn front */
   clear(why) {
     this.asking?.abort();
     byId("front").replaceChildren();
     byId("front-state").textContent = why;
   }
 
-  /** Other settings stand: what is drawn is about earlier ones. */
+  /** Mark the front as being about earlier settings. */
   withdraw() {
     const has = byId("front").childElementCount > 0 || byId("front-state").textContent !== "";
     this.clear(has ? "The settings have changed: draw it again." : "");
@@ -43,7 +40,6 @@ export class Trade {
     this.clear("The first point is being computed.");
     const mine = new AbortController();
     this.asking = mine;
-    /** @type {import("./front.js").Point[]} */
     const points = [];
     const across = byId("across").value;
     try {
@@ -54,11 +50,6 @@ export class Trade {
     }
   }
 
-  /**
-   * @param {any} told
-   * @param {import("./front.js").Point[]} points
-   * @param {string} across
-   */
   add(told, points, across) {
     if (told.error) throw new Refusal(told.error);
     if (!told.words) return;

@@ -1,4 +1,4 @@
-// Renders what the server claims of a design. What is claimed, and how strongly, is decided in claims.py alone.
+// Renders the server's claims about a design; claims.py decides their content and strength.
 import { byId, element } from "./parts.js";
 
 /**
@@ -6,7 +6,6 @@ import { byId, element } from "./parts.js";
  *   breaks: string, is_last: boolean}} Claim
  */
 
-/** @param {Claim} claim */
 export function tellClaim(claim) {
   const place = byId("claim");
   Object.assign(place.dataset, { kind: claim.kind, position: claim.position, value: claim.value ?? "", last: claim.is_last });
@@ -16,15 +15,15 @@ export function tellClaim(claim) {
   tellPending(claim.is_last ? "" : "; the whole problem is being solved");
 }
 
-/** @param {string} words what is still being done */
+/** @param {string} words work in progress */
 export function tellPending(words) {
   const place = document.getElementById("pending");
   if (place) place.textContent = words;
 }
 
 /**
- * Mark all that is claimed as being about other settings than those that stand now; at once.
- * @param {string} words which settings it is about; nothing where it is about those that stand now
+ * Mark all claims as being about other settings than the current ones.
+ * @param {string} words settings that the claim is about; empty for the current ones
  */
 export function tellMark(words) {
   document.body.classList.toggle("earlier", Boolean(words));
@@ -33,7 +32,7 @@ export function tellMark(words) {
 }
 
 /**
- * Say how long the whole problem is being solved.
+ * Show the time of the running solution.
  * @returns {() => void} what ends it
  */
 export function busy() {
@@ -45,7 +44,7 @@ export function busy() {
   return () => clearInterval(timer);
 }
 
-/** @param {string} text one line, or nothing where all is well */
+/** @param {string} text one line; empty without an error */
 export function complain(text) {
   const place = byId("complaint");
   if (place.textContent === text) return;
@@ -53,7 +52,6 @@ export function complain(text) {
   place.textContent = text;
 }
 
-/** @param {string | null} file */
 export function tellGone(file) {
   const banner = byId("banner");
   banner.hidden = false;

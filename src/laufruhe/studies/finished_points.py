@@ -12,12 +12,12 @@ from pathlib import Path
 
 from laufruhe.studies.part import Record
 
-KEPT = ".unfinished-points.jsonl"
+FINISHED_POINTS = ".unfinished-points.jsonl"
 # of a line: enough to tell it from any other, and from itself with anything changed
 _SUM = 32
 
 
-class KeptPoints(AbstractContextManager["KeptPoints"]):
+class FinishedPoints(AbstractContextManager["FinishedPoints"]):
     """Finished points of a file by fingerprint; each is on disk as soon as it is known.
 
     Every line begins with a checksum of the rest of it. What is cut, changed or no point at all does not fit its

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from laufruhe.studies.kept_points import KEPT, KeptPoints
+from laufruhe.studies.finished_points import FINISHED_POINTS, FinishedPoints
 from laufruhe.studies.reader import load_study
 from laufruhe.studies.runner import run
 from problem_files import PROBLEMS
@@ -31,7 +31,7 @@ cases = [{ name = "single", problem = "tractor-single.toml" }]
 
 def written(path: Path, count: int = 5) -> bytes:
     path.unlink(missing_ok=True)
-    with KeptPoints(path, MARKS) as store:
+    with FinishedPoints(path, MARKS) as store:
         for mark, record in list(zip(MARKS, RECORDS, strict=True))[:count]:
             store.keep(mark, 0.25, record)
     return path.read_bytes()
@@ -39,7 +39,7 @@ def written(path: Path, count: int = 5) -> bytes:
 
 def trusted(path: Path) -> list[int]:
     """Which points are taken from a file; each as it was kept, or the test fails."""
-    with KeptPoints(path, MARKS) as store:
+    with FinishedPoints(path, MARKS) as store:
         for mark, record in ((mark, store.read(mark)) for mark in store.seconds):
             whole = RECORDS[MARKS.index(mark)]
             assert json.dumps(record) == json.dumps(whole)
@@ -48,15 +48,15 @@ def trusted(path: Path) -> list[int]:
 
 
 def test_points_are_read_as_they_were_kept(tmp_path: Path) -> None:
-    written(tmp_path / KEPT)
-    assert trusted(tmp_path / KEPT) == [0, 1, 2, 3, 4]
-    with KeptPoints(tmp_path / KEPT, MARKS[1:3]) as store:
+    written(tmp_path / FINISHED_POINTS)
+    assert trusted(tmp_path / FINISHED_POINTS) == [0, 1, 2, 3, 4]
+    with FinishedPoints(tmp_path / FINISHED_POINTS, MARKS[1:3]) as store:
         assert list(store.seconds) == MARKS[1:3]
 
 
 def test_a_byte_changed_anywhere_costs_one_point(tmp_path: Path) -> None:
     """A point is as it was kept, or it is none; an end of line may be lost without harm, there are two."""
-    path = tmp_path / KEPT
+    path = tmp_path / FINISHED_POINTS
     content = written(path)
     rng = random.Random(1)
     for place in range(0, len(content), 3):
@@ -69,7 +69,7 @@ def test_a_byte_changed_anywhere_costs_one_point(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", range(40))
 def test_lines_in_any_disorder(tmp_path: Path, seed: int) -> None:
-    path, rng = tmp_path / KEPT, random.Random(seed)
+    path, rng = tmp_path / FINISHED_POINTS, random.Random(seed)
     lines = [line for line in written(path).splitlines(keepends=True) if line.strip()]
     whole = [*lines, rng.choice(lines)]
     rng.shuffle(whole)
@@ -79,7 +79,7 @@ def test_lines_in_any_disorder(tmp_path: Path, seed: int) -> None:
     assert len(found) >= 4
     # what is added after a line that was cut is not lost with it
     missing = next((k for k in range(5) if k not in found), 0)
-    with KeptPoints(path, MARKS) as store:
+    with FinishedPoints(path, MARKS) as store:
         store.keep(MARKS[missing], 0.25, RECORDS[missing])
     assert sorted({*found, missing}) == trusted(path)
 
@@ -89,18 +89,18 @@ def test_lines_in_any_disorder(tmp_path: Path, seed: int) -> None:
                 b'["a", 1, {}]\n', b'["' + b"0" * 32 + b'", 0.25, {"objective": 1.0}]\n', b"9" * 5000 + b"\n"],
 )  # fmt: skip
 def test_what_is_no_point_is_passed_over(tmp_path: Path, content: bytes) -> None:
-    path = tmp_path / KEPT
+    path = tmp_path / FINISHED_POINTS
     path.write_bytes(content)
     assert trusted(path) == []
-    with KeptPoints(path, MARKS) as store:
+    with FinishedPoints(path, MARKS) as store:
         store.keep(MARKS[0], 0.25, RECORDS[0])
     assert trusted(path) == [0]
 
 
 def test_two_at_once_keep_whole_lines(tmp_path: Path) -> None:
     """One that found the end of the file before the other added to it."""
-    path = tmp_path / KEPT
-    with KeptPoints(path, MARKS) as one, KeptPoints(path, MARKS) as other:
+    path = tmp_path / FINISHED_POINTS
+    with FinishedPoints(path, MARKS) as one, FinishedPoints(path, MARKS) as other:
         for k in range(5):
             (one if k % 2 else other).keep(MARKS[k], 0.25, RECORDS[k])
             one.keep(MARKS[0], 0.25, RECORDS[0])
@@ -109,7 +109,7 @@ def test_two_at_once_keep_whole_lines(tmp_path: Path) -> None:
 
 def test_a_changed_figure_is_solved_again(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(STUDY, encoding="utf-8")
-    study, path = load_study(tmp_path / "s.toml"), tmp_path / "kept" / KEPT
+    study, path = load_study(tmp_path / "s.toml"), tmp_path / "kept" / FINISHED_POINTS
 
     def computed() -> xr.Dataset:
         return run(study, PROBLEMS, path)[0]["p"]

@@ -34,7 +34,7 @@ def with_unit(values: xr.DataArray) -> str:
     return name if unit in ("", "1") else f"{name} [{unit}]"
 
 
-def settled(value: float, scale: float) -> float:
+def without_rounding(value: float, scale: float) -> float:
     """Return the value, or zero if it is a rounding relative to the scale."""
     return 0.0 if abs(value) < NEGLIGIBLE * abs(scale) else value
 
@@ -50,7 +50,7 @@ def readable_metric(data: xr.Dataset) -> xr.Dataset:
     )
 
 
-def claimed(data: xr.Dataset) -> str:
+def claim_of(data: xr.Dataset) -> str:
     """Return the claim that holds for all decided designs."""
     decided = (data["proof"].values != "as given") & np.isfinite(data["objective"].values)
     return "proven optimum" if np.all(data["proof"].values[decided] == "global") else "best found"
@@ -77,7 +77,7 @@ def by_point(data: xr.Dataset, *named: str) -> list[Text]:
 
 def _row(row: xr.Dataset, columns: Sequence[str]) -> list[str]:
     initial, best, bound = (float(row[name]) for name in ("objective_given", "objective", "lower_bound"))
-    best = settled(best, initial)
+    best = without_rounding(best, initial)
     proof, status = str(row["proof"].item()), str(row["status"].item())
     decided = proof != "as given"
     change = percent(best / initial - 1.0) if decided and initial and best == best else NOTHING
@@ -189,7 +189,7 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
     ]
     grey = "no shafts" if once is not None else "as given"
     legend = [p.Bars(colour="before", label=grey)] if plain.any() or not single.all() else []
-    legend += [p.Bars(label=claimed(data))] if not plain.all() else []
+    legend += [p.Bars(label=claim_of(data))] if not plain.all() else []
     lines = max(str(label).count("\n") for label in labels)
     size = (max(p.WIDE, side * each), p.HIGH if len(rows) == 1 else 0.7 * p.HIGH)
     gap = 0.42 + 0.16 * lines
@@ -199,4 +199,4 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
 def _bar(place: float, value: float, colour: str, width: float, most: float) -> p.Mark:
     if not np.isfinite(value):
         return p.Words(place, 0.02 * most, "no design", across="center", along="bottom")
-    return p.Bars([place], [value], width, colour, numbers=[figures(settled(value, most))])
+    return p.Bars([place], [value], width, colour, numbers=[figures(without_rounding(value, most))])

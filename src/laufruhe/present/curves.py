@@ -1,0 +1,124 @@
+"""Curves that pictures and tables share: indicator diagrams, transmissibility over speed, turning parts of twins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+
+from laufruhe.errors import ModelError
+from laufruhe.machine import Chambers, Engine, OperatingPoint, SliderCrank
+from laufruhe.numerics.arrays import Array
+from laufruhe.numerics.spectrum import orders_equal
+from laufruhe.physics.cylinder_volume import swept_volume
+from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.physics.speed_map import speed_map, split_loads
+from laufruhe.physics.working_chambers import chamber_pressure, chambers_thrust
+from laufruhe.physics.wrench import turning_parts
+from laufruhe.present.measures import hardest_point, has_loads
+from laufruhe.present.mounting import critical_speed, excited_frequencies, facts_of, main_order
+from laufruhe.problem.channels import mounting_in
+from laufruhe.problem.evaluation import Evaluation
+from laufruhe.solvers.result import Result
+
+
+def points_with_chambers(result: Result) -> list[tuple[OperatingPoint, Chambers]]:
+    """Return operating points with chambers on both sides of pistons."""
+    if not has_loads(result):
+        return []
+    return [(point, point.gas) for point in result.problem.points if isinstance(point.gas, Chambers)]
+
+
+@dataclass(frozen=True)
+class Indicator:
+    """Indicator diagram of one cylinder.
+
+    Attributes
+    ----------
+    travel
+        Part of the stroke from the head end.
+    pressures
+        Absolute, by the name of the chamber [Pa].
+    force, needed
+        Force of the chambers on the rod, towards the crank, and force that accelerates the reciprocating mass [N].
+    """
+
+    travel: Array
+    pressures: dict[str, Array]
+    force: Array
+    needed: Array
+
+
+def indicator_of(gas: Chambers, part: SliderCrank, point: OperatingPoint, angles: Array) -> Indicator:
+    """Return the diagram of a cylinder at crank angles from its dead centre [rad] (G14)."""
+    mass, (_, _, acceleration) = part.motion(np, part.fires_at + part.shaft.ratio * angles).points[0]
+    return Indicator(
+        swept_volume(part, angles),
+        {chamber.name: chamber_pressure(chamber, part, angles) for chamber in gas.of(part)},
+        -chambers_thrust(gas, part, angles),
+        np.asarray(-mass * (part.shaft.ratio * point.speed) ** 2 * acceleration.real),
+    )
+
+
+REACH = 1.25
+SPEEDS = 400
+
+
+def highest_speed(result: Result) -> float:
+    """Return the end of the speed axis, beyond operating points and isolation [rad/s]."""
+    facts = facts_of(result.final)
+    highest = max(point.speed for point in result.problem.points)
+    return REACH * max(highest, 2.0 * critical_speed(max(excited_frequencies(facts)), main_order(facts)))
+
+
+def transmissibility_speeds(result: Result) -> Array:
+    """Return the speeds of transmissibility curves [rad/s]."""
+    top = highest_speed(result)
+    return np.linspace(top / SPEEDS, top, SPEEDS)
+
+
+def transmissibility_of(
+    design: Evaluation, point: OperatingPoint, speeds: Array, orders: tuple[float, ...]
+) -> Iterator[tuple[int, Array]]:
+    """Yield index and values of the transmissibility of every order that the loads have.
+
+    None of a design on a resonance that nothing damps.
+    """
+    loads = split_loads(design.engine, point, design.fidelity)
+    try:
+        field = speed_map(mounting_in(design.engine), *loads, speeds, wanted=orders)
+    except ModelError:
+        return
+    curves = field.transmissibility
+    for k, order in enumerate(orders):
+        for column in np.flatnonzero(orders_equal(field.orders, order))[:1]:
+            yield k, curves[:, column]
+
+
+ORDERS = {1: "primary", 2: "secondary"}
+KINDS = {"force": ((1, 2), "N"), "couple": ((4, 5), "N m")}
+"""Lateral and vertical columns of the wrench, and unit."""
+NEXT_TO_NOTHING = 1e-6
+Parts: TypeAlias = dict[tuple[str, int], tuple[complex, complex]]
+
+
+def is_twin(result: Result) -> bool:
+    """Return True for two cylinders with loads of first or second order."""
+    engine = result.final.engine
+    if len(engine.cylinders) != 2 or not has_loads(result):
+        return False
+    k = hardest_point(result)
+    initial, final = (abs(np.array([*parts_of(result, each, k).values()])) for each in (result.initial.engine, engine))
+    return bool(final.max() > NEXT_TO_NOTHING * max(initial.max(), final.max()))
+
+
+def parts_of(result: Result, engine: Engine, k: int) -> Parts:
+    """Return forward and backward part of force and couple by order, at an operating point."""
+    wrench = shaking_loads(engine, result.problem.points[k], result.problem.fidelity)
+    return {
+        (kind, order): turning_parts(*wrench.at(order)[list(columns)])
+        for kind, (columns, _) in KINDS.items()
+        for order in ORDERS
+    }
