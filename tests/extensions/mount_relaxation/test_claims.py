@@ -14,9 +14,9 @@ import laufruhe
 from claims.test_broken_bounders import INPUTS, first_times, scaled
 from claims.test_unnamed import RESULTANT
 from laufruhe.errors import BoundError
-from laufruhe.extensions.mount_relaxation.proof import applies, spring_bound
-from laufruhe.extensions.mount_relaxation.quadratics import solver_of
-from laufruhe.extensions.mount_relaxation.search import SpringBoxes
+from laufruhe.extensions.mount_relaxation.cone_solver import new_solver
+from laufruhe.extensions.mount_relaxation.prover import applies, spring_bound
+from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.numerics.budget import at_least, left, limited, passed
 from laufruhe.problem.evaluation import evaluate, objective_value, with_default_sampling
 from problem_files import PROBLEMS
@@ -38,17 +38,17 @@ def test_spring_forces_bound_boxes_of_any_width(
     problem = laufruhe.load(tmp_path / "scene.toml")
     value = objective_value(problem, evaluate(problem, problem.design([stiffness])))
     assert value == pytest.approx(force, rel=1e-7)
-    boxes = SpringBoxes(with_default_sampling(problem), value * (1.0 + 1e-9), 0.0, [stiffness])
+    boxes = SdpRelaxation(with_default_sampling(problem), value * (1.0 + 1e-9), 0.0, [stiffness])
     assert len(boxes.modes) == (limit != "static sag")
     lower, upper = boxes.lower.copy(), boxes.upper.copy()
     lower[0], upper[0] = np.clip([stiffness * (1.0 - width), stiffness * (1.0 + width)], lower[0], upper[0])
-    for bound, share in ((boxes.relaxed(lower, upper)[0], 5e-3), (boxes.look(lower, upper)[0], 5e-3)):
+    for bound, share in ((boxes.relax(lower, upper)[0], 5e-3), (boxes.bound(lower, upper)[0], 5e-3)):
         assert force * (1.0 - share) <= bound <= value * (1.0 + 1e-9)
 
 
 @pytest.mark.slow
 def test_a_broken_bounder_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    scaled(SpringBoxes, "relaxed", first_times(1.01))(monkeypatch)
+    scaled(SdpRelaxation, "relax", first_times(1.01))(monkeypatch)
     with pytest.raises(BoundError, match="contradicts a known design"):
         laufruhe.solve(PROBLEMS / "powertrain-joined-springs.toml")
 
@@ -65,7 +65,7 @@ def test_no_bound_counts_what_it_does_not_name() -> None:
 
 def test_a_relaxation_stops_when_time_is_over_unless_it_is_given_more() -> None:
     cones, settings = [clarabel.NonnegativeConeT(3)], {"verbose": False}
-    solver = solver_of(np.ones(3), csc_array(-np.eye(3)), -np.arange(3.0), cones, settings)
+    solver = new_solver(np.ones(3), csc_array(-np.eye(3)), -np.arange(3.0), cones, settings)
     with limited(1e-9):
         assert solver.solve().iterations <= 1
         with at_least(60.0):

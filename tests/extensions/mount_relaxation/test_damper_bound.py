@@ -10,7 +10,7 @@ import pytest
 from extensions.mount_relaxation.test_spring_bound import MOVED, in_planes
 from lanes import first_fast
 from laufruhe.extensions.mount_relaxation.open_mounts import open_mounts
-from laufruhe.extensions.mount_relaxation.search import SpringBoxes
+from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.problem.decision import DAMPING
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
@@ -61,7 +61,7 @@ def test_no_design_is_under_the_bound_of_a_box(kind: str, norm: str, tmp_path: P
         given = [below + part * share * (high - low) for part in generator.random((40, len(low)))]
         worth = [objective_value(problem, evaluate(problem, problem.design(x.tolist()))) for x in given]
         least, best = min(worth), given[int(np.argmin(worth))]
-        boxes = SpringBoxes(problem, 1.5 * least, 1e-3, best.tolist())
+        boxes = SdpRelaxation(problem, 1.5 * least, 1e-3, best.tolist())
         planes = np.array([in_planes(boxes, x) for x in given])
         ends = np.append(below, planes.min(axis=0)), np.append(below + share * (high - low), planes.max(axis=0))
-        assert tight * least <= boxes.look(*ends)[0] <= least * (1.0 + 1e-9)
+        assert tight * least <= boxes.bound(*ends)[0] <= least * (1.0 + 1e-9)

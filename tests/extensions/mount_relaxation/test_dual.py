@@ -7,8 +7,14 @@ import numpy as np
 import pytest
 from scipy.sparse import coo_array
 
-from laufruhe.extensions.mount_relaxation.dual import Cone, Dual, Plain, solver_for
-from laufruhe.extensions.mount_relaxation.quadratics import column, matrix_of
+from laufruhe.extensions.mount_relaxation.cone_solver import (
+    Cone,
+    DualSolver,
+    PrimalSolver,
+    column,
+    matrix_of,
+    solver_for,
+)
 
 SETTINGS = {"verbose": False, "max_threads": 1, "presolve_enable": False, "chordal_decomposition_enable": False}
 SIZE, COUNT = 3, 4
@@ -42,20 +48,19 @@ class Program:
         ]
         self.costs = generator.normal(size=(3, width))
 
-    def solver(self, scaled: bool, kind: Any) -> Dual | Plain:
+    def solver(self, kind: Any) -> DualSolver | PrimalSolver:
         """By its dual, or as told."""
         kinds = [(own, clarabel.PSDTriangleConeT(SIZE)) for own in self.matrices]
-        found: Dual | Plain = kind(coo_array(self.rows), self.right, self.cones, kinds, scaled, SETTINGS)
+        found: DualSolver | PrimalSolver = kind(coo_array(self.rows), self.right, self.cones, kinds, SETTINGS)
         return found
 
 
-@pytest.mark.parametrize("kind", [Dual, Plain])
-@pytest.mark.parametrize("scaled", [True, False])
+@pytest.mark.parametrize("kind", [DualSolver, PrimalSolver])
 @pytest.mark.parametrize("seed", range(4))
-def test_both_keep_their_conditions_and_meet(seed: int, scaled: bool, kind: Any) -> None:
+def test_both_keep_their_conditions_and_meet(seed: int, kind: Any) -> None:
     program = Program(seed)
     for cost in program.costs:
-        x, z, least = program.solver(scaled, kind).solved(cost)
+        x, z, least = program.solver(kind).solve(cost)
         slack = program.right - program.rows @ x
         assert np.abs(slack[:3]).max() < 1e-6
         assert slack[3 : 3 + 2 * COUNT].min() > -1e-6
@@ -72,28 +77,28 @@ def test_both_keep_their_conditions_and_meet(seed: int, scaled: bool, kind: Any)
 
 def test_what_is_larger_stands_in_a_program_once() -> None:
     program = Program(1)
-    assert isinstance(program.solver(True, solver_for), Dual)
+    assert isinstance(program.solver(solver_for), DualSolver)
     program.rows = np.concatenate([program.rows, program.rows[-4:], program.rows[-4:]])
     program.right = np.concatenate([program.right, program.right[-4:], program.right[-4:]])
     program.cones[-1:] = [Cone(12, clarabel.SecondOrderConeT(12), True)]
-    assert isinstance(program.solver(True, solver_for), Plain)
+    assert isinstance(program.solver(solver_for), PrimalSolver)
 
 
-@pytest.mark.parametrize("kind", [Dual, Plain])
+@pytest.mark.parametrize("kind", [DualSolver, PrimalSolver])
 def test_an_answer_does_not_depend_on_those_before(kind: Any) -> None:
     program = Program(7)
-    several = program.solver(True, kind)
+    several = program.solver(kind)
     for cost in (*program.costs, *program.costs[::-1]):
-        for told, alone in zip(several.solved(cost), program.solver(True, kind).solved(cost), strict=True):
+        for told, alone in zip(several.solve(cost), program.solver(kind).solve(cost), strict=True):
             assert np.array_equal(told, alone)
 
 
-@pytest.mark.parametrize("kind", [Dual, Plain])
+@pytest.mark.parametrize("kind", [DualSolver, PrimalSolver])
 def test_what_has_no_least_value_is_told(kind: Any) -> None:
     program = Program(3)
     # nothing holds an entry that no row has
     rows, width = np.column_stack([program.rows, np.zeros(len(program.rows))]), program.rows.shape[1] + 1
     kinds = [(own, clarabel.PSDTriangleConeT(SIZE)) for own in program.matrices]
-    unbounded = kind(coo_array(rows), program.right, program.cones, kinds, True, SETTINGS)
-    assert unbounded.solved(np.eye(width)[-1])[2] == np.inf
-    assert np.isfinite(unbounded.solved(np.append(program.costs[0], 0.0))[2])
+    unbounded = kind(coo_array(rows), program.right, program.cones, kinds, SETTINGS)
+    assert unbounded.solve(np.eye(width)[-1])[2] == np.inf
+    assert np.isfinite(unbounded.solve(np.append(program.costs[0], 0.0))[2])

@@ -8,10 +8,10 @@ import pytest
 
 from extensions.mount_relaxation.test_mode_boxes import NEAR, decoupled, designs_about
 from extensions.mount_relaxation.test_spring_bound import DAMPED, LIMITS, MEANS, asked_for
-from laufruhe.extensions.mount_relaxation.ends import Aims, ends_ahead
-from laufruhe.extensions.mount_relaxation.program import Stated
-from laufruhe.extensions.mount_relaxation.proof import narrowed, spring_bound
-from laufruhe.extensions.mount_relaxation.search import SpringBoxes
+from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
+from laufruhe.extensions.mount_relaxation.prover import narrowed, spring_bound
+from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
+from laufruhe.extensions.mount_relaxation.speculation import Objectives, bounds_ahead
 from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.problem.evaluation import evaluate, objective_value
 
@@ -23,8 +23,8 @@ def test_whoever_works_them_out() -> None:
     found = []
     with ThreadPoolExecutor(3) as pool:
         for executor in (SERIAL, pool):
-            with working_on(executor), ends_ahead() as ahead:
-                boxes = SpringBoxes(problem, 1.02 * least, 1e-3, best.tolist(), ahead)
+            with working_on(executor), bounds_ahead() as ahead:
+                boxes = SdpRelaxation(problem, 1.02 * least, 1e-3, best.tolist(), ahead)
                 box, solved = narrowed(boxes, boxes.lower, boxes.upper, np.ones(len(boxes.lower)))
                 assert box is not None
                 found.append((box, solved, spring_bound(problem, least, 1e-2 * least, best.tolist()).bound))
@@ -40,13 +40,13 @@ def test_aims_are_those_of_their_own_program_and_box() -> None:
     """Whatever was stated, or looked at, before."""
     problem = decoupled(2)
     best, least = min(designs_about(problem, NEAR[:2], 6), key=lambda pair: pair[1])
-    boxes, anew = (SpringBoxes(problem, 1.02 * least, 1e-3, best.tolist()) for _ in range(2))
+    boxes, anew = (SdpRelaxation(problem, 1.02 * least, 1e-3, best.tolist()) for _ in range(2))
     middle = 0.5 * (boxes.lower + boxes.upper)
-    boxes.look(boxes.lower, middle)
-    half, whole = (boxes.left(boxes.lower, upper)[0] for upper in (middle, boxes.upper))
+    boxes.bound(boxes.lower, middle)
+    half, whole = (boxes.cut_off(boxes.lower, upper)[0] for upper in (middle, boxes.upper))
     aim = np.eye(whole.numbers + 5 * len(boxes.modes))[0]
-    found = [Aims(program, None).least(0, aim)[0] for program in (whole, half, whole)]
-    alone = [Stated(program).least(aim)[0] for program in (anew.left(boxes.lower, boxes.upper)[0], half)]
+    found = [Objectives(program, None).bound(0, aim)[0] for program in (whole, half, whole)]
+    alone = [ConeProgram(program).least(aim)[0] for program in (anew.cut_off(boxes.lower, boxes.upper)[0], half)]
     assert found == [*alone, alone[0]]
     assert alone[0] != alone[1]
 
@@ -55,8 +55,8 @@ def test_aims_are_those_of_their_own_program_and_box() -> None:
 def test_roots_of_a_box_are_not_taken_for_those_of_a_wider_one(tmp_path: Path) -> None:
     problem = asked_for(tmp_path, MEANS, LIMITS, mounts=DAMPED)
     value, near = objective_value(problem, evaluate(problem)), [d.start for d in problem.decisions]
-    boxes, anew = (SpringBoxes(problem, value, 1e-3, near) for _ in range(2))
+    boxes, anew = (SdpRelaxation(problem, value, 1e-3, near) for _ in range(2))
     at, aim = boxes.lower + 0.9 * (boxes.upper - boxes.lower), np.eye(len(boxes.lower))[0]
-    boxes.look(at, boxes.upper)
-    found, alone = (Stated(one.left(one.lower, one.upper)[0]).least(aim)[0] for one in (boxes, anew))
+    boxes.bound(at, boxes.upper)
+    found, alone = (ConeProgram(one.cut_off(one.lower, one.upper)[0]).least(aim)[0] for one in (boxes, anew))
     assert found == alone

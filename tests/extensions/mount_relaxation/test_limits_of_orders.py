@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from extensions.mount_relaxation.test_spring_bound import POWERTRAIN, powertrain
-from laufruhe.extensions.mount_relaxation.bound import follows
-from laufruhe.extensions.mount_relaxation.box import WORTH, SpringBox, worth
-from laufruhe.extensions.mount_relaxation.limits import ANYTHING, Limits
-from laufruhe.extensions.mount_relaxation.program import Stated
-from laufruhe.extensions.mount_relaxation.search import SpringBoxes
+from laufruhe.extensions.mount_relaxation.box import WORTH, BoxRelaxation, joint_scores
+from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
+from laufruhe.extensions.mount_relaxation.limits import UNBOUNDED, Limits
+from laufruhe.extensions.mount_relaxation.program import proven_bound
+from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
@@ -66,25 +66,26 @@ def test_no_design_that_keeps_a_limit_is_under_the_bound(name: str) -> None:
     kept = [(x, value, each) for x, value, each in designs if each <= most]
     assert len(kept) > 5
     least, near = min(value for _, value, _ in kept), max(kept, key=lambda each: each[2])[0]
-    boxes = SpringBoxes(problem, 1.3 * least, 1e-3, near.tolist())
+    boxes = SdpRelaxation(problem, 1.3 * least, 1e-3, near.tolist())
     assert boxes.limits.norms or boxes.limits.ratios
-    bound = boxes.relaxed(boxes.lower, boxes.upper)[0]
-    program, _ = boxes.left(boxes.lower, boxes.upper)
+    bound = boxes.relax(boxes.lower, boxes.upper)[0]
+    program, _ = boxes.cut_off(boxes.lower, boxes.upper)
     boxes.limits = Limits((), ())
-    without = boxes.relaxed(boxes.lower, boxes.upper)[0]
+    without = boxes.relax(boxes.lower, boxes.upper)[0]
     assert (1.0 - 1e-3) * without <= bound <= least
     # least s of all that is better than the best known
-    own = replace(program, aim=np.eye(program.numbers)[0])
-    told = Stated(own).answer(own, True).multipliers
+    own = replace(program, objective=np.eye(program.numbers)[0])
+    told = ConeProgram(own).solve(own).multipliers
     half, middle = 0.5 * (boxes.upper - boxes.lower), 0.5 * (boxes.upper + boxes.lower)
     smallest = min((x[0] - middle[0]) / half[0] for x, value, _ in kept if value <= 1.3 * least)
-    assert follows(own, told) <= smallest
+    assert proven_bound(own, told) <= smallest
     for by in (0.5, 1.0, 2.0):
         worse = replace(
-            told, caps=[m * generator.uniform(0.0, by) for m in told.caps],
-            budgets=told.budgets * generator.uniform(0.0, by), held=[m * generator.uniform(0.0, by) for m in told.held],
+            told, quadratics=[m * generator.uniform(0.0, by) for m in told.quadratics],
+            linear=told.linear * generator.uniform(0.0, by),
+            constraints=[m * generator.uniform(0.0, by) for m in told.constraints],
         )  # fmt: skip
-        assert follows(own, worse) <= smallest
+        assert proven_bound(own, worse) <= smallest
 
 
 def test_a_limit_that_holds_the_best_design_back_raises_the_bound() -> None:
@@ -96,10 +97,10 @@ def test_a_limit_that_holds_the_best_design_back_raises_the_bound() -> None:
         kept = [(value, x) for x, value, each in designs if each <= asked_limit(problem).maximum]
         if kept:
             least, x = min(kept, key=lambda each: each[0])
-            boxes = SpringBoxes(problem, 1.2 * least, 1e-3, x.tolist())
-            with_limit = boxes.relaxed(boxes.lower, boxes.upper)[0]
+            boxes = SdpRelaxation(problem, 1.2 * least, 1e-3, x.tolist())
+            with_limit = boxes.relax(boxes.lower, boxes.upper)[0]
             boxes.limits = Limits((), ())
-            raised.append(with_limit / boxes.relaxed(boxes.lower, boxes.upper)[0])
+            raised.append(with_limit / boxes.relax(boxes.lower, boxes.upper)[0])
     assert max(raised) > 1.001
 
 
@@ -112,16 +113,16 @@ def test_transmissibility_of_lines_is_that_of_the_model(name: str) -> None:
     value = evaluate(free).value(free.mount_limits[0].measure)
     tables["constraints"][0]["max"] = f"{1.01 * value:.9g}"
     problem = load(tables)
-    boxes = SpringBoxes(problem, 2.0 * objective_value(problem, evaluate(problem)), 1e-3, problem.start)
+    boxes = SdpRelaxation(problem, 2.0 * objective_value(problem, evaluate(problem)), 1e-3, problem.start)
     near = np.array([d.start_number for d in problem.mount_decisions])
-    box = SpringBox(boxes, boxes._terms[0][1], (np.inf, np.inf), near * (1.0 - 1e-9), near * (1.0 + 1e-9))
+    box = BoxRelaxation(boxes, boxes._terms[0][1], (np.inf, np.inf), near * (1.0 - 1e-9), near * (1.0 + 1e-9))
     found = []
     for ratio in boxes.limits.ratios:
         (order,) = ratio.orders
         sizes = []
         for each in (order, replace(order, omega=0.0)):
-            line, _ = box._line_of(each, ANYTHING)
-            v = np.concatenate([[1.0], boxes.columns.near, np.zeros(line.size - 1 - line.columns)])
+            line, _ = box._state(each, UNBOUNDED)
+            v = np.concatenate([[1.0], boxes.basis.near, np.zeros(line.size - 1 - line.columns)])
             sizes.append(float(np.linalg.norm(line.forces @ v) * line.unit))
         found.append(sizes[0] / sizes[1])
     assert max(found) == pytest.approx(value, rel=1e-7)
@@ -133,14 +134,14 @@ def test_sides_are_told_apart_where_nothing_is_lacking(lacking: float, size: flo
     """Zero and the least numbers there are: no share overflows, which would be an error here, nor is one lost."""
     hidden = size * np.array([0.0, 0.5, 1.0])
     for pull in (np.zeros(3), np.array([5e-324, 0.0, 0.0])):
-        found = worth(pull, hidden, lacking)
+        found = joint_scores(pull, hidden, lacking)
         assert np.isfinite(found).all()
         assert found[2] == found.max() > 0.0
 
 
 def test_what_is_hidden_counts_by_what_is_lacking() -> None:
     pull, hidden = np.array([4.0, 1.0]), np.array([0.0, 3.0])
-    assert worth(pull, hidden, 6.0) == pytest.approx([1.0, 3.0 / (6.0 * WORTH)])
+    assert joint_scores(pull, hidden, 6.0) == pytest.approx([1.0, 3.0 / (6.0 * WORTH)])
 
 
 SIDEWAYS = """

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from extensions.mount_relaxation.test_spring_bound import powertrain
-from laufruhe.extensions.mount_relaxation.bound import Multipliers, Priced, Program, Proposed, follows
-from laufruhe.extensions.mount_relaxation.modes import mode_of, shapes_of
+from laufruhe.extensions.mount_relaxation.cone_program import ConeProgram
+from laufruhe.extensions.mount_relaxation.modes import mode_basis, mode_constraints
 from laufruhe.extensions.mount_relaxation.open_mounts import open_mounts
-from laufruhe.extensions.mount_relaxation.program import Stated
-from laufruhe.extensions.mount_relaxation.proof import narrowed, spring_bound
-from laufruhe.extensions.mount_relaxation.search import SpringBoxes
+from laufruhe.extensions.mount_relaxation.program import ModeMultipliers, Multipliers, Program, Solution, proven_bound
+from laufruhe.extensions.mount_relaxation.prover import narrowed, spring_bound
+from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.files.reader import load
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
@@ -60,11 +60,11 @@ def test_every_mode_is_in_its_shapes(turned: bool) -> None:
             shares = (along @ modes) * (momentum @ modes)
             k = int(np.argmax(shares))
             assert shares[k] == pytest.approx(mounting.modes.energy[motion].max())
-            mode = mode_of(mounts.root, motion, 0.999 * float(shares[k]))
-            z = np.linalg.solve(mode.basis, modes[:, k] / (momentum @ modes[:, k]))
+            basis = mode_basis(mounts.root, motion, 0.999 * float(shares[k]))
+            z = np.linalg.solve(basis, modes[:, k] / (momentum @ modes[:, k]))
             assert z[0] == pytest.approx(1.0)
             assert float(z[1:] @ z[1:]) <= 1.0
-            shapes = shapes_of(mounts, mode, z[1:] - 0.1, z[1:] + 0.1)
+            shapes = mode_constraints(mounts, basis, z[1:] - 0.1, z[1:] + 0.1)
             moments = np.outer(z, z) * np.concatenate([[1.0], s])[:, None, None]
             for tensor in shapes.matrices:
                 assert np.linalg.eigvalsh(np.einsum("mabxy,mxy->ab", tensor, moments))[0] >= -1e-8
@@ -94,13 +94,18 @@ def spoilt(found: Multipliers, by: float, noise: float, generator: Any) -> Multi
         return m * generator.uniform(0.0, by) + noise * generator.normal(size=m.shape)
 
     shapes = [
-        Priced(
+        ModeMultipliers(
             [bad(m) for m in own.matrices], bad(own.sides), bad(own.equal), bad(own.corners),
-            [(bad(first), bad(second)) for first, second in own.shares],
+            [(bad(first), bad(second)) for first, second in own.signs],
         )
-        for own in found.shapes
+        for own in found.modes
     ]  # fmt: skip
-    return replace(found, caps=[bad(m) for m in found.caps], held=[bad(m) for m in found.held], shapes=shapes)
+    return replace(
+        found,
+        quadratics=[bad(m) for m in found.quadratics],
+        constraints=[bad(m) for m in found.constraints],
+        modes=shapes,
+    )
 
 
 def test_sides_hold_whatever_a_solver_proposes() -> None:
@@ -108,24 +113,24 @@ def test_sides_hold_whatever_a_solver_proposes() -> None:
     problem, generator = decoupled(4), np.random.default_rng(11)
     designs = designs_about(problem, NEAR, 12)
     best, least = min(designs, key=lambda pair: pair[1])
-    boxes = SpringBoxes(problem, 1.1 * least, 1e-3, best.tolist())
-    program, mounts = boxes.left(boxes.lower, boxes.upper)
-    assert len(program.shapes) == 2
-    stated = Stated(program)
+    boxes = SdpRelaxation(problem, 1.1 * least, 1e-3, best.tolist())
+    program, mounts = boxes.cut_off(boxes.lower, boxes.upper)
+    assert len(program.modes) == 2
+    stated = ConeProgram(program)
     half = 0.5 * (boxes.upper - boxes.lower)
     inside = [x for x, value in designs if value <= 1.1 * least]
     for number in (0, 2):
-        own: Program = replace(program, aim=np.eye(program.numbers + 10)[number])
-        told: Proposed = stated.answer(own, False)
+        own: Program = replace(program, objective=np.eye(program.numbers + 10)[number])
+        told: Solution = stated.solve(own)
         side = mounts.straight[number]
         assert side is not None
         smallest = min((x[side] - 0.5 * (boxes.lower + boxes.upper)[side]) / half[side] for x in inside)
-        assert -1.01 <= follows(own, told.multipliers) <= smallest
+        assert -1.01 <= proven_bound(own, told.multipliers) <= smallest
         # by the solver of the aim before, as exactly as it is worth
         proven, stands = stated.least(np.eye(program.numbers + 10)[number])
-        assert follows(own, told.multipliers) - 0.05 < proven <= min(smallest, stands[number] + 0.05)
+        assert proven_bound(own, told.multipliers) - 0.05 < proven <= min(smallest, stands[number] + 0.05)
         for by, noise in ((2.0, 0.0), (1.0, 1e-3), (0.0, 1.0), (0.0, 0.0)):
-            assert follows(own, spoilt(told.multipliers, by, noise, generator)) <= smallest
+            assert proven_bound(own, spoilt(told.multipliers, by, noise, generator)) <= smallest
 
 
 @pytest.mark.slow
@@ -134,7 +139,7 @@ def test_a_narrowed_box_keeps_all_better_designs_and_halves_are_dropped_rightly(
     problem = decoupled(4)
     designs = designs_about(problem, NEAR, 60)
     best, least = min(designs, key=lambda pair: pair[1])
-    boxes = SpringBoxes(problem, 1.02 * least, 1e-3, best.tolist())
+    boxes = SdpRelaxation(problem, 1.02 * least, 1e-3, best.tolist())
     found, _ = narrowed(boxes, boxes.lower, boxes.upper, np.ones(len(boxes.lower)))
     assert found is not None
     for x, value in designs:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from laufruhe.extensions.mount_relaxation.search import SpringBoxes
+from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
 from laufruhe.problem.problem import Problem
 from mounts.bounds_seen import designs
 from mounts.files import BLOCK, ENGINE, problem_of
@@ -19,7 +19,7 @@ from prove.test_subdivision import boxes
 def ratio(problem: Problem, low: np.ndarray, high: np.ndarray) -> float:
     """Return the bound of a box over the least design seen in it; a worse design is known."""
     least = min(designs(problem, low, high, 1))
-    return SpringBoxes(problem, 1.2 * least, 1e-4, problem.start).relaxed(low, high)[0] / least
+    return SdpRelaxation(problem, 1.2 * least, 1e-4, problem.start).relax(low, high)[0] / least
 
 
 KINDS = {"damping that follows": FOLLOWING, "hydraulic": HYDRAULIC, "joined": OPEN_PAD}

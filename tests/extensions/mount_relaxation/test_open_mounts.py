@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
-from laufruhe.extensions.mount_relaxation.columns import columns_of
-from laufruhe.extensions.mount_relaxation.mirrored import mirrored_parts
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts, open_mounts
+from laufruhe.extensions.mount_relaxation.symmetry_split import split_mounts
+from laufruhe.extensions.mount_relaxation.unbalance_basis import unbalance_basis
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import Decision, Domain
 from laufruhe.problem.problem import Problem
@@ -61,7 +61,7 @@ def test_no_stiffness_of_a_box_is_outside_of_what_is_known(tmp_path: Path, place
 def test_mounts_that_mirror_each_other_move_in_two_halves(tmp_path: Path) -> None:
     """Fore and aft, up and pitch; aside, roll and yaw: their stiffness has the same principal values together."""
     whole = known(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, RMS))
-    parts = mirrored_parts(whole)
+    parts = split_mounts(whole)
     assert [part.size for part in parts] == [3, 3]
     for side in ("least", "most"):
         values = np.concatenate([np.linalg.eigvalsh(getattr(part, side)) for part in parts])
@@ -108,7 +108,7 @@ def test_columns_of_unbalances_reach_from_minus_one_to_one(seed: int) -> None:
     for k, own in enumerate(sets):
         domains.append(Domain(Decision(f"d{k}", "kg m", own, 0j, ()), start))
         start += domains[-1].width
-    columns, middles = columns_of(domains, [0j for _ in sets])
+    columns, middles = unbalance_basis(domains, [0j for _ in sets])
     farthest = np.zeros(start)
     for _ in range(400):
         drawn = random.uniform(-1.0, 1.0, start)

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from laufruhe.extensions.mount_relaxation.planes import Plane
+from laufruhe.extensions.mount_relaxation.parameter_maps import PlaneStiffness
 
 
-def matrices(plane: Plane, generator: np.random.Generator, count: int) -> np.ndarray:
+def matrices(plane: PlaneStiffness, generator: np.random.Generator, count: int) -> np.ndarray:
     """K11, K22 and K12 of random stiffnesses and angles, by turning a matrix."""
     k = plane.low + generator.random((count, 2)) * (plane.high - plane.low)
     angles = generator.uniform(*plane.angles, count)
@@ -20,14 +20,16 @@ def matrices(plane: Plane, generator: np.random.Generator, count: int) -> np.nda
     return np.stack([found[:, 0, 0], found[:, 1, 1], found[:, 0, 1]], axis=1)
 
 
-def planes(generator: np.random.Generator, count: int) -> list[Plane]:
+def planes(generator: np.random.Generator, count: int) -> list[PlaneStiffness]:
     """Of every width, with angles in all quarters."""
     found = []
     for _ in range(count):
         low = 10.0 ** generator.uniform(0.0, 2.0, 2)
         high = low * 10.0 ** generator.choice([0.0, 0.05, 0.5, 1.5], 2)
         first = generator.uniform(-math.pi, math.pi)
-        found.append(Plane(low, high, (first, first + generator.choice([0.1, 0.8, 1.7, 3.5])), 0.5 * (low + high)))
+        found.append(
+            PlaneStiffness(low, high, (first, first + generator.choice([0.1, 0.8, 1.7, 3.5])), 0.5 * (low + high))
+        )
     return found
 
 
@@ -36,19 +38,19 @@ def test_what_is_possible_stays_in_the_box(seed: int) -> None:
     generator, narrower = np.random.default_rng(seed), 0
     for plane in planes(generator, 60):
         given = matrices(plane, generator, 300)
-        whole = plane.whole
+        whole = plane.full_box
         room = 1e-9 * float(plane.high.max())
         assert np.all(given >= whole[:, 0] - room)
         assert np.all(given <= whole[:, 1] + room)
         for share in (1.0, 0.5, 0.1):
             middle, half = given[0], 0.5 * share * (whole[:, 1] - whole[:, 0])
             box = np.stack([np.maximum(whole[:, 0], middle - half), np.minimum(whole[:, 1], middle + half)], axis=1)
-            kept = plane.kept(box)
+            kept = plane.contracted(box)
             assert kept is not None
             inside = given[np.all((given >= box[:, 0]) & (given <= box[:, 1]), axis=1)]
             assert np.all(inside >= kept[:, 0] - room)
             assert np.all(inside <= kept[:, 1] + room)
-            low, high = plane.own(kept)
+            low, high = plane.stiffness_range(kept)
             for k11, k22, k12 in inside:
                 values = np.linalg.eigvalsh([[k11, k12], [k12, k22]])
                 assert low - room <= values[0]
@@ -59,10 +61,10 @@ def test_what_is_possible_stays_in_the_box(seed: int) -> None:
 
 def test_a_box_without_anything_possible_is_empty() -> None:
     """Beside the wedge of angles, under the least and over the largest stiffness."""
-    plane = Plane(np.array([100.0, 1.0]), np.array([200.0, 2.0]), (-0.2, 0.2), np.array([150.0, 1.5]))
+    plane = PlaneStiffness(np.array([100.0, 1.0]), np.array([200.0, 2.0]), (-0.2, 0.2), np.array([150.0, 1.5]))
     for box in ([[100, 200], [1, 2], [60, 80]], [[1, 2], [100, 200], [-5, 5]], [[10, 20], [10, 20], [-5, 5]]):
-        assert plane.kept(np.array(box, dtype=float)) is None
-    kept = plane.kept(plane.whole)
+        assert plane.contracted(np.array(box, dtype=float)) is None
+    kept = plane.contracted(plane.full_box)
     assert kept is not None
     # the sine of twice the angle holds what is across
     assert kept[2, 1] <= 0.5 * 199.0 * math.sin(0.4) * (1.0 + 1e-9)

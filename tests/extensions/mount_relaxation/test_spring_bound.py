@@ -12,20 +12,19 @@ import numpy as np
 import pytest
 
 from lanes import first_fast
-from laufruhe.extensions.mount_relaxation import box
 from laufruhe.extensions.mount_relaxation import orders as orders_
-from laufruhe.extensions.mount_relaxation.bound import Multipliers, Priced, Program, Proposed, pulls
-from laufruhe.extensions.mount_relaxation.conditions import conditions, of_stiffness
-from laufruhe.extensions.mount_relaxation.high_orders import HighOrder, _linear, _seen
-from laufruhe.extensions.mount_relaxation.lines import Felt
-from laufruhe.extensions.mount_relaxation.mirrored import mirrored_halves, mirrored_parts
-from laufruhe.extensions.mount_relaxation.modes import Shapes
+from laufruhe.extensions.mount_relaxation.cone_program import FINE, ConeProgram
+from laufruhe.extensions.mount_relaxation.constraints import moment_constraints, stiffness_constraints
+from laufruhe.extensions.mount_relaxation.modes import ModeConstraints
+from laufruhe.extensions.mount_relaxation.odd_multiples import HighOrder, linear_sum, work_weight
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts, is_lifted, open_mounts
-from laufruhe.extensions.mount_relaxation.opened import own_axes
 from laufruhe.extensions.mount_relaxation.orders import Order
-from laufruhe.extensions.mount_relaxation.program import proposed
-from laufruhe.extensions.mount_relaxation.proof import spring_bound
-from laufruhe.extensions.mount_relaxation.search import SpringBoxes
+from laufruhe.extensions.mount_relaxation.parameter_maps import own_axes
+from laufruhe.extensions.mount_relaxation.program import ModeMultipliers, Multipliers, Program, Solution, mode_scores
+from laufruhe.extensions.mount_relaxation.prover import spring_bound
+from laufruhe.extensions.mount_relaxation.response import ResponseBound
+from laufruhe.extensions.mount_relaxation.search import SdpRelaxation
+from laufruhe.extensions.mount_relaxation.symmetry_split import split_mounts, split_signal
 from laufruhe.files.reader import load
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.decision import TURNED as ANGLES
@@ -48,7 +47,7 @@ TURNED = changed(
         f'stiffness = [{OPEN}, {OPEN}, {{ between = ["20 N/mm", "4000 N/mm"]',
     ),
 )
-ANY = Felt((), np.inf, False)
+ANY = ResponseBound((), np.inf, False)
 NARROW = '\norders = [2, 4]\noperating_points = ["idle"]'
 ASKED = {
     "rms": 'minimise = "rms mount force"\norders = [2, 4]',
@@ -82,9 +81,9 @@ def designs_of(
             yield x, objective_value(problem, each)
 
 
-def asked_of(problem: Problem) -> SpringBoxes:
+def asked_of(problem: Problem) -> SdpRelaxation:
     """Boxes about the design as given."""
-    return SpringBoxes(problem, objective_value(problem, evaluate(problem)), 1e-3, problem.start)
+    return SdpRelaxation(problem, objective_value(problem, evaluate(problem)), 1e-3, problem.start)
 
 
 def test_open_springs_add_up_to_what_the_matrices_change_by(tmp_path: Path) -> None:
@@ -92,7 +91,7 @@ def test_open_springs_add_up_to_what_the_matrices_change_by(tmp_path: Path) -> N
     boxes, model = asked_of(problem), StiffnessBoxes(problem, 1.0).model
     mounts = open_mounts(problem, model.lower, model.upper)
     half = 0.5 * (boxes.upper - boxes.lower)
-    for j, follows in enumerate(mounts.keys):
+    for j, follows in enumerate(mounts.decisions):
         own = model.stiffness_slopes[follows[0]] * half[follows[0]]
         assert np.allclose(mounts.slopes[j], own, rtol=1e-9, atol=1e-9 * np.abs(own).max())
 
@@ -171,7 +170,7 @@ def numbers_of(whole: OpenMounts, mounting: Any) -> np.ndarray:
     return numbers
 
 
-def designs_in(generator: np.random.Generator, boxes: SpringBoxes, about: np.ndarray, count: int) -> Any:
+def designs_in(generator: np.random.Generator, boxes: SdpRelaxation, about: np.ndarray, count: int) -> Any:
     """Boxes of every size, of planes about what a design has in them, and a design in each."""
     own = slice(len(about))
     for _ in range(count):
@@ -179,10 +178,10 @@ def designs_in(generator: np.random.Generator, boxes: SpringBoxes, about: np.nda
         width = share * (boxes.upper - boxes.lower)[own]
         low = np.clip(about - width * generator.random(len(about)), boxes.lower[own], boxes.upper[own] - width)
         x = low + generator.random(len(about)) ** 2 * width
-        columns, planes = generator.uniform(-0.7, 0.7, boxes.columns.count), in_planes(boxes, x)
+        columns, planes = generator.uniform(-0.7, 0.7, boxes.basis.count), in_planes(boxes, x)
         wide = share * (boxes.upper - boxes.lower)[len(about) :] * generator.random((2, len(planes)))
         given = np.append(low, planes - wide[0]), np.append(low + width, planes + wide[1])
-        kept = boxes.kept(np.maximum(given[0], boxes.lower), np.minimum(given[1], boxes.upper))
+        kept = boxes.contracted(np.maximum(given[0], boxes.lower), np.minimum(given[1], boxes.upper))
         # what keeps planes that are possible keeps this one
         assert kept is not None
         assert np.all(kept[0][len(about) :] <= planes * (1.0 + 1e-12) + 1e-3)
@@ -190,7 +189,7 @@ def designs_in(generator: np.random.Generator, boxes: SpringBoxes, about: np.nda
         yield *kept, x, columns
 
 
-def in_planes(boxes: SpringBoxes, x: np.ndarray) -> np.ndarray:
+def in_planes(boxes: SdpRelaxation, x: np.ndarray) -> np.ndarray:
     """K11, K22 and K12 of a design in the plane of the first mount that turns, and those of its dampers (E63, E66)."""
     found, (low, high) = [np.zeros(0)], number_ranges(boxes.problem)
     own = number_ranges(boxes.problem, x, x)[0]
@@ -248,7 +247,7 @@ def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatc
         halves.add(k)
         # of the load of all motions what half of them has
         order = replace(order, loads=order.loads @ np.linalg.solve(parts[0].root.T, mounts.root.T))
-        line = boxes.line(mounts, order, ANY, low, high)
+        line = boxes.response(mounts, order, ANY, low, high)
         told = truth(problem, parts[0], mounts, order, line, x, u)
         for function, value in (
             (line.motion, told.motion), (line.forces, told.forces), (line.deflections, told.travel),
@@ -263,7 +262,7 @@ def test_every_design_is_in_the_relaxation(name: str, tmp_path: Path, monkeypatc
         kept += 1
         assert mounts.lowest <= values[0] * (1.0 + 1e-9)
         assert values[-1] <= mounts.highest * (1.0 + 1e-9)
-        for limit in (*conditions(0, mounts, line), *of_stiffness(mounts, line.size)):
+        for limit in (*moment_constraints(mounts, line), *stiffness_constraints(mounts, line.size)):
             moments = np.einsum("abij,i,j->ab", limit.moments, told.vector, told.vector)
             whole = limit.constant + np.tensordot(told.numbers, limit.slopes, 1) + moments
             assert np.linalg.eigvalsh(whole)[0] >= -1e-9 * max(1.0, np.abs(whole).max())
@@ -306,7 +305,7 @@ def test_mounts_that_do_not_mirror_each_other_are_bounded_whole(name: str, tmp_p
     path.write_text(text, encoding="utf-8")
     problem = load(path)
     boxes = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
-    assert mirrored_parts(open_mounts(problem, *boxes)) == ()
+    assert split_mounts(open_mounts(problem, *boxes)) == ()
 
 
 def test_halves_in_the_mirror_add_up_and_no_norm_of_one_is_over_that_of_both() -> None:
@@ -315,7 +314,7 @@ def test_halves_in_the_mirror_add_up_and_no_norm_of_one_is_over_that_of_both() -
     members = ((0, 2), (1,), (3, 4))
     for _ in range(20):
         felt = generator.normal(size=(5, 3)) + 1j * generator.normal(size=(5, 3))
-        halves = mirrored_halves(felt, members)
+        halves = split_signal(felt, members)
         assert np.allclose(halves[0] + halves[1], felt)
         angles = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 90))
         for norm in (np.sum, np.max):
@@ -343,7 +342,7 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, limits: str, tmp_path:
         above = below + share * (high - low)
         best, least = min(designs_of(problem, below, above, 40, 6), key=lambda pair: pair[1])
         # what is known is a design that others of the box are better than
-        bound = SpringBoxes(problem, 1.2 * least, 1e-3, best.tolist()).relaxed(below, above)[0]
+        bound = SdpRelaxation(problem, 1.2 * least, 1e-3, best.tolist()).relax(below, above)[0]
         assert bound <= least * (1.0 + 1e-9)
         tight = max(tight, bound / least)
     assert tight > 0.8
@@ -395,14 +394,14 @@ def test_no_design_of_mounts_and_unbalances_is_under_the_bound(norm: str, tmp_pa
     assert len(domains) == 2
     assert len(given) > 20
     least, best = min(given, key=lambda pair: pair[0])
-    boxes = SpringBoxes(problem, 1.2 * least, 1e-3, best)
+    boxes = SdpRelaxation(problem, 1.2 * least, 1e-3, best)
     low, high = boxes.lower.copy(), boxes.upper.copy()
-    assert boxes.relaxed(low, high)[0] <= least
+    assert boxes.relax(low, high)[0] <= least
     # about the best of them, its place held
     held = [*("position" in d.name for d in problem.mount_decisions), False, False, False]
     width = np.where(held, 0.0, 1e-3 * (high - low))
     near = np.clip(boxes.near, low + width, high - width)
-    bound = boxes.relaxed(near - width, near + width)[0]
+    bound = boxes.relax(near - width, near + width)[0]
     # the unbalances may cancel the one order that others than root mean squares are shown by
     assert (0.3 * least if norm == "rms" else 0.0) <= bound <= least
 
@@ -414,32 +413,35 @@ def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, mon
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     high = low + 0.2 * (high - low)
     best, least = min(designs_of(problem, low, high, 200, 1), key=lambda pair: pair[1])
-    boxes, generator = SpringBoxes(problem, 1.5 * least, 1e-3, best.tolist()), np.random.default_rng(3)
+    boxes, generator = SdpRelaxation(problem, 1.5 * least, 1e-3, best.tolist()), np.random.default_rng(3)
     # roots of a mean narrow each other on the whole of what is divided
     boxes.lower, boxes.upper = low, high
 
+    right = ConeProgram.solve
+
     def spoilt(by: float, noise: float) -> Any:
-        def wrong(program: Program) -> Iterator[Proposed]:
-            found = next(proposed(program))
-            told = found.multipliers
+        def wrong(self: ConeProgram, program: Program, tolerances: tuple[float, float] = FINE) -> Solution:
+            solution = right(self, program, tolerances)
+            told = solution.multipliers
 
             def bad(m: np.ndarray) -> np.ndarray:
                 return m * generator.uniform(0.0, by) + noise * generator.normal(size=m.shape)
 
-            parts = ([bad(m) for m in own] for own in (told.caps, told.held, told.links))
-            caps, held, links = parts
+            parts = ([bad(m) for m in own] for own in (told.quadratics, told.constraints, told.links))
+            quadratics, constraints, links = parts
             along = [[bad(each) for each in own] for own in told.lengths]
-            roots = bad(told.lines), along, float(generator.uniform(0.0, by) * told.goal + noise)
-            yield replace(found, multipliers=Multipliers(caps, held, bad(told.budgets), bad(told.sets), links, *roots))
+            roots = bad(told.chords), along, float(generator.uniform(0.0, by) * told.limit + noise)
+            linear = bad(told.linear), bad(told.sets)
+            return replace(solution, multipliers=Multipliers(quadratics, constraints, *linear, links, *roots))
 
         return wrong
 
     # of several orders every one is bounded by itself, so that one way to be wrong is many
     ways = (spoilt(2.0, 1e-3), spoilt(2.0, 0.0), spoilt(0.0, 0.0), spoilt(0.0, 1.0))
     for wrong in ways[: 1 if name == "means" else 4]:
-        monkeypatch.setattr(box, "proposed", wrong)
-        boxes._least = [0.0 * own for own in boxes._least]
-        assert boxes.relaxed(low, high)[0] <= least
+        monkeypatch.setattr(ConeProgram, "solve", wrong)
+        boxes._reset()
+        assert boxes.relax(low, high)[0] <= least
 
 
 def test_a_mean_is_shown_by_its_strongest_order_less_odd_multiples() -> None:
@@ -450,7 +452,9 @@ def test_a_mean_is_shown_by_its_strongest_order_less_odd_multiples() -> None:
         others = [Order(0, k * place, 1.0, np.zeros((1, 6)), np.zeros((1, 3)), 0) for k in (3, 5)]
         phases = samples // place
         factor = 2.0 / phases / math.tan(math.pi / phases)
-        head = orders_.Head((), 1.0, 1.0, 0.0, False, factor, tuple(zip(others, (3, 5), strict=True)), phases)
+        head = orders_.EpigraphVariable(
+            (), 1.0, 1.0, 0.0, False, factor, tuple(zip(others, (3, 5), strict=True)), phases
+        )
         for _ in range(30):
             size = 10.0 ** generator.uniform(-2.0, 0.0)
             felt = {
@@ -459,11 +463,9 @@ def test_a_mean_is_shown_by_its_strongest_order_less_odd_multiples() -> None:
             }
             signal = sum(np.real(f[:, None] * np.exp(1j * k * place * angles)) for k, f in felt.items())
             mean = float(np.linalg.norm(signal, axis=0).mean())
-            for shift in (0, phases // 6, phases // 5):
-                ratio, taken = head.shifted(shift)
-                shown = ratio * factor * np.linalg.norm(felt[1])
-                shown -= sum(w * np.linalg.norm(felt[k]) for w, k in zip(taken, (3, 5), strict=True))
-                assert shown <= mean * (1.0 + 1e-12)
+            shown = factor * np.linalg.norm(felt[1])
+            shown -= sum(w * np.linalg.norm(felt[k]) for w, k in zip(head.multiple_weights, (3, 5), strict=True))
+            assert shown <= mean * (1.0 + 1e-12)
             if size < 0.02:
                 assert mean < 1.3 * factor * np.linalg.norm(felt[1])
 
@@ -481,9 +483,9 @@ def test_no_design_feels_more_of_a_high_order_than_its_line() -> None:
         for mounts in parts:
             load_ = generator.normal(size=mounts.size) + 1j * generator.normal(size=mounts.size)
             high = HighOrder(mounts, load_, omega, generator.uniform(-1.0, 1.0, mounts.numbers))
-            if not high.is_plain:
+            if not high.is_above:
                 continue
-            line = high.felt
+            line = high.bound
             assert line is not None
             k, h = (mounts.root @ mounting.total(m) @ mounts.root.T for m in (mounting.springs, mounting.losses))
             motion = np.linalg.solve(k + 1j * h - omega**2 * np.eye(mounts.size), load_)
@@ -492,9 +494,9 @@ def test_no_design_feels_more_of_a_high_order_than_its_line() -> None:
             felt = float(np.linalg.norm(forces, axis=1).sum())
             assert felt <= line.constant + float(line.slopes @ numbers)
             # chords are over what they cover by what is told of them, and by nothing at their ends
-            over = high.hidden(numbers)
+            over = high.looseness(numbers)
             assert np.all(over >= 0.0)
-            assert over.sum() <= sum(chord.line(numbers).near for chord in high.chords)
+            assert over.sum() <= sum(chord.bound(numbers).near for chord in high.chords)
             tight = max(tight, felt / line.largest)
     assert tight > 0.3
 
@@ -602,14 +604,17 @@ def test_forces_of_a_motion_are_linear_in_stiffness_and_not_over_what_places_all
         mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
         if model is not None:
             near = numbers_of(whole, mounting)
-            told = _linear(whole, weights, near)
+            told = linear_sum(whole, weights, near)
             true = float(np.sum(weights * mounting.springs))
             assert told.constant + told.slopes @ near == pytest.approx(true, rel=1e-9)
             assert told.near == pytest.approx(true, rel=1e-9)
         load = generator.normal(size=(6, 2)) @ [1.0, 1.0j]
         for m, (motion, spring) in enumerate(zip(mounting.motions, mounting.springs, strict=True)):
             travel = motion @ whole.root.T @ load
-            true, over = float((travel.conj() @ spring @ travel).real), float(np.sum(_seen(whole, m, load) * spring))
+            true, over = (
+                float((travel.conj() @ spring @ travel).real),
+                float(np.sum(work_weight(whole, m, load) * spring)),
+            )
             assert true <= over * (1.0 + 1e-9)
             assert over <= true * 1.0001 or mounts is PLACES
             assert over < 60.0 * true
@@ -617,10 +622,10 @@ def test_forces_of_a_motion_are_linear_in_stiffness_and_not_over_what_places_all
 
 @pytest.mark.parametrize("seed", range(3))
 def test_products_that_are_not_those_of_the_means_pull(seed: int) -> None:
-    """Nothing pulls where all are; what those of s and those of w add is never taken off each other."""
+    """Nothing mode_scores where all are; what those of s and those of w add is never taken off each other."""
     rng, numbers, d = np.random.default_rng(seed), 3, 6
-    shapes = Shapes((), rng.normal(size=(4, 1 + numbers, d, d)), rng.normal(size=(2, 1 + numbers, d, d)))
-    found = Priced((), rng.random(4), rng.normal(size=2), np.zeros((numbers, d)), ())
+    shapes = ModeConstraints((), rng.normal(size=(4, 1 + numbers, d, d)), rng.normal(size=(2, 1 + numbers, d, d)))
+    found = ModeMultipliers((), rng.random(4), rng.normal(size=2), np.zeros((numbers, d)), ())
     s, z = rng.uniform(-1.0, 1.0, numbers), np.concatenate([[1.0], rng.normal(size=d - 1)])
 
     def moments(own: float, crossed: float) -> np.ndarray:
@@ -632,7 +637,7 @@ def test_products_that_are_not_those_of_the_means_pull(seed: int) -> None:
     pulled = []
     for own, crossed in ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)):
         rng_of = np.random.default_rng(seed + 10)
-        pulled.append(pulls(shapes, found, s, moments(own, crossed)))
+        pulled.append(mode_scores(shapes, found, s, moments(own, crossed)))
     none, plain, mixed, both = pulled
     for k in range(2):
         assert np.all(none[k] < 1e-9)
@@ -646,9 +651,8 @@ def test_products_that_are_not_those_of_the_means_pull(seed: int) -> None:
 def test_what_is_a_share_of_a_norm_may_be_so_much_larger(share: float, tmp_path: Path) -> None:
     """Where a norm is at most one number, a root that is half of it is at most twice that, its square four times."""
     boxes = asked_of(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, "[objective]\n" + ASKED["rms"]))
-    ((weight, each), *_), ((head,), *_) = boxes._terms, boxes._heads
-    look = box.SpringBox(boxes, each, boxes._ends(weight), boxes.lower, boxes.upper)
+    ((variable,), *_), look = boxes._variables, boxes._box(0, boxes.lower, boxes.upper)
     whole, part = (
-        look.under_all([replace(head, share=own, loss=0.0)], boxes._least[0]).tops[0] for own in (1.0, share)
+        look.cut_off([replace(variable, share=own, loss=0.0)], boxes._roots[0]).uppers[0] for own in (1.0, share)
     )
     assert part == pytest.approx(whole / share**2, rel=1e-12)

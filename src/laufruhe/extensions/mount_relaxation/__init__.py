@@ -5,4 +5,4 @@ Without it boxes of the core bound the same designs, with a wider gap where many
 
 from laufruhe.extension import Extension
 
-EXTENSION = Extension("mount_relaxation", provers=("laufruhe.extensions.mount_relaxation.proof:SPRINGS",))
+EXTENSION = Extension("mount_relaxation", provers=("laufruhe.extensions.mount_relaxation.prover:SPRINGS",))

@@ -1,0 +1,309 @@
+"""The relaxation of E43-E45 and E52-E54 as a cone program; bounds do not depend on how good its multipliers are."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Hashable, Sequence
+from dataclasses import replace
+from typing import Any, TypeAlias
+
+import numpy as np
+from scipy.sparse import coo_array, vstack
+
+from laufruhe.extensions.mount_relaxation.cone_solver import (
+    Cone,
+    DualSolver,
+    PrimalSolver,
+    column,
+    matrix_of,
+    solver_for,
+    triangle,
+)
+from laufruhe.extensions.mount_relaxation.constraints import MomentConstraint
+from laufruhe.extensions.mount_relaxation.modes import ModeConstraints
+from laufruhe.extensions.mount_relaxation.program import (
+    ModeMultipliers,
+    Multipliers,
+    Program,
+    QuadraticBound,
+    RootTerm,
+    Solution,
+    proven_bound,
+)
+from laufruhe.numerics.arrays import Array, Indices
+
+# small price of every square in the objective, so that the remainder of multipliers is convex
+ASIDE = 3e-7
+# tolerances of gap and feasibility: of a bound, and of what narrows a box
+FINE, ROUGH = (1e-5, 1e-7), (2e-2, 5e-6)
+# equations are solved once and not refined, more regular instead, and steps stay off the ends of cones: bounds are as
+# good in less time
+_SETTINGS = {
+    "verbose": False,
+    "tol_gap_abs": 1e-6,
+    "max_threads": 1,
+    "direct_solve_method": "faer",
+    "presolve_enable": False,
+    "chordal_decomposition_enable": False,
+    "iterative_refinement_enable": False,
+    "static_regularization_constant": 1e-7,
+    "max_step_fraction": 0.95,
+}
+
+ZERO, SIDES, LENGTH, MATRIX = "zero", "at least zero", "a length and its vector", "semidefinite"
+_Parts: TypeAlias = defaultdict[Hashable, list[Array]]
+
+
+class ConeProgram:
+    """A program as rows of cones.
+
+    Its variables are the epigraph variables, blocks of their quadratic bounds, roots and their lengths, s, and moments
+    of every order and of every mode.
+    """
+
+    def __init__(self, program: Program) -> None:
+        self.program = program
+        self.rows: list[Any] = []
+        self.right: list[Array] = []
+        self.cones: list[tuple[str, Hashable]] = []
+        self._solvers: dict[tuple[float, float], DualSolver | PrimalSolver] = {}
+        blocks = [_entries(size) for quadratic in program.quadratics for size in quadratic.blocks]
+        self.blocks = np.cumsum([len(program.prices), *blocks])
+        counts = [1 + sum(len(rows) for _, rows in root.rows) for root in program.roots]
+        self.roots = np.cumsum([self.blocks[-1], *counts])
+        self.first = int(self.roots[-1])
+        self.ends = np.cumsum([self.first + program.numbers, *map(_entries, program.sizes)])
+        sizes = [(1 + program.numbers) * _entries(6) for _ in program.modes]
+        self.modes = np.cumsum([int(self.ends[-1]), *sizes])
+        self._add_links()
+        self._add_linear()
+        at = 0
+        for quadratic in program.quadratics:
+            self._add_quadratic(quadratic, at)
+            at += len(quadratic.blocks)
+        for constraint in program.constraints:
+            self._add_constraint(constraint)
+        for number, root in enumerate(program.roots):
+            self._add_root(number, root)
+        if program.limit is not None:
+            columns = np.concatenate([self.roots[:-1], self.first + np.arange(program.numbers)])
+            block = np.concatenate([[root.price for root in program.roots], program.limit.slopes])[None]
+            self._add(block, columns.astype(np.intp), SIDES, "limit", np.array([program.limit.upper]))
+        for number, mode in enumerate(program.modes):
+            self._add_mode(number, mode)
+
+    def _add(
+        self, block: Array, columns: Indices, cone: str, name: Hashable = None, right: Array | None = None
+    ) -> None:
+        """Add rows with entries in these columns alone; their multipliers are known by a name."""
+        row, place = np.nonzero(block)
+        shape = len(block), int(self.modes[-1])
+        self.rows.append(coo_array((block[row, place], (row, columns[place])), shape=shape))
+        self.right.append(np.zeros(len(block)) if right is None else np.asarray(right, dtype=float))
+        self.cones.append((cone, name))
+
+    def _add_mode(self, number: int, mode: ModeConstraints) -> None:
+        """Add the six kinds of rows of E56."""
+        numbers, entries = self.program.numbers, _entries(6)
+        own = np.arange(self.modes[number], self.modes[number + 1])
+        corners = own[::entries]
+        self._add(np.ones((1, 1)), corners[:1], ZERO, right=np.ones(1))
+        both = np.concatenate([np.eye(numbers), -np.eye(numbers)], axis=1)
+        columns = np.concatenate([corners[1:], self.first + np.arange(numbers)])
+        self._add(both, columns, ZERO, ("corners", number))
+        for name, matrices, cone in (("equal", mode.equal, ZERO), ("sides", mode.sides, SIDES)):
+            self._add(-column(matrices).reshape(len(matrices), -1), own, cone, (name, number))
+        for tensor in mode.matrices:
+            i, j, factor = triangle(tensor.shape[1])
+            rows = column(tensor[:, i, j]).transpose(1, 0, 2).reshape(len(i), -1) * factor[:, None]
+            self._add(-rows, own, MATRIX, ("matrices", number))
+        first = np.arange(entries)
+        for k in range(1, 1 + numbers):
+            for sign in (1.0, -1.0):
+                rows = np.concatenate([-np.eye(entries), -sign * np.eye(entries)], axis=1)
+                self._add(rows, np.concatenate([own[first], own[k * entries + first]]), MATRIX, (sign, number))
+
+    def _add_links(self) -> None:
+        """Add that every moment matrix has a corner of one, and that (1, u)(1, u)' is the same for all orders."""
+        sizes = self.program.sizes
+        self._add(np.eye(len(sizes)), np.asarray(self.ends[:-1]), ZERO, right=np.ones(len(sizes)))
+        corner, count = self._corner(0), _entries(1 + self.program.columns) - 1
+        for order in range(1, len(sizes) if count else 1):
+            both = np.concatenate([-np.eye(count), np.eye(count)], axis=1)
+            self._add(both, np.concatenate([corner[1:], self._corner(order)[1:]]), ZERO, "links")
+
+    def _corner(self, order: int) -> Indices:
+        """Return the entries of (1, u)(1, u)': columns come first in a triangle column by column."""
+        return np.asarray(self.ends[order] + np.arange(_entries(1 + self.program.columns)))
+
+    def _moment(self, order: int) -> Indices:
+        return np.arange(self.ends[order], self.ends[order + 1])
+
+    def _add_linear(self) -> None:
+        """Add the range of s, sets of unbalances, linear limits, bounds of variables, and traces under variables."""
+        program, numbers = self.program, self.program.numbers
+        for sign in (1.0, -1.0):
+            self._add(sign * np.eye(numbers), self.first + np.arange(numbers), SIDES, right=np.ones(numbers))
+        for matrix in program.sets:
+            self._add(column(matrix)[None], self._corner(0), SIDES, "sets")
+        for linear in program.linear:
+            columns = np.concatenate([self._moment(order) for order, _ in linear.matrices])
+            block = np.concatenate([column(matrix) for _, matrix in linear.matrices])[None]
+            self._add(block, columns, SIDES, "linear", np.array([linear.upper]))
+        if len(program.uppers):
+            bounded = np.flatnonzero(np.isfinite(program.uppers))
+            self._add(np.eye(len(bounded)), bounded, SIDES, right=program.uppers[bounded])
+        at = 0
+        for quadratic in program.quadratics:
+            if quadratic.blocks:
+                span = np.arange(self.blocks[at], self.blocks[at + len(quadratic.blocks)])
+                traces = np.concatenate([_diagonal(size) for size in quadratic.blocks])
+                self._add(np.append(traces, -1.0)[None], np.append(span, quadratic.variable), SIDES)
+            at += len(quadratic.blocks)
+
+    def _add_quadratic(self, quadratic: QuadraticBound, at: int) -> None:
+        """Add that S - F(M) is semidefinite; the blocks of S are variables from number `at` on."""
+        i, j, factor = triangle(quadratic.size)
+        columns, blocks = [], []
+        for order, rows in quadratic.rows:
+            pairs = np.einsum("pax,pay->axy", rows[:, i], rows[:, j])
+            blocks.append(column(0.5 * (pairs + pairs.transpose(0, 2, 1))) * factor[:, None])
+            columns.append(self._moment(order))
+        if quadratic.blocks:
+            entry_of = {pair: k for k, pair in enumerate(zip(i.tolist(), j.tolist(), strict=True))}
+            for k, part in enumerate(quadratic.block_slices):
+                block_rows, block_columns, own = triangle(quadratic.blocks[k])
+                block = np.zeros((len(i), len(own)))
+                for entry, (a, b) in enumerate(zip(block_rows + part.start, block_columns + part.start, strict=True)):
+                    block[entry_of[int(a), int(b)], entry] = -1.0
+                blocks.append(block)
+                columns.append(np.arange(self.blocks[at + k], self.blocks[at + k + 1]))
+        else:
+            blocks.append(-column(np.eye(quadratic.size))[:, None])
+            columns.append(np.array([quadratic.variable]))
+        self._add(np.concatenate(blocks, axis=1), np.concatenate(columns), MATRIX, "quadratics")
+
+    def _add_root(self, number: int, root: RootTerm) -> None:
+        """Add that a root is over its chord, and over the sum of lengths, each over that of its vector."""
+        at, end = int(self.roots[number]), int(self.roots[number + 1])
+        ends = np.array([number, at])
+        self._add(np.array([[root.slope, -1.0]]), ends, SIDES, "chords", np.array([-root.offset]))
+        sums = np.concatenate([[-1.0], np.ones(end - at - 1)])[None]
+        self._add(sums, np.arange(at, end), SIDES)
+        for order, rows in root.rows:
+            for vector in rows:
+                at, (count, size) = at + 1, vector.shape
+                block = np.zeros((1 + count, 1 + size))
+                block[0, 0], block[1:, 1:] = -1.0, -vector
+                # the first row of a triangle column by column
+                first = self.ends[order] + np.cumsum(np.arange(size))
+                # off the diagonal an entry counts by the root of two
+                block[1:, 2:] *= math.sqrt(0.5)
+                self._add(block, np.concatenate([[at], first]), LENGTH, ("lengths", number))
+
+    def _add_constraint(self, constraint: MomentConstraint) -> None:
+        i, j, factor = triangle(constraint.size)
+        moments = -column(constraint.moments[i, j]) * factor[:, None]
+        columns = np.concatenate([self.first + np.arange(self.program.numbers), self._moment(constraint.order)])
+        block = np.concatenate([-column(constraint.slopes).T.reshape(len(i), -1), moments], axis=1)
+        self._add(block, columns, MATRIX, "constraints", column(constraint.constant))
+
+    def least(self, objective: Array | int) -> tuple[float, Array]:
+        """Return the proven bound of another objective, or of one root by its number, and s and w at the optimum."""
+        if isinstance(objective, int):
+            assert self.program.limit is not None
+            program = replace(self.program, limit=replace(self.program.limit, root=objective))
+        else:
+            program = replace(self.program, objective=objective)
+        solution = self.solve(program, ROUGH)
+        modes = [each[0, 0, 1:] for each in solution.modes]
+        return proven_bound(program, solution.multipliers), np.concatenate([solution.s, *modes])
+
+    def solve(self, program: Program, tolerances: tuple[float, float] = FINE) -> Solution:
+        """Return multipliers and moments of a program with the same constraints, whatever the solver says of them."""
+        x, z, value = self._solver(tolerances).solve(self._cost(program))
+        parts: _Parts = defaultdict(list)
+        for (_, name), part in zip(self.cones, np.split(z, np.cumsum([*map(len, self.right)])[:-1]), strict=True):
+            parts[name].append(part)
+        lengths = []
+        for number, root in enumerate(program.roots):
+            # the vectors of the cones, beside their first number, order by order
+            vectors = iter(parts["lengths", number])
+            lengths.append([-np.array([next(vectors)[1:] for _ in rows]) for _, rows in root.rows])
+        multipliers = Multipliers(
+            [matrix_of(part, bound.size) for part, bound in zip(parts["quadratics"], program.quadratics, strict=True)],
+            [matrix_of(part, own.size) for part, own in zip(parts["constraints"], program.constraints, strict=True)],
+            _joined(parts["linear"]),
+            _joined(parts["sets"]),
+            [matrix_of(np.append(0.0, part), 1 + program.columns) for part in parts["links"]],
+            _joined(parts["chords"]),
+            lengths,
+            float(sum(part[0] for part in parts["limit"])),
+            [self._mode_multipliers(number, mode, parts) for number, mode in enumerate(program.modes)],
+        )
+        moments = [matrix_of(x[self._moment(k)], size) for k, size in enumerate(program.sizes)]
+        modes = []
+        for start, end in zip(self.modes[:-1], self.modes[1:], strict=True):
+            entries = x[start:end].reshape(1 + program.numbers, -1)
+            modes.append(np.array([matrix_of(each, 6) for each in entries]))
+        s = np.clip(x[self.first : self.first + program.numbers], -1.0, 1.0)
+        return Solution(multipliers, s, moments, value, modes)
+
+    def _mode_multipliers(self, number: int, mode: ModeConstraints, parts: _Parts) -> ModeMultipliers:
+        matrices = [
+            matrix_of(part, tensor.shape[1])
+            for part, tensor in zip(parts["matrices", number], mode.matrices, strict=True)
+        ]
+        above, under = ([matrix_of(part, 6) for part in parts[sign, number]] for sign in (1.0, -1.0))
+        (sides,), (equal,), (corners,) = (parts[name, number] for name in ("sides", "equal", "corners"))
+        return ModeMultipliers(matrices, sides, -equal, corners, [*zip(above, under, strict=True)])
+
+    def _cost(self, program: Program) -> Array:
+        cost = np.zeros(int(self.modes[-1]))
+        cost[: len(program.prices)] = program.prices
+        for number, (at, root) in enumerate(zip(self.roots, program.roots, strict=False)):
+            cost[at] = root.price if program.limit is None else float(number == program.limit.root)
+        slopes, mode_slopes = program.slopes
+        cost[self.first : self.first + program.numbers] = slopes
+        for at, slope in zip(self.modes, mode_slopes, strict=False):
+            # entries (0, k) of a triangle column by column, which count by the root of two
+            cost[at + np.cumsum(np.arange(1, 6))] = slope * math.sqrt(0.5)
+        for order, size in enumerate(program.sizes):
+            cost[self._moment(order)] = -ASIDE * _diagonal(size)
+        return cost
+
+    def _solver(self, tolerances: tuple[float, float]) -> DualSolver | PrimalSolver:
+        """Return the solver of all objectives under the same constraints."""
+        import clarabel
+
+        if tolerances not in self._solvers:
+            kinds = {SIDES: clarabel.NonnegativeConeT, LENGTH: clarabel.SecondOrderConeT}
+            cones = []
+            for (cone, _), right in zip(self.cones, self.right, strict=True):
+                size = len(right)
+                if cone == MATRIX:
+                    # the matrix that has a triangle of so many entries
+                    cones.append(Cone(size, clarabel.PSDTriangleConeT(math.isqrt(2 * size)), True))
+                else:
+                    cones.append(Cone(size, None if cone == ZERO else kinds[cone](size), cone == LENGTH))
+            moments = [
+                (self._moment(order), clarabel.PSDTriangleConeT(size)) for order, size in enumerate(self.program.sizes)
+            ]
+            rows, right = vstack(self.rows, format="coo"), np.concatenate(self.right)
+            settings = {**_SETTINGS, **dict(zip(("tol_gap_rel", "tol_feas"), tolerances, strict=True))}
+            self._solvers[tolerances] = solver_for(rows, right, cones, moments, settings)
+        return self._solvers[tolerances]
+
+
+def _joined(parts: Sequence[Array]) -> Array:
+    return np.concatenate([np.zeros(0), *parts])
+
+
+def _entries(size: int) -> int:
+    return size * (size + 1) // 2
+
+
+def _diagonal(size: int) -> Array:
+    i, j, _ = triangle(size)
+    return np.where(i == j, 1.0, 0.0)
