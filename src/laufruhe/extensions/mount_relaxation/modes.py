@@ -21,6 +21,9 @@ from laufruhe.problem.channels import DECOUPLING, motion_indices
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.ranges import SLACK
 
+OF_SHARES = frozenset({DECOUPLING})
+"""Channels of the energy shares of motions in modes."""
+
 # least square of the radius of a ball, as a share of that of its middle
 NO_SIZE = 1e-8
 
@@ -48,7 +51,7 @@ def mode_bases(problem: Problem, mounts: OpenMounts) -> tuple[Array, ...]:
         return ()
     shares: dict[int, float] = {}
     for limit in problem.mount_limits:
-        if limit.measure.channel == DECOUPLING and limit.minimum > 0.0:
+        if limit.measure.channel in OF_SHARES and limit.minimum > 0.0:
             for motion in motion_indices(limit.measure):
                 shares[motion] = max(shares.get(motion, 0.0), limit.minimum * (1.0 - SLACK))
     return tuple(mode_basis(mounts.root, motion, share) for motion, share in shares.items())
