@@ -87,8 +87,8 @@ def decided(problem: Problem, numbers: Mapping[str, float]) -> dict[str, Value]:
 
 def _moving(problem: Problem, values: Mapping[str, Value]) -> Problem:
     fixed = [decision for decision in problem.decisions if not decision.is_affine]
-    problem_ = problem.fixed_at([values[decision.name] for decision in fixed], fixed)
-    return replace(problem_, phasing=None, extras=())
+    reduced = problem.fixed_at([values[decision.name] for decision in fixed], fixed)
+    return replace(reduced, phasing=None, extras=())
 
 
 def _filled(
@@ -96,7 +96,7 @@ def _filled(
 ) -> LiveModel:
     affine = AffineModel(moving)
     kinds = {decision.kind for decision in moving.decisions}
-    # where the value of a measure is known that the page cannot follow
+    # source of values that the page cannot compute
     known = "it is measured when sliders rest" if is_served else f"its value is that of the design decided; {HOW}"
     aside = f"cannot be followed live; {known.format(file=bare.file)}"
     collected = _Collected(affine, kinds, result, aside)

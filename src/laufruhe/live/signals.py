@@ -128,7 +128,7 @@ def _of_load(model: AffineModel, measure: Measure) -> Signal:
     base = common_base([problem.engine.cycle.base_order, *(signal.base for signal in every)])
     constant = over(base, [own for own, _ in pairs])
     columns = [over(base, by) for _, by in pairs]
-    # those of every norm, a mean has no need of them, and of all that may bend
+    # kinks of all signals, for every norm
     signals = [reduce(add, by, own) for own, by in zip(constant, columns, strict=True)]
     bends = bends_of(replace(measure, norm=PEAK), signals, problem.engine)
     points = []

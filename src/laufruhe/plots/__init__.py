@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-# a matplotlibrc in the working folder, which may be broken, is none of ours
+# ignore a matplotlibrc in the working folder
 with chdir(Path(__file__).parent):
     import matplotlib  # noqa: F401
 
@@ -74,17 +74,17 @@ def get_ready() -> None:
 
 def draw_in_shares(result: Result, folder: Path, kinds: Sequence[str], count: int) -> dict[str, str]:
     """Write all pictures as `draw_and_show` does, in several processes."""
-    # what letters need is found once, for all processes
+    # find fonts once, for all processes
     prepare(_words(result))
     wanted, (left, put) = names(result), os.pipe()
     os.write(put, bytes(range(len(wanted))))
     os.close(put)
-    # who is done with one takes the next: a byte of a pipe is read by one process alone
+    # an idle process takes the next picture: only one process reads a byte of the pipe
     numbered = (wanted[number[0]] for number in iter(partial(os.read, left, 1), b""))
     parts = fork_map(lambda _: draw_and_show(result, folder, kinds, numbered), count)
     os.close(left)
     drawn = {name: svg for part in parts for name, svg in part.items()}
-    # of a twin that died
+    # pictures of a process that died
     drawn |= draw_and_show(result, folder, kinds, [name for name in wanted if name not in drawn])
     return {name: drawn[name] for name in wanted}
 

@@ -193,7 +193,7 @@ def views(scene: Scene) -> Page:
         wide = max(float(scale * size[0]), NARROW)
         axes.set_position((left / inches, 0.0, wide / inches, 1.0))
         left += wide + ACROSS
-        # so much [mm] about the middle of what is seen at any angle
+        # limits [mm] about the middle of the area over all angles
         (x, y), half = 0.5 * (points.min(axis=0) + points.max(axis=0)), (0.5 * wide / scale, 0.5 * high / scale)
         across, up = (x - half[0], x + half[0]), (y - half[1], y + half[1])
         down = is_side and scene.is_flat
@@ -214,7 +214,7 @@ def draw_views(drawn: Page, scene: Scene, phi: float = 0.0) -> None:
 
 def _front(axes: Axes, scene: Scene, phi: float) -> None:
     """Draw the view from the front: y to the right, z up, turning clockwise (C3)."""
-    # what stands further back is drawn first
+    # draw from back to front
     poses = [Pose.at_angle(part, phi) for part in sorted(scene.engine.slider_cranks, key=lambda part: part.x)]
     bore, places = bore_of(scene.engine), dict[str, complex]()
     for k, pose in enumerate(poses):
@@ -352,7 +352,7 @@ def legend_of(scene: Scene) -> list[Line2D | Patch]:
             entries.append(Patch(label=f"{name}, {scene.state}", **DECIDED))
     if not scene.cranks >= {part.shaft.name for part in scene.engine.slider_cranks}:
         entries.append(Patch(label="crank", **_PLAIN))
-    # one of each kind
+    # one entry per kind
     kinds = {scene.is_decided(rotor): rotor for rotor in scene.weights}
     entries += [
         Patch(label=f"weight, {scene.state}" if decided else "weight", **_weight_look(scene, rotor))
@@ -386,5 +386,5 @@ def _rod_look(scene: Scene) -> dict[str, Any]:
 
 
 def _weight_look(scene: Scene, rotor: Rotor) -> dict[str, Any]:
-    # weights behind each other are told apart by their edges
+    # edges separate overlapping weights
     return {"facecolor": (AFTER if scene.is_decided(rotor) else GREY, 0.55), "edgecolor": INK, "linewidth": 0.8}

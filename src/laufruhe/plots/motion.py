@@ -24,7 +24,7 @@ FRAMES = 48
 """Number of frames over the working cycle."""
 SECONDS = 4.0
 DPI, COLOURS = 80, 96
-# of the height of the picture, for the largest force
+# length of the largest arrow relative to the picture's height
 REACH = 0.35
 LIT = math.radians(70.0)
 """Crank angle for which a firing is displayed [rad]."""
@@ -56,7 +56,7 @@ def animate(result: Result, path: Path) -> None:
         drawn.figure.canvas.draw()
         pixels = np.asarray(drawn.figure.canvas.buffer_rgba())  # type: ignore[attr-defined]
         frames.append(Image.fromarray(pixels).convert("RGB"))
-    # one set of colours for all, or they would flicker
+    # one palette for all frames avoids flicker
     some = np.concatenate([np.asarray(frame) for frame in frames[:: max(FRAMES // 4, 1)]])
     colours = Image.fromarray(some).quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE)
     reduced = [frame.quantize(palette=colours, dither=Image.Dither.NONE) for frame in frames]

@@ -19,7 +19,7 @@ from laufruhe.solvers.result import Result
 LIMIT = VERMILION
 MOST_NAMES, _APART = 5, 0.1
 """Operating points that are all named, and room between two names [inch]."""
-# styles tell orders apart in print as well
+# line styles distinguish orders in print
 STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 
 

@@ -32,7 +32,7 @@ from laufruhe.present.measures import evaluations_with_loads, is_changed
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.solvers.result import Result
 
-# Okabe and Ito: told apart by every eye, and by their lightness in print
+# Okabe and Ito: distinct for colour-blind readers, and by lightness in print
 GREY, SKY, BLUE, ORANGE, VERMILION, GREEN = "#8a8a8a", "#56B4E9", "#0072B2", "#E69F00", "#D55E00", "#009E73"
 PURPLE, PALE = "#CC79A7", "#8fc4e8"
 INDIGO, OLIVE, LEAF, RUST, MINT, WHITE = "#332288", "#999933", "#00664b", "#a63c00", "#d9ecd9", "#ffffff"
@@ -67,7 +67,7 @@ _SETTINGS: Any = {
 def styled() -> Iterator[None]:
     """Apply fonts and colours within the block or the decorated function."""
     with mpl.rc_context({**_SETTINGS, "font.family": families()}), warnings.catch_warnings():
-        # letters that no font has are told once; the tables have them right
+        # `prepare` warns about missing letters once
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         yield
 
@@ -237,7 +237,7 @@ def as_png(figure: Figure) -> bytes:
     with styled():
         canvas.draw()
     drawn = io.BytesIO()
-    # all of it is opaque
+    # no transparency
     image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
     image.save(drawn, format="png", compress_level=3, dpi=(DPI, DPI))
     return drawn.getvalue()

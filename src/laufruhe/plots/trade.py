@@ -65,7 +65,7 @@ def _drawn(trade: Trade) -> Figure:
     if times.max() < _FEW_DECADES * times.min():
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(_PLAIN)
-    # the band under the axis has a name of its own
+    # the band under the axis has its own label
     least = 1.01 * LEAST_ERROR if min(row.error for row in rows) < LEAST_ERROR else 0.0
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _power(value) if value > least else ""))
     for axis in (axes.xaxis, axes.yaxis):

@@ -127,7 +127,7 @@ def label_lines(axes: Axes, heights: Sequence[float], texts: Sequence[str]) -> N
     least = 1.3 * SMALL / _POINTS / (axes.bbox.height / axes.figure.dpi)
     places = spread((np.asarray(heights, dtype=float) - low) / (high - low), least)
     for height, place, text in zip(heights, places, texts, strict=True):
-        # to the middle of the end of the words, under none of them
+        # the leader ends at the middle of the text's left side
         leader = {"arrowstyle": "-", "color": FAINT, "lw": 0.6, "shrinkA": 0.0, "shrinkB": 0.0, "relpos": (0.0, 0.5)}
         axes.annotate(
             text, (1.0, height), (1.035, place), axes.get_yaxis_transform(), "axes fraction", size=SMALL, color=INK,
@@ -164,7 +164,7 @@ def separate_texts(texts: Sequence[Text]) -> None:
     left = [(text, text.get_window_extent()) for text in texts]
     while left:
         group = [left.pop(0)]
-        # all that stand over one stretch of the axis are spread together
+        # texts over the same part of the axis are spread together
         for text, box in left[:]:
             if any(box.x0 < other.x1 and other.x0 < box.x1 for _, other in group):
                 group.append((text, box))

@@ -79,7 +79,7 @@ def main_load(loads: PointLoads) -> Spectrum:
 
 def mount_orders(spectrum: Spectrum) -> Array:
     """Return the amplitude by order of every mount's force, shape (orders, mounts) [N]."""
-    # on a resonance there is none
+    # a resonance has no finite amplitude
     with np.errstate(invalid="ignore"):
         return order_amplitude(spectrum.coefficients)
 

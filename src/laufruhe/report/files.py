@@ -118,11 +118,11 @@ def staged(wanted: FileSet) -> Iterator[Path]:
     with ExitStack() as until_then:
         with _reporting(wanted):
             above = wanted.folder.parent
-            # not while another run swaps the folder
+            # wait while another run swaps the folder
             with held(above) if above.is_dir() else nullcontext():
                 wanted.checked()
             stage = until_then.enter_context(_stage_for(wanted.folder))
-            # there may be none, or none while another run puts its own there
+            # the folder may be missing, also while another run swaps it
             with suppress(FileNotFoundError):
                 shutil.copymode(wanted.folder, stage)
         with _with_final_name(stage, wanted.folder):
@@ -248,7 +248,7 @@ def _made(folder: Path) -> tuple[str, frozenset[str]]:
         verb, names = noted["made_by"], noted["files"]
         here = {entry.name for entry in folder.iterdir() if names is None or entry.is_file()}
         if isinstance(verb, str) and isinstance(names, list | None):
-            # a name that stands nowhere, or elsewhere, is nobody's
+            # ignore names that are not in this folder
             return verb, frozenset(here if names is None else here.intersection(map(str, names)))
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         pass
@@ -270,7 +270,7 @@ def _clear(left: Path, place: Path) -> None:
                 entry.unlink()
             elif not (place / entry.name).exists():
                 entry.rename(place / entry.name)
-        # last, for without it nothing here is known as made
+        # last: it identifies the other files
         (left / MADE).unlink(missing_ok=True)
         left.rmdir()
 
@@ -278,7 +278,7 @@ def _clear(left: Path, place: Path) -> None:
 def _swap(stage: Path, folder: Path) -> None:
     """Swap a folder with another."""
     with suppress(OSError):
-        # there is none yet, or an empty one
+        # the target is missing or empty
         stage.rename(folder)
         return
     if os.name == "posix":

@@ -41,7 +41,7 @@ def as_dict(result: Result, series: bool = False) -> Record:
     """Return the result as plain Python values; `series` adds loads over the cycle."""
     problem = result.problem
     points = [_point(result, k) for k in range(len(problem.points))]
-    # one operating point stands at the top already
+    # a single operating point is at the top level
     places = {"mounts": None} | {places.key: None for places in places_of(result)}
     keys = ("name", "speed", "weight", "torque", *((*places, "shaking") if len(points) > 1 else ()))
     if series:

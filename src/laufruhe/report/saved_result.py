@@ -23,7 +23,7 @@ from laufruhe.solvers.values import DecisionValue, LimitValue, ObjectiveValue
 def _numbers(entry: Any) -> Any:
     if not isinstance(entry, dict):
         return entry
-    # the price as an edge is tightened is told again where it is the same
+    # an equal tightening price is stored twice
     same = entry.get("tightening_price") in (None, entry.get("shadow_price"))
     entries = {k: v for k, v in entry.items() if not (same and k == "tightening_price")}
     return {k: math.nan if v is None else v for k, v in entries.items()}

@@ -124,9 +124,9 @@ def _table(grid: Table, columns: Sequence[int], width: int) -> RichTable:
     caps = range(max(most for _, most in widths), 0, -1)
     shares = ([min(most, max(least, cap)) for least, most in widths] for cap in caps)
     fitting: Sequence[int | None] = next((share for share in shares if sum(share) <= room), [None] * len(columns))
-    for column, width_ in zip(columns, fitting, strict=True):
+    for column, column_width in zip(columns, fitting, strict=True):
         side: Literal["left", "right"] = "left" if column in grid.texts else "right"
-        table.add_column(Text(grid.head[column]), justify=side, overflow="fold", width=width_)
+        table.add_column(Text(grid.head[column]), justify=side, overflow="fold", width=column_width)
     for row in grid.rows:
         table.add_row(*(Text(row[k], style="red" if row[k] == "broken" else "") for k in columns))
     return table

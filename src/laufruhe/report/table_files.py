@@ -52,7 +52,7 @@ def write_book(tables: Mapping[str, Table], path: Path) -> None:
             page.add_write_handler(str, partial(_write_text, plain=plain))
             page.freeze_panes(1, 0)
             for k, row in enumerate(chain([table.head], table.rows)):
-                # numbers first: most cells are
+                # most cells are numbers
                 page.write_row(
                     k, 0, [cell if type(cell) is float and math.isfinite(cell) else _book_cell(cell) for cell in row]
                 )

@@ -126,7 +126,7 @@ def _rankings(result: Result) -> Table:
     head = ["rank", f"objective [{unit or '-'}]", f"not under [{unit or '-'}]", "proven", "throws [deg]", "shafts",
             "firing order", "intervals [deg]", "neighbours", "roll content"]  # fmt: skip
     for order in ranking_of(result).ranking[0].orders:
-        # in forces of one throw, and that times their spacing
+        # relative to the force of one throw, and that times the spacing
         head += [f"free force of order {order} [-]", f"free couple of order {order} [-]"]
     return Table(head, rows)
 
@@ -148,7 +148,7 @@ def _torque(result: Result) -> Table:
          for of, values in _torques(design.engine, point, fidelity, angles).items()}
         for point in points
     ]  # fmt: skip
-    # without gas at one point there is none of that part
+    # an operating point may lack gas
     names = list(dict.fromkeys(name for columns in columns_by_point for name in columns))
     rows = [
         [point.name, *row]
@@ -192,7 +192,7 @@ def _indicator(result: Result) -> Table:
     for _, _, one in diagrams:
         named |= dict.fromkeys(one.pressures)
     for point, part, one in diagrams:
-        # a cylinder has not every chamber
+        # a cylinder may lack a chamber
         pressures = (one.pressures.get(name, np.full(STEPS, math.nan)) for name in named)
         columns = np.column_stack([np.degrees(TURN), one.travel, one.force, one.needed, *pressures])
         rows += [[point, part, *row] for row in columns.tolist()]

@@ -241,5 +241,5 @@ def _regret(row: Row | None) -> str:
         return f"{_percent(row.excess)} beyond a limit"
     if row is None or math.isnan(row.regret):
         return DASH
-    # the cone solver's own digits
+    # accuracy of the cone solver
     return "0" if abs(row.regret) < 1e-8 else f"{row.regret:.1e}"

@@ -38,7 +38,7 @@ def headline(result: Result) -> str:
         return f"{text}; the design as given stands on a resonance."
     if abs(o.value - o.initial) <= UNFELT * max(abs(o.value), abs(o.initial)):
         return f"{name} stays at {figure(o.initial, o.unit)}, {_proven(result.certificate)}."
-    # of nothing there is no share
+    # a zero objective has no relative change
     change = f" ({percent(-o.reduction)})" if o.initial else ""
     initial, decided = figure(o.initial, o.unit), figure(o.value, o.unit, scale=o.initial)
     sentence = f"{name} falls from {initial} to {decided}"

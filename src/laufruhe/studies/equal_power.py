@@ -11,7 +11,7 @@ from laufruhe.machine.similarity import EqualPowerScale, equal_power_scale
 from laufruhe.problem.decision import Decision, RotorDrive
 from laufruhe.problem.problem import Problem
 
-# what a decision's size is multiplied by when the engine is rebuilt, as powers of its unit
+# factors on a decision when the engine is resized, by unit
 _FRACTION, _LENGTH, _MASS, _UNBALANCE = "", "m", "kg", "kg m"
 
 
@@ -28,7 +28,7 @@ def at_equal_power(problem: Problem, reference_cylinders: int) -> Problem:
         raise ModelError("cylinders differ in bore or stroke, so no one scale gives equal power; make them equal")
     scale, phasing = equal_power_scale(len(cylinders), reference_cylinders), problem.phasing
     if phasing is not None:
-        # every star is that of the engine in its new size
+        # stars are realised in the new size
         realise, layout = phasing.realise, phasing.layout
         phasing = replace(
             phasing,

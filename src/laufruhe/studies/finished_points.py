@@ -13,7 +13,7 @@ from pathlib import Path
 from laufruhe.studies.part import Record
 
 FINISHED_POINTS = ".unfinished-points.jsonl"
-# of a line: enough to tell it from any other, and from itself with anything changed
+# length of a line's checksum
 _SUM = 32
 
 
@@ -46,7 +46,7 @@ class FinishedPoints(AbstractContextManager["FinishedPoints"]):
         line = json.dumps([mark, round(seconds, 6), record]).encode()
         rest = memoryview(b"\n%b %b\n" % (_checksum(line), line))
         while rest:
-            # a full disk takes a part, and then complains
+            # a full disk writes a part before it fails
             rest = rest[self._stream.write(rest) :]
         self._records[mark], self.seconds[mark] = record, seconds
 

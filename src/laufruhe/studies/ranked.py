@@ -11,9 +11,9 @@ from laufruhe.present import picture as p
 from laufruhe.present.numbers import number
 from laufruhe.units import readable
 
-# height of a row, and of what stands above and below all of them [inch]
+# height of a row, and of the margins above and below [inch]
 ROW, AROUND = 0.19, 0.9
-# panels side by side, and from which share of the largest on an axis is logarithmic
+# panels side by side, and spread of values from which an axis is logarithmic
 MOST, SPREAD = 4, 200.0
 
 
@@ -29,7 +29,7 @@ def side_by_side(data: xr.Dataset, words: str) -> p.Picture:
     unit, metric = data["objective"].attrs["units"], data.attrs["metric"]
     if unit and metric not in [name for name, *_ in quantities]:
         quantities.insert(0, (metric, *readable(unit), data["objective"].values[order]))
-    # in rows of about as many
+    # rows of similar length
     columns = -(-len(quantities) // -(-len(quantities) // MOST))
     panels = [
         _panel(f"{name}\n[{unit}]" if unit else f"{name}\n", factor * values, names if k % columns == 0 else [])
@@ -46,7 +46,7 @@ def side_by_side(data: xr.Dataset, words: str) -> p.Picture:
 def _panel(title: str, values: np.ndarray, names: list[str]) -> p.Panel:
     most = float(np.nanmax(values, initial=0.0)) or 1.0
     least = float(np.nanmin(values, initial=most))
-    # what spreads over decades would be lines of no length
+    # values over decades need a logarithmic axis
     low = 10.0 ** math.floor(math.log10(least)) if 0.0 < least < most / SPREAD else 0.0
     span = math.log(most / low) if low else most
     known, places = np.isfinite(values), np.arange(len(values), dtype=float)

@@ -87,7 +87,7 @@ class Regions:
                 return None
             values = np.ascontiguousarray(self.read(mark)[VALUES], dtype="<f8")
         except Exception:
-            # a damaged file ends in whatever its codec makes of it
+            # damaged files raise any error of their codec
             return None
         return float(_SECONDS.unpack(packed)[0]) if noted[:_SUM] == _checksum(mark, packed, values) else None
 
@@ -110,7 +110,7 @@ def _laid_out(root: Path, name: str, template: Template) -> tuple[Any, Any]:
     arrays = _standing(store, name, about, forms)
     if arrays is not None:
         for key, array in zip(shapes, arrays, strict=True):
-            # more draws go on from those that are there
+            # further draws extend existing ones
             if array.shape != shapes[key]:
                 array.resize(shapes[key])
         return arrays
@@ -156,7 +156,7 @@ def _store_at(root: Path) -> Any:
         store = zarr.open_group(root, mode="r+", zarr_format=3)
         is_ours = store.attrs.get("made_by") == MADE_BY and isinstance(store.attrs.get("parts"), list)
     except Exception:
-        # an array, no JSON, a number for a name: each ends in another error of Zarr
+        # an array, invalid JSON or a number for a name raise different errors of Zarr
         rule, remedy = f"has a '{_ROOT}' that is damaged or no group", f"delete the folder, or {_ELSEWHERE}"
         raise refused("results", str(root), rule, remedy) from None
     if not is_ours:

@@ -26,7 +26,7 @@ from laufruhe.studies.reader import StudyFile
 from laufruhe.studies.scenes import Scenes
 from laufruhe.studies.stores import Records, Task, stores_of
 
-# a worker imports everything anew: two seconds, so it has to save more
+# a worker imports everything anew, which takes two seconds
 POOL_PAYS = 4.0
 NEAR, FAR = 0.5, 30.0
 """Seconds of points that one piece of work takes, on this machine and elsewhere: what is lost with a worker, and far
@@ -60,7 +60,7 @@ def run(
     scenes = Scenes(folder)
     work = [(part, point) for part in study.study.parts for point in part.points(scenes)]
     marks = [scenes.fingerprint(point, part.settings()) for part, point in work]
-    # a scene that stands in two parts of one kind is solved once
+    # equal scenes of several parts are solved once
     wanted = dict(zip(marks, work, strict=True))
     with ExitStack() as stores:
         store = {
@@ -140,7 +140,7 @@ def answers(tasks: Sequence[Task], scenes: Scenes, jobs: int) -> Generator[Answe
                 break
             answer = _answer(k, task, scenes)
             if passed():
-                # what a limit may have cut short is no answer
+                # a time limit may have cut the answer short
                 raise _time_limit_error()
             yield answer
             first = k + 1

@@ -147,7 +147,7 @@ def dataset(
     mounts = list(dict.fromkeys(name for record in records for name in record["mean"]))
     units = {name: unit for record in records for name, unit in record["units"].items()}
     metrics = {record["metric"]: record["unit"] for record in records if record["metric"]}
-    # of several metrics the unit is one, or they were refused
+    # several metrics share a unit, or were refused
     metric, unit = next(iter(metrics), "") if len(metrics) == 1 else "objective", next(iter(metrics.values()), "")
     variables = {
         name: variable("point", [record[name] for record in records], words.format(metric), unit)
@@ -258,8 +258,8 @@ class SweptPart(Part):
         units = {problem.objective_unit: case for problem, case in zip(problems, self.cases, strict=True)}
         if len(units) > 1:
             (one, first_case), (two, second_case) = list(units.items())[:2]
-            units_ = [unit or "several units together" for unit in (one, two)]
-            rule = f"minimises in {units_[0]} in '{first_case.name}' and in {units_[1]} in '{second_case.name}'"
+            unit_names = [unit or "several units together" for unit in (one, two)]
+            rule = f"minimises in {unit_names[0]} in '{first_case.name}' and in {unit_names[1]} in '{second_case.name}'"
             raise scenes.refused(self.cases[0], "objective", rule, "give the part one metric")
         return problems
 
@@ -293,7 +293,7 @@ def coordinates(axes: Sequence[Axis], points: Sequence[Point]) -> dict[str, Any]
     for axis in axes:
         values = [point.changes[axis.quantity] for point in points]
         number = axis.by_value()
-        # labels as a problem file has them
+        # labels as in a problem file
         labels = [str(value).lower() if isinstance(value, bool) else str(value) for value in values]
         column = labels if axis.numbers is None else [number[value] for value in values]
         coords[axis.quantity] = ("point", column, {"units": axis.unit, "long_name": axis.name, "swept": 1})

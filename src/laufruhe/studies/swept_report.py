@@ -18,7 +18,7 @@ from laufruhe.units import readable
 
 MOST_ROWS, MOST_DOTS = 80, 40
 NEGLIGIBLE = 1e-9
-# width of a letter of a tick [inch], and how many a line of it has
+# width of a tick's letter [inch], and letters per line
 LETTER, LETTERS = 0.078, 18
 _PROOFS = {"global": "proven", "global within gap": "proven within gap", "local": "local", "none": "not proven"}
 
@@ -104,7 +104,7 @@ def lines(data: xr.Dataset, names: Sequence[str]) -> list[p.Mark]:
     place, numbers = spread(data, names[-1]), data[names[-1]].dtype.kind in "fi"
     marks: list[p.Mark] = []
     for label, chosen, colour in groups(data, names[:-1]):
-        # nothing lies between two labels, and dots would hide a line of many points
+        # labels are not joined, and many dots would hide their line
         dots = not numbers or chosen.sum() <= MOST_DOTS
         size, width = (2.5, 1.5) if numbers else (6.0, 0.0)
         y = data["objective"].values[chosen]
@@ -139,16 +139,16 @@ def metric_axis(data: xr.Dataset, *drawn: str) -> p.Axis:
 
 def groups(data: xr.Dataset, names: Sequence[str]) -> list[tuple[str, Any, p.Colour]]:
     """Return label, points and colour of every line."""
-    columns_ = [*(["case"] if len(set(data["case"].values.tolist())) > 1 else []), *names]
-    columns = [data[name].values.tolist() for name in columns_]
-    keys = list(zip(*columns, strict=True)) if columns_ else [()] * data.sizes["point"]
+    keyed_by = [*(["case"] if len(set(data["case"].values.tolist())) > 1 else []), *names]
+    columns = [data[name].values.tolist() for name in keyed_by]
+    keys = list(zip(*columns, strict=True)) if keyed_by else [()] * data.sizes["point"]
     each = list(dict.fromkeys(keys))
-    groups_ = []
+    line_groups = []
     for k, key in enumerate(each):
-        words = ", ".join(_with_unit(data[name], value) for name, value in zip(columns_, key, strict=True))
+        words = ", ".join(_with_unit(data[name], value) for name, value in zip(keyed_by, key, strict=True))
         chosen = np.array([one == key for one in keys])
-        groups_.append((words or str(data["case"].values[0]), chosen, p.colour(k, len(each))))
-    return groups_
+        line_groups.append((words or str(data["case"].values[0]), chosen, p.colour(k, len(each))))
+    return line_groups
 
 
 def _with_unit(values: xr.DataArray, value: Any) -> str:

@@ -135,12 +135,12 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     rows, is_complete, measured = [], False, dict[tuple[Fidelity, int], Row]()
     for name, variant in ladder(scale):
         say(name)
-        # several tolerances may come to the same physics
+        # several tolerances may select the same physics
         physics = replace(variant.fidelity, tolerance=None), len(variant.points)
         row = replace(measured[physics], name=name) if physics in measured else _row(name, variant, scale, decided)
         measured[physics] = row
         if passed():
-            # what a limit may have cut short is no measurement
+            # a time limit may have cut the last row short
             break
         rows.append(row)
     else:
@@ -216,7 +216,7 @@ class _Decided:
         final = reference(problem, engine)
         value, excess = objective_value(problem, final), final.excess(problem.limits)
         if excess <= FEASIBLE and not self.least <= value:
-            # what cancels has no share by which another design is worse
+            # a zero objective has no relative regret
             self.least = 0.0 if value <= numerical_zero(problem, engine) else value
         return value, excess
 
@@ -251,7 +251,7 @@ def _row(name: str, variant: Problem, scale: Scale, decided: _Decided) -> Row:
     return Row(
         name=name,
         error=abs(value - truth) / truth if truth > 0.0 else 0.0,
-        # the bound is over what was computed, a table compares with the reference
+        # the bound is relative to the computed value, the table to the reference
         estimate=scale.error_of(evaluation) * value / truth if truth > 0.0 else 0.0,
         evaluation=fresh if math.isnan(prepared) else prepared,
         gradient=gradient,

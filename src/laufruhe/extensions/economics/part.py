@@ -337,7 +337,7 @@ def _levels(data: xr.Dataset, right: float, high: float) -> list[p.Mark]:
         more = str(engines["standing"].sel(build=name).item()) == NEXT
         dash, colour = (next(dashes), "ink") if more else ((), "before")
         marks.append(p.Line([0.0, right], [force, force], colour, dash=dash, width=1.2, behind=True))
-        # names of levels close together stand one under the other
+        # stack the names of close levels
         top = min(force, top - LINE * high)
         place, colour = top + 0.15 * LINE * high, "ink" if more else "faint"
         marks.append(p.Words(right, place, f"{name}: {force:.0f}", colour, "right", "bottom", boxed=True))

@@ -156,16 +156,16 @@ def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
         row = data.sel(build=name)
         says, falls, against, where = (row[f"claim{end}"].item() for end in ("", "ed_fall", "ed_against", "ed_where"))
         statement = f"{name}: beside {against}" + (f" ({where})" if where else "")
-        judged_: list[Verdict] = []
+        by_claim: list[Verdict] = []
         fall = 1.0 - engines[name].force / engines[against].force
         if says:
             agrees, why = _judged(engines, engines[name], engines[against], says)
-            judged_.append(Verdict(statement, says, -100.0 * fall, "% of the force", agrees, why))
+            by_claim.append(Verdict(statement, says, -100.0 * fall, "% of the force", agrees, why))
         if not np.isnan(falls):
             agrees, claim = abs(fall - falls) <= PRINTED_FALL, f"{-100.0 * falls:.0f} %"
-            judged_.append(Verdict(statement, claim, -100.0 * fall, "% of the force", agrees, _ALLOWED))
-        if judged_:
-            by_build[name] = tuple(judged_)
+            by_claim.append(Verdict(statement, claim, -100.0 * fall, "% of the force", agrees, _ALLOWED))
+        if by_claim:
+            by_build[name] = tuple(by_claim)
     return by_build
 
 

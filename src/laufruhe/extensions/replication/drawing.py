@@ -40,7 +40,7 @@ def draw_picture(table: PictureTable, readings: Mapping[str, Names], data: xr.Da
         fill_in(table.words, next(iter(readings.values()))),
         panels,
         credit(data),
-        # broken into rows, panels need less height each
+        # panels in rows need less height
         size=(table.size[0], table.size[1] * (0.85 if len(panels) > count else 1.0)),
         columns=table.columns,
         gap=table.gap,

@@ -119,7 +119,7 @@ def value_of(text: Any, names: Mapping[str, Any]) -> Any:
         return text
     code = _read(text)[1]
     try:
-        # nothing but what `_read` let through is in the code
+        # `_read` admitted only allowed nodes
         return eval(code, {"__builtins__": {}, **_CALLED, **CONSTANTS, **names})
     except ExpressionError:
         raise

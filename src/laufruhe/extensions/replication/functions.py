@@ -91,7 +91,7 @@ def transmissibility(ratio: Any, loss_factor: Any) -> Any:
     """Return foundation over exciting force of one mass on one spring (E11), also for labelled arrays."""
     import xarray as xr
 
-    # without damping there is no end to it at the critical speed
+    # infinite at the critical speed without damping
     with np.errstate(divide="ignore"):
         return xr.apply_ufunc(single_transmissibility, ratio, loss_factor)
 

@@ -72,8 +72,8 @@ def rows(data: xr.Dataset) -> list[Text]:
 def _row(one: xr.Dataset, readings: Sequence[str]) -> list[str]:
     unit = one["unit"].item()
     cells = [str(one[name].item()) for name in ("statement", "printed")]
-    for ours, verdict_ in zip(one["ours"].values.tolist(), one["verdict"].values.tolist(), strict=True):
-        cells += [f"{_shown(ours)} {unit}".strip(), _CELLS[verdict_]]
+    for ours, outcome in zip(one["ours"].values.tolist(), one["verdict"].values.tolist(), strict=True):
+        cells += [f"{_shown(ours)} {unit}".strip(), _CELLS[outcome]]
     whys = one["why"].values.tolist()
     if len(set(whys)) > 1:
         return [*cells, "<br>".join(f"{name}: {why}" for name, why in zip(readings, whys, strict=True))]
@@ -90,7 +90,7 @@ def count_confirmed(datasets: Iterable[xr.Dataset]) -> str:
     readings = dict.fromkeys(str(name) for data in judged_ones for name in data["by_reading"].values)
     sentences = []
     for name in [name for name in readings if name] or list(readings):
-        # a part without readings says the same in all of them
+        # a part without readings counts in all of them
         parts = [data.sel(by_reading=name if name in data["by_reading"] else "") for data in judged_ones]
         verdicts = [v for data in parts for v in data["verdict"].values[data["printed"].values != UNSTATED]]
         lead = f"{name}: " if name else ""

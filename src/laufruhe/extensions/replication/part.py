@@ -219,11 +219,11 @@ def _by_case(data: xr.Dataset, name: str) -> _Cases:
         here = data.isel(point=np.flatnonzero(data["case"].values == case))
         coords = {c: np.array(list(dict.fromkeys(here[c].values.tolist()))) for c in swept if here[c].notnull().all()}
         labels_of = {str(dim): here[dim].values for dim in here[name].dims[1:]}
-        values_ = np.full([len(labels) for labels in (*coords.values(), *labels_of.values())], np.nan)
-        # by their labels: cases may sweep the same numbers one within the other in any order
+        padded = np.full([len(labels) for labels in (*coords.values(), *labels_of.values())], np.nan)
+        # by label: cases may nest their sweeps in any order
         places = [[labels.tolist().index(label) for label in here[c].values.tolist()] for c, labels in coords.items()]
-        values_[tuple(places)] = here[name].values if places else here[name].values[0]
-        values = xr.DataArray(values_, coords={**coords, **labels_of}, dims=[*coords, *labels_of])
+        padded[tuple(places)] = here[name].values if places else here[name].values[0]
+        values = xr.DataArray(padded, coords={**coords, **labels_of}, dims=[*coords, *labels_of])
         for dim in labels_of if here[name].attrs.get("padded") else ():
             values = values.dropna(dim, how="all")
         cases[str(case)] = values if values.dims else values.item()

@@ -247,7 +247,7 @@ def front(source: Source, state: PageState, across: str, k: int) -> dict[str, An
     problem, unit = pareto.problem, pareto.across.unit
     design = evaluate(problem.fixed_at(point.values))
     (shown_unit, factor), (of_unit, of_factor) = readable(unit), readable(problem.objective_unit or "")
-    # a bound of a simpler problem is none of the whole one
+    # a bound of a simplified problem does not hold for the whole problem
     bound = None if simpler else {"at": most, "value": point.bound}
     place, value = design.value(pareto.across), objective_value(problem, design)
     text = f"{figure(place, unit)}: {figure(value, problem.objective_unit or '')}"

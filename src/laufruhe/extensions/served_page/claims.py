@@ -166,7 +166,7 @@ def settled_claim(position: int, result: Result) -> Claim:
     value, breaks = figure(objective.value, objective.unit, 5), breaks_words(result.limits)
     least = f"no design has less than {figure(certificate.lower_bound, objective.unit, 5)}"
     is_proven = result.status is Status.OPTIMAL and not breaks
-    # a page shows the drawing, with the parts that it names
+    # the page shows the drawing without extras
     is_drawn = not result.problem.extras
     reference = "the proven optimum" if is_proven else "the best design found"
     return Claim(

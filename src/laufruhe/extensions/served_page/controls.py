@@ -97,10 +97,10 @@ def _number(entry: Any) -> tuple[float, str] | None:
 
 
 def _around(name: str, group: str, label: str, entry: Any, low: float = _NARROW, high: float = _WIDE) -> list[Control]:
-    number_ = _number(entry)
-    if number_ is None or number_[0] <= 0.0:
+    parsed = _number(entry)
+    if parsed is None or parsed[0] <= 0.0:
         return []
-    value, unit = number_
+    value, unit = parsed
     step = _round_step((high - low) * value / _STEPS)
     ends = [float(f"{round(share * value / step) * step:.10g}") for share in (low, high)]
     return [Control("set", name, group, label, value, ends[0], ends[1], unit)]
@@ -120,10 +120,10 @@ def _of_points(tables: Mapping[str, Any]) -> Iterator[Control]:
 def _of_engine(tables: Mapping[str, Any]) -> Iterator[Control]:
     engine = tables["engine"]
     for key, (label, low, high) in _OF_ENGINE.items():
-        number_ = _number(engine.get(key))
-        if number_ is not None and key in _WHOLE_TURN:
-            yield Control("set", f"engine.{key}", "Engine", label, number_[0], low, high, number_[1] or "deg")
-        elif number_ is not None:
+        parsed = _number(engine.get(key))
+        if parsed is not None and key in _WHOLE_TURN:
+            yield Control("set", f"engine.{key}", "Engine", label, parsed[0], low, high, parsed[1] or "deg")
+        elif parsed is not None:
             yield from _around(f"engine.{key}", "Engine", label, engine.get(key), low, high)
 
 

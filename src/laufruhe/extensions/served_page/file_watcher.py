@@ -73,7 +73,7 @@ class FileWatcher:
                 self._changed.notify_all()
 
     def _read(self) -> Source:
-        # stamps are taken before what they are of is read, so that no change is missed
+        # take stamps before reading, so that no change is missed
         self._stamps[self.path] = _stamp_of(self.path)
         tables = tables_of(self.path)
         _check_inside(tables, self.path)
@@ -89,7 +89,7 @@ def _named_in(tables: Mapping[str, Any], folder: Path) -> Iterator[Path]:
 
 
 def _stamp_of(path: Path) -> tuple[int, int]:
-    # a text of a problem may be no name that a file can have
+    # a text may be no valid file name
     with suppress(OSError, ValueError):
         status = path.stat()
         if stat.S_ISREG(status.st_mode):

@@ -20,10 +20,10 @@ _DIGITS = 9
 
 def fixing_edits(result: Result, tables: Mapping[str, Any]) -> list[list[Any]]:
     """Return edits that fix the numbers that are not affine; empty without any, or if one cannot be fixed."""
-    edits_: list[list[Any]] = []
+    fixes: list[list[Any]] = []
     if result.phasing is not None and result.phasing.ranking:
         star = result.phasing.ranking[0]
-        edits_.append(["star", STAR, star_value(result, star, star.firing_orders[0] if star.firing_orders else None)])
+        fixes.append(["star", STAR, star_value(result, star, star.firing_orders[0] if star.firing_orders else None)])
     values = {entry.name: entry for entry in result.decisions}
     for decision in result.problem.decisions:
         if decision.is_affine or decision.name not in values:
@@ -33,8 +33,8 @@ def fixing_edits(result: Result, tables: Mapping[str, Any]) -> list[list[Any]]:
             edit(tables)
         except (Refused, InputError):
             return []
-        edits_.append([edit.what, edit.name, edit.value])
-    return edits_
+        fixes.append([edit.what, edit.name, edit.value])
+    return fixes
 
 
 def star_value(result: Result, star: RankedStar, order: RankedOrder | None) -> dict[str, Any]:

@@ -63,7 +63,7 @@ def can_follow(problem: Problem) -> bool:
     kinds = {decision.kind for decision in problem.decisions}
     has_norm = bool(problem.objective) and not any(term.measure.channel.is_number for term in problem.objective)
     alone = not problem.extras and problem.phasing is None
-    # limits on run-ups wait, and are named; what else is not known to be affine is followed by no program and no bound
+    # limits on run-ups are left out and named; all other measures must be affine
     measures = [measure for measure in problem.measures if not measure.channel.simulation]
     affine = all(is_affine(measure.channel, kinds, problem) for measure in measures)
     convex = all(measure.norm.is_convex for measure in problem.measures if measure.is_load)
@@ -100,7 +100,7 @@ class Follower:
         names = [limit.name for limit in self._problem.load_limits]
         solution = solve_cones(coarse)
         if solution.x is None:
-            # rows that are never more than what they stand for: where these contradict each other, the cycle does
+            # averaged rows never overestimate: their contradiction proves one of the whole cycle
             solution = solve_cones(averaged)
             if solution.x is None:
                 return _conflict(smallest_conflict(averaged, names))

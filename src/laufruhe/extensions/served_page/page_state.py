@@ -97,7 +97,7 @@ def _edit(body: object, where: str) -> Edit:
 
 
 def _is_number(value: object) -> bool:
-    # a whole number may be beyond all floats
+    # an integer may exceed all floats
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 

@@ -68,14 +68,14 @@ def places(low: float, high: float, count: int = POINTS) -> Iterator[float]:
     if high - low <= _NARROW * abs(high):
         yield high
         return
-    # the least of the other measure is known up to a solver's tolerance
+    # the minimum is accurate to the solver's tolerance
     yield high
     yield low + 1e-4 * (high - low)
-    count_, parts = 2, 2
-    while count_ < count:
+    yielded, parts = 2, 2
+    while yielded < count:
         for k in range(1, parts, 2):
             yield low + (high - low) * k / parts
-            count_ += 1
-            if count_ >= count:
+            yielded += 1
+            if yielded >= count:
                 return
         parts *= 2

@@ -58,7 +58,7 @@ class Scene:
             try:
                 self.follower = Follower(self.problem)
             except ModelError:
-                # an engine on mounts in time has no loads that are affine in anything
+                # mounts integrated in time have no affine loads
                 self.follower = None
 
     def evaluated(self, followed: Optimum | None) -> Evaluation:
@@ -78,9 +78,9 @@ class Scene:
         return tuple(self._priced(limit, stand, price, followed.value) for limit, stand, price in pairs)
 
     def _priced(self, limit: Limit, stand: LimitValue, price: float, value: float) -> LimitValue:
-        if limit.measure not in {limit_.measure for limit_ in self.problem.load_limits}:
+        if limit.measure not in {load_limit.measure for load_limit in self.problem.load_limits}:
             return replace(stand, shadow_price=math.nan) if stand.active else stand
-        # a price that would not move the objective by its rounding is none
+        # prices below the rounding of the objective count as zero
         active = price * abs(limit.maximum) > ROUNDING * value
         return replace(stand, active=active, shadow_price=price if active else 0.0)
 

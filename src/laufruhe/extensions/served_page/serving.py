@@ -77,7 +77,7 @@ class Page:
             timer = threading.Timer(ends_after, self.server.shutdown)
             timer.daemon = True
             timer.start()
-        # the process that follows sliders begins to import now
+        # let the follower's process import in advance
         threading.Thread(target=self._warmed, daemon=True).start()
         try:
             when_ready()
@@ -158,7 +158,7 @@ def _worked(work: Callable[[], str]) -> Answer:
         text = "the process that solves has ended, most likely for want of memory; it is started again"
         return Answer(json.dumps({"error": text}))
     except Exception as error:
-        # a fault of the program; the page stays, and the next state is another
+        # a program fault must not end the page
         return Answer(
             json.dumps({"error": printed(f"this state cannot be worked out: {type(error).__name__}: {error}")})
         )

@@ -179,7 +179,7 @@ class Request(BaseHTTPRequestHandler):
                 self._answer(self._exchanged(body) if self.path == "/token" else self.server.handles[self.path](body))
 
     def _headers(self) -> Mapping[str, str]:
-        # two of one name are as good as a wrong one
+        # duplicate headers count as wrong
         headers = {name: self.headers.get_all(name, []) for name in ("Host", "Origin", "Sec-Fetch-Site")}
         return {name: values[0] if len(values) == 1 else "?" for name, values in headers.items() if values}
 
@@ -221,7 +221,7 @@ class Request(BaseHTTPRequestHandler):
             close()
 
     def _begin(self, status: HTTPStatus, kind: str) -> None:
-        # a connection that nothing is asked over would take the room of one that asks
+        # an idle connection would block others
         self.close_connection = True
         self.connection.settimeout(WRITE)
         self.send_response(status)

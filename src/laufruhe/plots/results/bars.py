@@ -59,9 +59,9 @@ def _measures(design: Evaluation, k: int) -> Array:
 def _groups(axes: Axes, values: list[Array], series: list[Series], part: range, top: float) -> None:
     factor = in_thousands(top, "N")[0]
     all_mounts = values[0].shape[1] - 1
-    # that of all mounts stands apart from the others
+    # the group of all mounts stands apart
     places = np.array([k - part[0] + (0.3 if k == all_mounts and len(part) > 1 else 0.0) for k in part])
-    # a bar this high holds a number
+    # least height of a bar with a number inside
     room = 0.18 * axes.figure.dpi / axes.bbox.height * factor * top
     for k, (table, one) in enumerate(zip(values, series, strict=True)):
         mean, most = factor * table[:, part]
@@ -84,6 +84,6 @@ def _frame(axes: Axes, names: list[str], part: range, side: int, top: float) -> 
     axes.set_xticks(axes.get_xticks(), [fit_line(names[k], GROUP - 0.08) for k in part])
     axes.tick_params(axis="x", length=0)
     axes.grid(axis="x", visible=False)
-    # for a number over the highest bar
+    # room for a number above the highest bar
     room = 1.0 + 0.24 * axes.figure.dpi / axes.bbox.height
     axes.set(xlim=(-0.55, side - 0.15), ylim=(0.0, room * factor * top), ylabel=f"force on the mount [{unit}]")

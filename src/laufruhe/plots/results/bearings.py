@@ -30,7 +30,7 @@ from laufruhe.present.pictures import rows_of
 from laufruhe.solvers.result import Result
 
 MOST_BEARINGS, MOST_COLUMNS, PANEL, STEPS = 6, 4, 1.95, 180
-# of a panel: where the ring of wear begins, how thick it is at most, and what the paths fill
+# fractions of a panel: radius and thickness of the wear ring, extent of the paths
 RING, THICK, FILLED = 0.86, 0.12, 0.80
 Plane = NDArray[np.complex128]
 applies = has_bearings

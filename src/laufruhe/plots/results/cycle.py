@@ -35,11 +35,11 @@ from laufruhe.solvers.result import Result
 STEPS, MOST_POINTS, MOST_MOUNTS = 1440, 3, 6
 # width of one panel and of several side by side, height, gaps [inch]
 ALONE, BESIDE, NARROW, HIGH, GAP, ACROSS = 6.8, 4.0, 2.7, 1.1, 0.2, 0.25
-# what did not change is seen under what was decided
+# a wide line stays visible under an equal decided one
 WIDTHS = (2.4, 1.4)
-# between two numbers [inch]
+# distance between two numbers [inch]
 DIGIT = 0.085
-# a smaller share of the largest component of a row is a rounding
+# relative size below which a component of a row is a rounding
 SHARE = 1e-6
 applies = has_loads
 STYLES = ("-", (0, (4, 1.6)), (0, (1.2, 1.2)))
@@ -156,7 +156,7 @@ def _rows(series: Sequence[Series], k: int, mounts: Sequence[int]) -> Iterator[R
     yield _row("rocking couple", "N m", {"pitch": pitch, "yaw": yaw}, most)
     forces = [_closed(load.mount_forces, base) for load in loads if load.mount_forces is not None]
     sizes = [np.linalg.norm(np.stack([force[:, m] for force in forces]), axis=-1) for m in mounts]
-    # mounts are compared: one scale serves them all
+    # one scale makes mounts comparable
     top = max((float(size.max()) for size in sizes), default=0.0)
     for m, size in zip(mounts, sizes, strict=True):
         yield Row(series[0].design.mount_names[m], "N", {"": size}, (0.0, top))

@@ -17,7 +17,7 @@ from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import PhasingResult, RankedOrder
 
 SHOWN = 6
-# two shades tell a firing from the next
+# two shades distinguish neighbouring firings
 BEST, NEXT = (AFTER, PALE), (BEFORE, "#d4d4d4")
 applies = has_ranking
 

@@ -27,7 +27,7 @@ from laufruhe.solvers.result import Result
 MOST_PANELS, MOST_COLUMNS = 12, 4
 POINTS = 1440
 PANEL, GAP, LEAD = 2.0, 0.42, 0.42
-# how many times a smaller side is enlarged, so that its panel is filled
+# magnifications of the smaller direction
 ENLARGED = (20, 10, 5, 2, 1)
 STEADY = 0.25
 """Share of the largest force: what moves less about a steady part is shown without it."""

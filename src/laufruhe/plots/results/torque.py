@@ -26,7 +26,7 @@ Unit: TypeAlias = tuple[float, str]
 STEPS, MOST_ORDERS = 1440, 12
 WIDE, HIGH = 6.8, 1.65
 COLOURS = {"gas": ORANGE, "pistons": SKY, "rods": GREEN, "all": INK}
-# a part that is a smaller share of the largest is not drawn, and an order not shown
+# smallest drawn part, and smallest drawn order, relative to the largest
 FELT, SEEN = 1e-3, 1e-2
 _MEAN: Any = {"color": FAINT, "linewidth": 1.0, "linestyle": (0, (4, 1.6)), "zorder": 1.5}
 
@@ -128,7 +128,7 @@ def _orders(axes: Axes, parts: Mapping[str, Spectrum], unit: Unit) -> None:
     orders, sizes = total.orders[1:], np.abs(total.coefficients[1:])
     top = float(sizes.max(initial=0.0))
     chosen = sorted(k for k in np.argsort(-sizes, kind="stable")[:MOST_ORDERS].tolist() if sizes[k] > SEEN * top)
-    # a part that no bar could show takes no room
+    # drop parts without a visible bar
     parts = {name: part for name, part in parts.items()
              if max((abs(complex(part.at(float(orders[k])))) for k in chosen), default=0.0) > SEEN * top}  # fmt: skip
     wide = 0.8 / max(len(parts), 1)

@@ -28,7 +28,7 @@ def figure(result: Result) -> Figure:
     trade = ranking_of(result).trade
     drawn = page(1, 1, (6.4, HIGH))
     axes = drawn.panels[0]
-    # more freedom that buys nothing is no new design
+    # skip points without improvement
     points = [p for before, p in zip((None, *trade), trade, strict=False) if before is None or p.value < before.value]
     x = [math.degrees(p.deviation) for p in points]
     y = [p.value for p in points]
@@ -38,7 +38,7 @@ def figure(result: Result) -> Figure:
     for k, place in enumerate(zip(x, y, strict=True)):
         if k == 0 or texts[k] != texts[k - 1]:
             axes.annotate(texts[k], place, xytext=(5, 6), textcoords="offset points", size=SMALL, color=FAINT)
-    # what holds with more freedom holds with less: a step reaches back to the point before
+    # a bound with more freedom holds with less: steps extend to the point before
     freedom = [math.degrees(p.allowed) for p in trade]
     axes.plot(freedom, [p.lower_bound for p in trade], linewidth=1.2, drawstyle="steps-pre", zorder=1, **_BOUND)
     name, unit = (result.objective.name, result.objective.unit) if result.objective else ("", "")

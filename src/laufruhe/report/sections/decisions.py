@@ -33,7 +33,7 @@ def _row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str
     name, factor = readable(d.unit)
     most = max(abs(d.lower), abs(d.upper))
     bounds = f"{trimmed(d.lower * factor)} to {trimmed(d.upper * factor)} {name}".rstrip()
-    # the angle of a size that is none means nothing
+    # the angle of a zero size is meaningless
     size = before if d.name.endswith(".angle") else None
     initial = DASH if size and not size.initial else with_unit(d.initial, d.unit)
     if size and size.is_nothing:

@@ -47,7 +47,7 @@ def _ends(rank: RankValue, name: str) -> str:
         return DASH
     unit, factor = readable(entry.unit)
     is_open = any(entry is each for each in rank.equal)
-    # a rounding beside the largest decision is nothing
+    # values below this are roundings
     least = 1e-3 * max(abs(each.high) for each in rank.designs)
     values = (entry.low, entry.high) if is_open else (0.5 * (entry.low + entry.high),)
     ends = (trimmed(0.0 if abs(value) <= least else factor * value, 3) for value in values)

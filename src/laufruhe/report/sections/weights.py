@@ -60,7 +60,7 @@ def _in_grams(rotor: Rotor, scale: float) -> tuple[str, str]:
 def _factors(result: Result) -> Table:
     designs = [result.initial, result.final] if is_changed(result) else [result.final]
     names = dict.fromkeys(one.cylinders for design in designs for one in balance_factors(design.engine))
-    # a weight that one of the designs has is in the other a weight of nothing
+    # a weight that a design lacks counts as zero there
     factors = [{one.cylinders: one.factor for one in balance_factors(design.engine, True)} for design in designs]
     rows = [
         (", ".join(cylinders), *(f"{100.0 * each[cylinders]:.1f} %" if cylinders in each else DASH for each in factors))

@@ -84,7 +84,7 @@ class BalancerSizing(SweptPart):
         if swept_names(data):
             return over_sweep(data, ["shafts"], words)
         plain = data["shafts"].values == "none"
-        # cases that differ in their shafts alone have one plain engine
+        # cases that differ only in their shafts share the plain engine
         shared = bool(np.ptp(data["objective"].values[plain]) == 0.0)
         if shared:
             data = data.isel(point=np.concatenate([np.flatnonzero(plain)[:1], np.flatnonzero(~plain)]))

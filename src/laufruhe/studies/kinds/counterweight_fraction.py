@@ -84,7 +84,7 @@ class CounterweightFraction(SweptPart):
         best, marks, legend = data["optimum"].values, [], []
         x, y = data[along].values, data["objective"].values
         for label, chosen, colour in groups(data, [name for name in names if name != along]):
-            # the optimum is a point of its line too
+            # the line includes its optimum
             order = np.flatnonzero(chosen)[np.argsort(x[chosen])]
             marks += [
                 p.Line(x[order], y[order], colour),

@@ -65,7 +65,7 @@ class LayoutComparison(SweptPart):
         """Return further quantities by name, or the error of an engine that lacks one."""
         scene, measures = Scene(problem.engine, problem.points), dict[str, Measure | InputError]()
         for name in self.further:
-            # an engine without weights has none to add up, and is no worse for it
+            # an engine without weights has a mass of zero
             is_mass = name in MEASURES and MEASURES[name][0].is_mass
             try:
                 with scenes.named(case):
@@ -155,7 +155,7 @@ def _ranking(data: xr.Dataset) -> list[Text]:
     columns = [(data.attrs["metric"], data["objective"].attrs["units"], best, [""] * points)]
     for k, name in enumerate(data["quantity"].values.tolist()):
         values = data["further"].values[:, k]
-        # what cancels leaves a rounding
+        # loads that cancel leave a rounding
         near = _NOTHING * float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
         values = np.where(np.abs(values) < near, 0.0, values)
         columns.append((name, str(data["quantity_unit"].values[k]), values, data["why_none"].values[:, k].tolist()))

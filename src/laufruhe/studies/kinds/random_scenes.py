@@ -82,7 +82,7 @@ class RandomScenes(Sampled):
             try:
                 record = solve_scene(scenes.problem(replace(point, changes=changes, span=None)))
             except (InputError, ModelError):
-                # among so many some engine cannot be built: it is counted, and no reason to stop
+                # an engine that cannot be built is counted
                 record = IMPOSSIBLE
             row = dict(zip((span.quantity for span in spans), map(float, numbers), strict=True))
             row |= {key: float(codes.index(record[key])) for key, codes in _CODES.items()}
@@ -110,10 +110,10 @@ class RandomScenes(Sampled):
         for name in data["case"].values:
             part = data.sel(case=name)
             status, proof = part["status"].values, part["proof"].values
-            solved_ = np.isin(status, (0, 1))
-            best = solved_ & np.isin(proof, (0, 4))
+            is_solved = np.isin(status, (0, 1))
+            best = is_solved & np.isin(proof, (0, 4))
             initial, decided = (in_unit(part[key])[0] for key in SIZES[:2])
-            cells = [str(name), f"{len(status):,}", f"{int(best.sum()):,}", f"{int((solved_ & ~best).sum()):,}"]
+            cells = [str(name), f"{len(status):,}", f"{int(best.sum()):,}", f"{int((is_solved & ~best).sum()):,}"]
             cells += [f"{int((status == code).sum()):,}" for code in (2, 3, 4)]
             cells += [number(x) for values in (initial, decided) for x in percentiles_of(values)]
             proven = part.isel(draw=np.flatnonzero(status == 0))

@@ -172,7 +172,7 @@ class SpeedMap(Part):
                 here = one.sel(measure=name)
                 proof, label = str(one["proof"].values[0]), f"{name} [{unit}]" if unit else str(name)
                 cells = _row_of(*(here[what].values for what in ("speed", "value", "limit")))
-                # what one case does not ask for is no line of it
+                # a case lists only its own measures
                 if cells is not None or proof in ("infeasible", FAILED):
                     rows.append([case, design, label, *(cells or [NOTHING] * 5), proof])
         return [marked_table([*head, "proof"], rows)]
@@ -289,13 +289,13 @@ def _panel(data: xr.Dataset, designs: Sequence[tuple[str, str, xr.Dataset]], k: 
         label = design if len(cases) == 1 else f"{case}, {design}"
         lines.append(p.Line(speeds, values, colour, label, dash=p.DASHES[0] if is_given else ()))
         there = np.isfinite(limits)
-        # one of a single operating point is a stroke
+        # a limit at a single operating point is a stroke
         look: dict[str, Any] = {"width": 1.2} if there.sum() > 1 else {"width": 0.0, "marker": "_", "size": 14.0}
         borders.append(p.Line(speeds[there], limits[there], dash=p.DASHES[1], behind=True, **look))
     name, unit = str(data["measure"].values[k]), str(data["measure_unit"].values[k])
     top = max(float(data[what].isel(measure=k).max()) for what in ("value", "limit") if data[what].notnull().any())
     label, ends = f"{name} [{unit}]" if unit else name, (0.0, 1.08 * top or 1.0)
-    # beside a panel of its own there is room for the name
+    # a single panel has room for the name on its axis
     alone = data.sizes["measure"] == 1 and "amplitude" not in data
     axis, title = (p.Axis(label, ends), "") if alone else (p.Axis(ends=ends), label)
     return p.Panel([*lines, *borders], _speed_axis(data), axis, title)
