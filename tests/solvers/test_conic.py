@@ -184,7 +184,7 @@ def test_a_solver_that_gives_up_is_not_the_end(status: str, monkeypatch: pytest.
         x, z = np.full(rows.columns, value), np.full(rows.count, value)
         return SimpleNamespace(status=word, x=x, z=z, solve_time=0.0, iterations=1)
 
-    monkeypatch.setattr(conic, "told", told)
+    monkeypatch.setattr(conic, "run_clarabel", told)
     result = solve(limited(0.5))
     assert result.status is Status.FEASIBLE
     assert result.objective is not None
