@@ -49,7 +49,7 @@ WORTH = 0.25
 
 
 class BoxRelaxation:
-    """One box, for designs whose norm is not over a number: its bounds hold for these alone.
+    """Relaxation of a box, for designs whose norm is not over a number: its bounds hold for these alone.
 
     Attributes
     ----------
@@ -171,7 +171,6 @@ class BoxRelaxation:
         return float(mean.prices.sum()) + mean.constant < (1.0 - LARGE) * size
 
     def _high_order(self, order: Order) -> HighOrder | None:
-        """Return the order if its spring forces have a bound linear in s."""
         high = HighOrder(self.parts[order.part], order.loads[0], order.omega, self._near)
         return None if self.query.is_travel or np.any(order.loads[1:]) or not high.is_above else high
 
@@ -289,7 +288,6 @@ class BoxRelaxation:
         return scores
 
     def _score(self, scores: Array, numbers: Sequence[int], share: float) -> None:
-        """Add a share to the relatively longest side that some s follow."""
         sides = sorted({j for number in numbers for j in self.mounts.decisions[number]})
         lengths = (self.upper - self.lower) / np.maximum(self.search.upper - self.search.lower, 1e-300)
         scores[max(sides, key=lambda j: lengths[j])] += share
@@ -306,5 +304,4 @@ def joint_scores(scores: Array, loose: Array, missing: float) -> Array:
 
 
 def _matters(shares: Array) -> Mask:
-    """Return which parts of a mean are worth a relaxation."""
     return np.asarray(shares > SMALL * shares.sum())

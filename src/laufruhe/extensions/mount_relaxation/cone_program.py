@@ -96,7 +96,6 @@ class ConeProgram:
     def _add(
         self, block: Array, columns: Indices, cone: str, name: Hashable = None, right: Array | None = None
     ) -> None:
-        """Add rows with entries in these columns alone; their multipliers are known by a name."""
         row, place = np.nonzero(block)
         shape = len(block), int(self.modes[-1])
         self.rows.append(coo_array((block[row, place], (row, columns[place])), shape=shape))
@@ -125,7 +124,6 @@ class ConeProgram:
                 self._add(rows, np.concatenate([own[first], own[k * entries + first]]), MATRIX, (sign, number))
 
     def _add_links(self) -> None:
-        """Add that every moment matrix has a corner of one, and that (1, u)(1, u)' is the same for all orders."""
         sizes = self.program.sizes
         self._add(np.eye(len(sizes)), np.asarray(self.ends[:-1]), ZERO, right=np.ones(len(sizes)))
         corner, count = self._corner(0), _entries(1 + self.program.columns) - 1
@@ -134,7 +132,6 @@ class ConeProgram:
             self._add(both, np.concatenate([corner[1:], self._corner(order)[1:]]), ZERO, "links")
 
     def _corner(self, order: int) -> Indices:
-        """Return the entries of (1, u)(1, u)': columns come first in a triangle column by column."""
         return np.asarray(self.ends[order] + np.arange(_entries(1 + self.program.columns)))
 
     def _moment(self, order: int) -> Indices:

@@ -97,13 +97,11 @@ def _spring_constraints(
 
 
 def _symmetrised(products: Array) -> Array:
-    """Return the mean over exchanged rows and exchanged entries of v, shape (p, p, d, d)."""
     products = products + products.transpose(1, 0, 2, 3)
     return np.asarray(0.25 * (products + products.transpose(0, 1, 3, 2)))
 
 
 def _of_moments(numbers: int, moments: Array, terms: float) -> MomentConstraint:
-    """Return a constraint on moments alone, in their size, relaxed by the rounding of terms of a size that cancel."""
     count, size = len(moments), float(np.abs(moments).max()) or 1.0
     relaxed = min(ROUNDING * terms / size, 1.0) * np.eye(count)
     return MomentConstraint(0, relaxed, np.zeros((numbers, count, count)), moments / size)
@@ -171,7 +169,6 @@ def stiffness_constraints(mounts: OpenMounts, size: int) -> list[MomentConstrain
 
 
 def _restricted(constraint: MomentConstraint, motions: Array) -> MomentConstraint:
-    """Return the part of the first rows and columns that lies in some motions, shape (k, n)."""
     basis = np.zeros((constraint.size, motions.shape[1] + 2))
     basis[: len(motions), :-2], basis[-2:, -2:] = motions, np.eye(2)
     moments = np.einsum("ax,abij,by->xyij", basis, constraint.moments, basis, optimize=True)

@@ -70,7 +70,7 @@ class LimitTerms:
 
 @dataclass(frozen=True, eq=False)
 class Limits:
-    """All limits that count."""
+    """Limits that count."""
 
     norms: tuple[NormLimit, ...]
     ratios: tuple[RatioLimit, ...]

@@ -89,12 +89,10 @@ class HighOrder:
 
     @property
     def _distance(self) -> float:
-        """W^2 less the largest square of a natural frequency."""
         return self.omega**2 - self.mounts.highest
 
     @property
     def _turning(self) -> float:
-        """|1 + i eta|."""
         return float(np.hypot(1.0, self.mounts.losses[0]))
 
     @property
@@ -165,7 +163,6 @@ class Chord:
 
 
 def _place_deflections(mounts: OpenMounts, m: int, load: ComplexArray) -> list[ComplexArray]:
-    """Return the deflections of a spring per s of the places that it moves with."""
     return [
         h * place.arms.T @ (place.aside @ mounts.turns @ load)
         for place in mounts.places for k, h in place.mounts if k == m

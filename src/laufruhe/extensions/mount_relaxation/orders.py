@@ -209,7 +209,7 @@ def _in_parts(
 
 @dataclass(frozen=True, eq=False)
 class EpigraphVariable:
-    """One part of a norm: at least the root of a variable with quadratic bounds, times a unit, less a loss.
+    """Part of a norm: at least the root of a variable with quadratic bounds, times a unit, less a loss.
 
     Attributes
     ----------
@@ -298,7 +298,6 @@ def epigraph_variables(query: MeasureOrders, parts: Sequence[OpenMounts]) -> lis
 
 
 def _of_squares(query: MeasureOrders) -> EpigraphVariable:
-    """Return the variable of a root mean square, over the orders that make nearly all of the best design."""
     weights = np.array([query.shares[order.point] for order in query.orders]) * (0.5 / len(query.mounts))
     size = weights * np.array([np.sum(np.abs(order.signal) ** 2) for order in query.orders])
     rank = np.argsort(-size, kind="stable")

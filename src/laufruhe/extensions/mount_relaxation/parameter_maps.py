@@ -235,7 +235,6 @@ class ParameterMaps:
         return (shift, slope) if misfit <= STAYS * STAYS * float(dampers.max()) else None
 
     def _turned(self, m: int, axes: Array, turning: list[int], kind: slice) -> tuple[Array, list[SpringTerm]]:
-        """Return stiffness or damping along axes that turn; nothing is open if it is the same along all of them."""
         low, high = (each[m, kind][turning] for each in (self.low, self.high))
         if float(low.min()) == float(high.max()):
             return np.asarray(low[0] * axes[turning].T @ axes[turning]), []
@@ -394,7 +393,6 @@ class PlaneStiffness:
         return min(low1, low2), max(high1, high2)
 
     def _polar(self, box: Array) -> tuple[tuple[float, float], tuple[float, float], float]:
-        """Return ranges of d cos and d sin of twice the angle from its middle, and the largest tangent of that."""
         half, middle = self.angles[1] - self.angles[0], self.angles[0] + self.angles[1]
         along = 0.5 * (box[0] - box[1][::-1])
         cosine, sine = math.cos(middle), math.sin(middle)
@@ -445,7 +443,6 @@ def _contract_by_eigenvalues(box: Array, low: float, high: float) -> Array:
 
 
 def _sine_range(low: float, high: float) -> tuple[float, float]:
-    """Return the least and the largest sine between two angles."""
     turn, ends = 2.0 * math.pi, (math.sin(low), math.sin(high))
     top = math.ceil((low - 0.5 * math.pi) / turn) * turn + 0.5 * math.pi <= high
     bottom = math.ceil((low + 0.5 * math.pi) / turn) * turn - 0.5 * math.pi <= high

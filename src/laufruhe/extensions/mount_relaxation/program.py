@@ -262,7 +262,6 @@ def proven_bound(program: Program, multipliers: Multipliers) -> float:
 
 
 def _split_price(price: float, chord: float, vectors: Sequence[Array]) -> tuple[float, list[Array]]:
-    """Scale the price of a chord, and vectors no longer than the rest, to add up to the price of a root."""
     chord = max(chord, 0.0)
     longest = max((float(np.linalg.norm(each, axis=1).max()) for each in vectors), default=0.0)
     if chord + longest <= 0.0:
@@ -286,7 +285,6 @@ def _mode_bound(mode: ModeConstraints, multipliers: ModeMultipliers, slope: Arra
 
 
 def _mode_remainder(mode: ModeConstraints, multipliers: ModeMultipliers) -> Array:
-    """Return the matrices that multiply Z, Z_1 ... in the Lagrangian, shape (1 + numbers, d, d)."""
     remainder = np.tensordot(multipliers.equal, mode.equal, 1)
     remainder -= np.tensordot(np.maximum(multipliers.sides, 0.0), mode.sides, 1)
     for tensor, multiplier in zip(mode.matrices, multipliers.matrices, strict=True):
@@ -327,10 +325,6 @@ def _psd_part(matrix: Array) -> Array:
 
 
 def _least_quadratic(matrix: Array, reaches: Array) -> float:
-    """Return a lower bound of (1, v) matrix (1, v)' over v_i^2 <= reaches_i, by a shift that makes it convex.
-
-    The shift is the same for all entries, or for all in units of their reaches.
-    """
     plain = _least_with_shift(matrix, float(reaches.sum()))
     if not np.all(np.isfinite(reaches)):
         return plain

@@ -31,7 +31,7 @@ SMALL = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """One order over a box, as complex functions of (1, v), shapes (..., d), in units of a motion.
+    """Response of an order over a box, as complex functions of (1, v), shapes (..., d), in units of a motion.
 
     Attributes
     ----------
@@ -174,7 +174,6 @@ def response_of(
 
 
 def _mount_forces(mounts: OpenMounts, forces: ComplexArray, omega: float, motion: ComplexArray) -> ComplexArray:
-    """Return the sum of spring forces of every mount, with those of springs that depend on frequency."""
     static = mounts.dynamic.directions @ np.diag([law.static for law in mounts.dynamic.laws]) @ mounts.dynamic.rows
     added = mounts.dynamic.forces(np.array([omega]), mounts.root.T)[0] + static.reshape(-1, 6) @ mounts.root.T
     total = np.asarray(added @ motion, dtype=np.complex128).reshape(mounts.mounts, 3, -1)
@@ -216,7 +215,6 @@ def _product_bounds(mounts: OpenMounts, motion: float, deflections: Array) -> Ar
 
 
 def _deflections_per_motion(mounts: OpenMounts) -> Array:
-    """Return the largest deflection of every spring per motion, shape (springs,)."""
     turn, reach = float(np.linalg.norm(mounts.turns, 2)), np.zeros(len(mounts.motions))
     for place in mounts.places:
         for m, h in place.mounts:
@@ -225,7 +223,6 @@ def _deflections_per_motion(mounts: OpenMounts) -> Array:
 
 
 def _largest(mounts: OpenMounts, kind: Literal["elastic", "viscous"]) -> Array:
-    """Return the largest stiffness, or damping, of every spring."""
     sizes = np.linalg.norm(mounts.middles if kind == "elastic" else mounts.dampers, 2, axis=(1, 2))
     for spring in mounts.springs:
         sizes[spring.mount] += abs(getattr(spring, kind)) * spring.largest

@@ -111,7 +111,6 @@ class SdpRelaxation:
         self._reset()
 
     def _reset(self) -> None:
-        """Forget lower bounds of roots and upper bounds of odd multiples."""
         self._roots = [np.zeros(len(variables)) for variables in self._variables]
         self.multiple_uppers: dict[int, float] = {}
         self._last_box = self.lower, self.upper, self._roots[0]
@@ -124,7 +123,6 @@ class SdpRelaxation:
         return (mounts, *split_mounts(mounts))
 
     def _plane_sides(self) -> list[tuple[Any, slice]]:
-        """Return the key and the sides of every plane (E63)."""
         first = len(self.problem.mount_decisions)
         return [(key, slice(first + 3 * k, first + 3 * (k + 1))) for key, (k, _) in self._planes.items()]
 
@@ -211,7 +209,6 @@ class SdpRelaxation:
         return total, scores * (upper > lower)
 
     def _box(self, term: int, lower: Array, upper: Array) -> BoxRelaxation:
-        """Return the relaxation of one term, for designs that are not over the value."""
         weight, query = self._terms[term]
         ends = (self.value - self._constant) / weight, (self.enough - self._constant) / weight
         return BoxRelaxation(self, query, ends, lower, upper)

@@ -112,7 +112,6 @@ def _walk(problem: Problem, lots: Sequence[Lot], best: Chosen, bound: float, sec
 
 
 def _neighbours(lots: Sequence[Lot], chosen: Chosen) -> Iterator[Chosen]:
-    """Yield assemblies with another part in one cylinder, which goes where that one comes from."""
     for k, (lot, parts) in enumerate(zip(lots, chosen, strict=True)):
         for i, part in itertools.product(range(len(parts)), range(len(lot.masses))):
             if part not in parts[: i + 1]:
@@ -239,7 +238,6 @@ class _Search(Division[Chosen]):
         return best
 
     def _middle(self, node: Chosen) -> Array:
-        """Return the masses where free cylinders have the mean of the parts that are left."""
         total = np.zeros((self.cylinders, 2))
         for more, parts in zip(self.more, node, strict=True):
             left = [k for k in range(len(more)) if k not in parts]

@@ -149,14 +149,12 @@ class Marks:
 
 
 def _split(tables: Mapping[str, Any]) -> tuple[dict[str, Any], Marks | None]:
-    """Return the tables of a file without tolerances, and the tolerances; None if there is no table of them either."""
     found: list[Mark] = []
     plain = {key: _strip_marks(value, (key,), found) if key in _ROOMS else value for key, value in tables.items()}
     return plain, Marks(tuple(found)) if found or {"tolerances", "robust"} & set(tables) else None
 
 
 def _attach(marks: Marks, problem: Problem, file: Any, tables: Mapping[str, Any]) -> Problem:
-    """Return the problem with its tolerances if it has [robust]; check tolerances in any case."""
     found = [_tolerance(one, problem, tables) for one in marks.written]
     found += _residual(file.tolerances, problem.engine, max(point.speed for point in problem.points))
     if file.robust is None:

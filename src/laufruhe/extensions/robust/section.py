@@ -63,7 +63,6 @@ def _checked(found: RobustResult) -> str:
 
 
 def _assembly_tables(result: Result) -> list[Table]:
-    """Return a row a cylinder, with the number of each part in the order of its file."""
     found, unit = result.details, objective_unit(result)
     assert isinstance(found, AssemblyResult)
     head = ["cylinder"]
@@ -104,7 +103,6 @@ def _tolerance_record(result: Result) -> dict[str, Any]:
 
 
 def _assembly_record(result: Result) -> dict[str, Any]:
-    """Return the part of every lot in each cylinder, counted from one."""
     found = result.details
     assert isinstance(found, AssemblyResult)
     told = {name: getattr(found, name) for name in ["assemblies", "looked_at", "random", "worst", "mean_parts"]}
@@ -113,7 +111,6 @@ def _assembly_record(result: Result) -> dict[str, Any]:
 
 
 def _shares(result: Result) -> Table:
-    """Return the share of engines built, or of assemblies, that stay below a value."""
     unit, found = objective_unit(result) or "-", result.details
     if isinstance(found, RobustResult):
         columns = {"best drawing": found.nominal.quantiles, "decided": found.robust.quantiles}

@@ -332,7 +332,6 @@ def _minimise_worst_case(
 
 
 def _refine_sampling(adversary: Adversary, best: RobustDesign, nothing: float) -> RobustDesign:
-    """Double the samples until the worst engine of a design is not under the bound of all designs."""
     for _ in in_time(range(READINGS)):
         if not is_over(best.bound, best.found.bound, nothing):
             break

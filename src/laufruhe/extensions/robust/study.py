@@ -94,7 +94,6 @@ def _built(engine: Engine, tolerances: Tolerances, errors: Array) -> Engine:
 
 
 def _added_forces(engine: Engine, speed: float, tolerances: Tolerances) -> Array:
-    """Return the lateral and vertical force that every error adds at its limit, shape (columns, angles, 2)."""
     point, steps = OperatingPoint("", speed), ANGLES * engine.cycle.turns
     engines = [engine, *(_built(engine, tolerances, z) for z in np.eye(tolerances.count))]
     # over one and the same period: an engine without errors may repeat within it
@@ -323,7 +322,6 @@ def _row(row: xr.Dataset, k: int) -> list[p.Mark]:
 
 
 def _density(quantiles: np.ndarray, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Density over the logarithm of the force, its peak at one, from quantiles four percent apart."""
     force = np.maximum(quantiles, 1e-6)[::8]
     steps = np.diff(np.log(force))
     density = np.diff(shares[::8]) / np.maximum(steps, 1e-9)

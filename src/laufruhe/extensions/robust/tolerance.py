@@ -141,7 +141,7 @@ class FileDrive:
 
 @dataclass(frozen=True)
 class Error:
-    """One independent error.
+    """Independent error.
 
     Attributes
     ----------
@@ -237,7 +237,7 @@ class Population:
 
 @dataclass(frozen=True)
 class Tolerances:
-    """All tolerances of a problem, their errors side by side in one vector.
+    """Tolerances of a problem, their errors side by side in one vector.
 
     Attributes
     ----------

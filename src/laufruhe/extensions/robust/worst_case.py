@@ -214,7 +214,6 @@ class Block:
         return [self._arc(centre, middle + side * 0.5 * half, 0.5 * half) for side in (-1.0, 1.0)]
 
     def _arc(self, centre: Array, middle: float, half: float) -> tuple[Array, Block]:
-        """Return the centre of the rectangle about an arc of the unit circle, and its block (R7)."""
         along = np.array([np.cos(middle), np.sin(middle)])
         across = np.array([-along[1], along[0]])
         near = float(np.cos(half))
