@@ -18,15 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Engine, GasModel, Mount, OperatingPoint, Rotor, SliderCrank
+from laufruhe.numerics.exact_angles import Turn, as_turn
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.numerics.turns import Turn, as_turn
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_loads import gas_coefficients
 from laufruhe.physics.mechanism import cylinder_wrench
-from laufruhe.physics.rigid_body import point_motion
-from laufruhe.physics.wrench import plane_wrench
+from laufruhe.physics.rigid_body import plane_wrench, point_motion
 from laufruhe.problem import channels
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.loads import PointLoads

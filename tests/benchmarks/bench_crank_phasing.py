@@ -29,8 +29,7 @@ from laufruhe.load_models.star_model import StarModel
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import even_patterns
 from laufruhe.machine.layouts import inline
-from laufruhe.physics.crank_stars import star_sums
-from laufruhe.physics.star_space import StarSpace
+from laufruhe.physics.crank_stars import StarSpace, star_sums
 from laufruhe.present.tables import Table
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem

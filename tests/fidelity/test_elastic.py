@@ -23,7 +23,7 @@ from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.mounting import mounting_of
 from laufruhe.physics.rigid_body import moved_wrench
-from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
+from laufruhe.physics.steady_state import TimeMounting, viscous_forces
 from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from laufruhe.errors import InputError
 from laufruhe.files.reader import load, load_tables
 from laufruhe.machine.crank_names import CRANKS, name_of_crank
-from laufruhe.physics.wrench import turning_parts
+from laufruhe.physics.rigid_body import turning_parts
 from laufruhe.plots.results import twins
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Result

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Rod, SliderCrank
-from laufruhe.machine.stroke import radius_for_stroke
+from laufruhe.machine.drives.base import radius_for_stroke
 
 POSITIVE = st.floats(1e-3, 10.0)
 

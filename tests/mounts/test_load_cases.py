@@ -15,7 +15,7 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.load_models.mount_symbols import symbolic_mounts
 from laufruhe.machine import Mount
-from laufruhe.machine.load_case import LoadCase
+from laufruhe.machine.block import LoadCase
 from laufruhe.physics import mount_numbers
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.mount_numbers import mass_root

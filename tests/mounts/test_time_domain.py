@@ -12,9 +12,8 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import Block, Mount
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import elastic_mounting
-from laufruhe.physics.steady_state import periodic_state
+from laufruhe.physics.steady_state import INTEGRATION, periodic_state
 from laufruhe.physics.time_model import time_model
-from laufruhe.physics.time_mounting import INTEGRATION
 from mounts.powertrain import powertrain, random_mounting, wrench
 
 RPM = np.pi / 30.0

@@ -11,7 +11,15 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from laufruhe.numerics.spectrum import BEHIND, Mapped, Spectrum, bent_spectrum, common_base, orders_equal, spectrum_of
+from laufruhe.numerics.spectrum import (
+    BEHIND,
+    Mapped,
+    Spectrum,
+    common_base,
+    orders_equal,
+    spectrum_of,
+    spectrum_with_kinks,
+)
 
 BASES = st.sampled_from([Fraction(1), Fraction(1, 2), Fraction(2), Fraction(3, 2), Fraction(1, 3)])
 NUMBERS = st.complex_numbers(max_magnitude=10.0, allow_subnormal=False)
@@ -166,10 +174,10 @@ def bent(highest: int) -> Spectrum:
     smooth = rng.normal(size=(highest + 1, 2)) + 1j * rng.normal(size=(highest + 1, 2))
     smooth[0] = 3.0
     smooth[1::2] = 0.0
-    kink = bent_spectrum(
+    kink = spectrum_with_kinks(
         lambda x: np.abs(np.sin(x))[:, None] * [1.0, -2.0], 96, Fraction(1, 2), np.array([0.0, math.pi])
     )
-    assert kink.corners is not None
+    assert kink.kinks is not None
     return Spectrum(Fraction(1, 2), smooth) + kink
 
 
@@ -178,7 +186,7 @@ def test_a_mapped_signal_is_that_of_its_coefficients(highest: int) -> None:
     turned = np.array([[1.0, 0.5], [-0.3, 0.2], [0.0, 4.0]])
     mapped = Mapped(bent(highest), lambda values: values @ turned.T)
     for made in (mapped, pickle.loads(pickle.dumps(mapped))):
-        plain = Spectrum(made.base, made.coefficients, made.corners)
+        plain = Spectrum(made.base, made.coefficients, made.kinks)
         assert made.repeats() <= plain.repeats()
         for one, other in ((made, plain), (made.series, plain.series), (made + made, plain + plain)):
             np.testing.assert_allclose(one.sample(48), other.sample(48), atol=1e-12)
@@ -200,7 +208,7 @@ def test_orders_are_told_apart_to_a_thousandth() -> None:
 @pytest.mark.parametrize("steps", [96, 144, 1440])
 def test_a_step_on_a_jump_is_read_behind_it_wherever_the_signal_was_moved(steps: int) -> None:
     """Parts of a sum that jump at one angle have to agree on the side."""
-    saw = bent_spectrum(lambda angles: np.mod(angles, math.tau), 720, Fraction(1), np.array([0.0]))
+    saw = spectrum_with_kinks(lambda angles: np.mod(angles, math.tau), 720, Fraction(1), np.array([0.0]))
     assert saw.sample(steps, BEHIND)[0] == pytest.approx(0.0, abs=1e-6)
     for moved in range(1, steps, max(steps // 48, 1)):
         share = Fraction(moved, steps)

@@ -10,10 +10,9 @@ from hypothesis import strategies as st
 
 from laufruhe.machine import Cycle, Engine, OperatingPoint
 from laufruhe.machine.layouts import Mechanism, build, inline
-from laufruhe.physics.crank_stars import canonical, images, star_sums
+from laufruhe.physics.crank_stars import StarSpace, canonical, images, star_sums
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.star_space import StarSpace
 
 RADIUS, LAMBDA, MASS, SPACING, SPEED = 0.06, 0.26, 1.25, 0.125, 200.0
 

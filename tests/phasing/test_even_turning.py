@@ -10,7 +10,7 @@ import pytest
 import laufruhe
 from laufruhe.files.reader import load_tables
 from laufruhe.machine.firing import lap_orders
-from laufruhe.physics.irregularity import irregularity
+from laufruhe.physics.torque import irregularity
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof

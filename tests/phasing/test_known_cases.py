@@ -11,8 +11,7 @@ from laufruhe.load_models.amplitudes import AmplitudeObjective, AmplitudeTerm
 from laufruhe.machine import Cycle
 from laufruhe.machine.firing import even_patterns, firing_lattice
 from laufruhe.machine.layouts import inline
-from laufruhe.physics.crank_stars import star_sums
-from laufruhe.physics.star_space import StarSpace
+from laufruhe.physics.crank_stars import StarSpace, star_sums
 from laufruhe.prove.certificate import Proof
 from laufruhe.report.json_result import as_dict
 from laufruhe.report.wording import explained

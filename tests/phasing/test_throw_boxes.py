@@ -12,8 +12,8 @@ from laufruhe.load_models.affine import AffineNorm
 from laufruhe.load_models.throw_waves import ThrowWaves, WaveNorm
 from laufruhe.load_models.uneven_model import rides_of
 from laufruhe.machine.firing import firing_turns, intervals_of, lap_orders
+from laufruhe.numerics.exact_angles import angle_of
 from laufruhe.numerics.norms import NORMS, Grid
-from laufruhe.numerics.turns import angle_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.prove.certificate import Proof

@@ -13,17 +13,18 @@ from numpy.typing import NDArray
 from laufruhe.errors import ModelError
 from laufruhe.machine import Bearing, Cycle, Engine, OperatingPoint, Rod, Rotor, Seiliger, Shaft, SliderCrank
 from laufruhe.machine.kinematics import piston_acceleration, rod_acceleration
-from laufruhe.numerics.turns import cis
+from laufruhe.numerics.exact_angles import cis
 from laufruhe.physics.bearing_loads import (
+    beam_shares,
     crank_pin_factors,
+    lever_shares,
     main_bearing_forces,
     pin_forces,
     piston_pin_forces,
 )
-from laufruhe.physics.bearing_shares import beam_shares, lever_shares
-from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.shaking_loads import rotor_loads, shaking_loads
+from laufruhe.physics.torque import crank_torque
 from one_cylinder import cylinder_pressure
 
 FloatArray = NDArray[np.float64]

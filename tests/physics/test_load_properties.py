@@ -31,8 +31,8 @@ from laufruhe.machine import (
     Shaft,
     SliderCrank,
 )
+from laufruhe.numerics.exact_angles import as_turn, cis
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.numerics.turns import as_turn, cis
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.shaking_loads import (
     EXACT,

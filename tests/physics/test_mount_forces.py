@@ -18,7 +18,7 @@ from laufruhe.machine import Mount
 from laufruhe.machine.mount import Matrix3
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.mount_forces import UNCARRIED_SHARE, RigidMounting, rigid_mounting
-from laufruhe.physics.wrench import WRENCH
+from laufruhe.physics.rigid_body import WRENCH
 
 PLACE = st.floats(-1.0, 1.0).map(lambda x: round(x, 4))
 TURNS = st.tuples(*[st.floats(-math.pi, math.pi)] * 3)

@@ -17,11 +17,9 @@ from laufruhe.fidelity.error_bounds import Scale, reference
 from laufruhe.machine import Arms, Engine, Rim
 from laufruhe.machine.flywheel import GRAVITY
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
-from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.irregularity import irregularity, swing_of
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import torque_facts, torque_parts, work_stored
+from laufruhe.physics.torque import crank_torque, irregularity, swing_of, torque_facts, torque_parts, work_stored
 from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.plots.results.torque import applies, figure
 from laufruhe.problem.evaluation import evaluate

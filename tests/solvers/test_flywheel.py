@@ -13,7 +13,7 @@ from laufruhe.cli.fidelity import explained, traded
 from laufruhe.errors import InputError, ModelError
 from laufruhe.files.reader import load_tables, tables_of
 from laufruhe.machine import Flywheel, Rim
-from laufruhe.physics.irregularity import irregularity
+from laufruhe.physics.torque import irregularity
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof

@@ -14,8 +14,8 @@ from scipy.optimize import brentq
 
 import laufruhe
 from laufruhe.files.reader import load_tables
-from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Result

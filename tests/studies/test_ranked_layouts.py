@@ -14,7 +14,7 @@ import xarray as xr
 import laufruhe
 from laufruhe.files.reader import load_tables
 from laufruhe.physics.bearing_loads import main_bearing_forces, pin_forces
-from laufruhe.physics.irregularity import irregularity
+from laufruhe.physics.torque import irregularity
 from laufruhe.plots.picture import draw
 from laufruhe.problem.problem import Problem
 from laufruhe.studies.equal_power import at_equal_power

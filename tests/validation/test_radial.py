@@ -26,13 +26,13 @@ from laufruhe.files.reader import load
 from laufruhe.machine import Bearing, Engine, OperatingPoint, Seiliger, SliderCrank
 from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
 from laufruhe.physics.bearing_loads import crank_forces, main_bearing_forces, pin_forces, piston_pin_forces
-from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_cycle import thrust_at
 from laufruhe.physics.shaking_loads import (
     reciprocating_loads,
     shaking_loads,
 )
+from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import solve
 from one_cylinder import inertia_coefficients, rod_inertia_loads, rotating_loads

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from laufruhe.machine import Cycle, Engine, GasModel, PressureTrace
-from laufruhe.numerics.corners import SAME_ANGLE
+from laufruhe.numerics.kinks import SAME_ANGLE
 from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.fidelity import EXACT, Fidelity

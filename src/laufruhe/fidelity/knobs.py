@@ -16,7 +16,7 @@ from laufruhe.fidelity.knob import PART_SHARE, Knob, LeftOut, Rungs, first_enoug
 from laufruhe.fidelity.mount_knobs import MOUNT_KNOBS
 from laufruhe.physics.fidelity import EXACT, CrankshaftModel, Fidelity, Kinematics, RodModel
 from laufruhe.physics.mechanism import rod_effects
-from laufruhe.physics.wrench import WRENCH
+from laufruhe.physics.rigid_body import WRENCH
 from laufruhe.problem.problem import Problem
 
 ORDERS = (1, 2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 96, 128, 192, 256, 384)

@@ -19,7 +19,7 @@ from laufruhe.machine.drives import DRIVES, Sizes
 from laufruhe.machine.facing import least_room, with_shared_chambers
 from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, LayoutKind, Mechanism, Throw, even_throws, rod_of
 from laufruhe.machine.leads import led_parts
-from laufruhe.numerics.turns import direction
+from laufruhe.numerics.exact_angles import direction
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
 
 T = TypeVar("T", bound=BaseModel)

@@ -16,8 +16,8 @@ from laufruhe.files.complaints import Refused, all_different, blamed_on, measure
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import Block, Mount
+from laufruhe.machine.block import LoadCase
 from laufruhe.machine.dynamic import Dynamic, FluidTrack, MeasuredStiffness
-from laufruhe.machine.load_case import LoadCase
 from laufruhe.physics.elastic_mounts import elastic_mounting
 from laufruhe.physics.modes import free_motion
 from laufruhe.problem.decision import (

@@ -15,7 +15,7 @@ from laufruhe.files.complaints import Refused, blamed_on, nearest, none_of, one_
 from laufruhe.files.fields import CylinderNumber, Name, Open, Table
 from laufruhe.machine import CRANKSHAFT, Role, Rotor, Shaft, SliderCrank
 from laufruhe.machine.layouts import Throw
-from laufruhe.numerics.turns import as_turn, cis
+from laufruhe.numerics.exact_angles import as_turn, cis
 from laufruhe.problem.decision import Decision, PlaceDrive, RotorDrive
 from laufruhe.problem.sets import Interval, Sector, Set
 

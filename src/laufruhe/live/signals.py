@@ -146,13 +146,13 @@ def _point(share: float, constant: Spectrum, columns: Sequence[Spectrum], at: Ar
     slope = np.zeros((most, *shape, len(columns)), dtype=complex)
     for k, column in enumerate(columns):
         slope[: len(column.coefficients), ..., k] = column.coefficients
-    bent = tuple((k, _bends(column, at)) for k, column in enumerate(columns) if column.corners is not None)
-    bends = _bends(constant, at) if bent or constant.corners is not None else None
+    bent = tuple((k, _bends(column, at)) for k, column in enumerate(columns) if column.kinks is not None)
+    bends = _bends(constant, at) if bent or constant.kinks is not None else None
     return PointSignal(share, Waves.from_series(constant.coefficients), bends, Waves.from_series(slope), bent)
 
 
 def _bends(signal: Spectrum, at: Array) -> Bends:
-    smooth, corners = Waves.from_series(signal.smooth.coefficients), signal.corners
+    smooth, corners = Waves.from_series(signal.smooth.coefficients), signal.kinks
     if corners is None:
         return Bends(smooth, np.zeros(0), np.zeros((1, 0, *signal.coefficients.shape[1:])), at)
     return Bends(smooth, corners.angles, corners.pieces(signal.period), at)

@@ -14,10 +14,9 @@ from laufruhe.machine import Engine, Role, SliderCrank
 from laufruhe.machine.firing import even_patterns
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.crank_stars import Stars, star_sums
+from laufruhe.physics.crank_stars import Stars, StarSpace, star_sums
 from laufruhe.physics.order_coefficients import orders_needed
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.star_space import StarSpace
 from laufruhe.problem.channels import ROCKING_COUPLE, SHAKING_FORCE, SURGING_FORCE, SWAYING_COUPLE, Channel
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Term

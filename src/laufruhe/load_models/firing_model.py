@@ -18,7 +18,7 @@ from laufruhe.load_models.lone_parts import lone, working
 from laufruhe.load_models.star_model import StarModel, StarNorm, StarProblem, normalised
 from laufruhe.machine.firing import even_patterns, firing_lattice, slot_order, slot_steps
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.star_space import StarSpace
+from laufruhe.physics.crank_stars import StarSpace
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Measure, bends_of, load_rows

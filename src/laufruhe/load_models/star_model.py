@@ -19,7 +19,7 @@ from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid, Norm
 from laufruhe.numerics.spectrum import common_base
-from laufruhe.physics.star_space import StarSpace
+from laufruhe.physics.crank_stars import StarSpace
 from laufruhe.problem.decision import Decision, Domain
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem

@@ -239,7 +239,7 @@ class ThrowWaves:
         total, kept = 0.0, np.array([float(order) for order in self.times])
         for one in signals:
             # of what bends at an angle so many orders are listed that those beyond are next to nothing
-            signal = one if one.corners is None else one.extended(_LISTED)
+            signal = one if one.kinks is None else one.extended(_LISTED)
             out = ~orders_equal(signal.orders, kept)
             rest = signal.holding(np.where(out[:, None, None], signal.coefficients, 0.0))
             if measure.norm.is_euclidean or measure.norm.averages:
@@ -337,8 +337,8 @@ def _averaged(signal: Spectrum, out: Mask, steps: float) -> Array:
     """What averages, about so many angles a turn, have at most of some orders and of those beyond all listed."""
     sizes = np.linalg.norm(signal.coefficients[out], axis=-1)
     whole = np.sinc(signal.orders[out] / steps) ** 2 @ sizes
-    if signal.corners is None:
+    if signal.kinks is None:
         return np.asarray(whole)
     count, base = len(signal.coefficients), float(signal.base)
-    further = signal.corners.beyond_averaged(count, base, steps / base)
+    further = signal.kinks.beyond_averaged(count, base, steps / base)
     return np.asarray(whole + np.linalg.norm(further, axis=-1))

@@ -11,18 +11,15 @@ from functools import cached_property, lru_cache
 from typing import TypeVar
 
 from laufruhe.errors import ModelError
-from laufruhe.machine.bearing import Bearing
-from laufruhe.machine.block import Block
+from laufruhe.machine.block import Block, LoadCase
 from laufruhe.machine.chambers import GasModel
 from laufruhe.machine.extra import Extra
 from laufruhe.machine.flywheel import Flywheel
-from laufruhe.machine.geared import GearedInertia
-from laufruhe.machine.load_case import LoadCase
 from laufruhe.machine.mount import Mount
-from laufruhe.machine.rotor import Rotor, Shaft
+from laufruhe.machine.rotor import Bearing, GearedInertia, Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
+from laufruhe.numerics.exact_angles import as_turn, cis, direction, within
 from laufruhe.numerics.spectrum import as_order
-from laufruhe.numerics.turns import as_turn, cis, direction, within
 
 E = TypeVar("E", bound=Extra)
 

@@ -19,7 +19,7 @@ import numpy as np
 from laufruhe.errors import ModelError, counted
 from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts import Layout
-from laufruhe.numerics.turns import SAME_TURN, angle_of
+from laufruhe.numerics.exact_angles import SAME_TURN, angle_of
 
 MOST_ORDERS = 4096
 ORDERS_LOOKED_AT = 200_000

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -84,3 +85,98 @@ class Rotor:
         if self.radius is None:
             raise ModelError(f"rotor '{self.name}' has no radius, so its mass is not known")
         return abs(self.unbalance) / self.radius
+
+
+@dataclass(frozen=True)
+class Bearing:
+    """A plain bearing that carries a shaft in the block.
+
+    Attributes
+    ----------
+    x
+        Middle of it along the crank axis [m] (C2).
+    diameter, width
+        Of its journal [m]; needed for a pressure, the diameter for friction too.
+    friction
+        Coefficient of friction; needed for friction power only.
+    """
+
+    name: str
+    x: float
+    diameter: float | None = None
+    width: float | None = None
+    friction: float | None = None
+    shaft: Shaft = CRANKSHAFT
+
+    def __post_init__(self) -> None:
+        for what, size in (("diameter", self.diameter), ("width", self.width)):
+            if size is not None and not size > 0.0:
+                raise ModelError(f"bearing '{self.name}' has a {what} of {size:g} m; it must be positive")
+
+    def scaled(self, length: float) -> Bearing:
+        """Return the bearing in another size."""
+        diameter, width = (None if size is None else size * length for size in (self.diameter, self.width))
+        return replace(self, x=self.x * length, diameter=diameter, width=width, shaft=self.shaft.scaled(length))
+
+    @property
+    def area(self) -> float:
+        """Projected area, diameter times width [m2]."""
+        if self.diameter is None or self.width is None:
+            raise ModelError(f"bearing '{self.name}' has no diameter or no width, so its pressure is not known")
+        return self.diameter * self.width
+
+    @property
+    def drag(self) -> float:
+        """Coefficient of friction times the speed of the journal over that of the crank [m] (B7)."""
+        if self.diameter is None or self.friction is None:
+            raise ModelError(
+                f"bearing '{self.name}' has no diameter or no friction, so its friction power is not known"
+            )
+        return 0.5 * self.friction * self.diameter * abs(self.shaft.ratio)
+
+
+@dataclass(frozen=True)
+class GearedInertia:
+    """A second crank, or a flywheel of its own, geared to the crank.
+
+    Attributes
+    ----------
+    ratio
+        Speed over crank speed; negative runs against the crank (C3).
+    share
+        Of the inertia of all that turns, reduced to the crank: n^2 J_n over the sum of all (L8).
+    """
+
+    name: str
+    ratio: float
+    share: float
+
+    def __post_init__(self) -> None:
+        if self.ratio == 0.0:
+            raise ModelError(f"geared inertia '{self.name}' has ratio 0: what stands still takes no part")
+        if not 0.0 <= self.share <= 1.0:
+            raise ModelError(f"geared inertia '{self.name}' has a share of {self.share:g}; it lies between 0 and 1")
+
+
+_GRADE = re.compile(r"^\s*G\s*(\d+\.?\d*|\.\d+)\s*$")
+
+
+def grade_of(text: str) -> float | None:
+    """Return the grade [m/s] of a text such as "G 6.3" (in mm/s), or None."""
+    match = _GRADE.match(text)
+    return float(match.group(1)) * 1e-3 if match else None
+
+
+def permitted_unbalance(grade: float, mass: float, speed: float) -> float:
+    """Return the permitted unbalance of a rotor, summed over its planes [kg m] (R1).
+
+    Parameters
+    ----------
+    grade
+        e_per times the speed of rotation [m/s].
+    mass
+        Of the rotor [kg].
+    speed
+        Its fastest in service [rad/s].
+    """
+    return grade * mass / speed

@@ -12,7 +12,7 @@ from laufruhe.errors import ModelError
 from laufruhe.machine import kinematics
 from laufruhe.machine.bodies import Motion, Outline
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
-from laufruhe.numerics.turns import Turn, as_turn, cis
+from laufruhe.numerics.exact_angles import Turn, as_turn, cis
 
 _ON_ONE_AXIS = 1e-9
 

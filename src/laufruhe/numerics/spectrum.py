@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from laufruhe.numerics.corners import SAME_ANGLE, Corners, found_corners, joined
-from laufruhe.numerics.turns import Turn, phasors
+from laufruhe.numerics.exact_angles import Turn, phasors
+from laufruhe.numerics.kinks import SAME_ANGLE, SignalKinks, find_kinks, join_kinks
 
-MOST_CORNERS = 24
+MOST_SIGNAL_KINKS = 24
 """Of one function that are taken out in closed form."""
 BEHIND = 1e-3 * SAME_ANGLE
-"""Angle behind a step at which corners are read [rad]: far over its rounding, and far under what a signal feels."""
+"""Angle behind a step at which kinks are read [rad]: far over its rounding, and far under what a signal feels."""
 FEW = 9
 """Coefficients of a signal that is sampled wave by wave."""
 MAX_ORDER_DENOMINATOR = 1000
@@ -55,13 +55,13 @@ class Spectrum:
         The lowest order b: 1 for a period of one turn, 1/2 for a four-stroke cycle.
     coefficients
         Shape (n, ...): c_j of order j b, j = 0 ... n-1, of a signal of any shape.
-    corners
-        Of a signal whose derivatives jump: its orders from n on are those of the corners (L5a).
+    kinks
+        Of a signal whose derivatives jump: its orders from n on are those of the kinks (L5a).
     """
 
     base: Fraction
     coefficients: NDArray[np.complex128]
-    corners: Corners | None = None
+    kinks: SignalKinks | None = None
 
     @property
     def period(self) -> float:
@@ -71,37 +71,37 @@ class Spectrum:
     @cached_property
     def smooth(self) -> Spectrum:
         """The signal without its kinks."""
-        if self.corners is None:
+        if self.kinks is None:
             return self
         return Spectrum(
-            self.base, self.coefficients - self.corners.coefficients(len(self.coefficients), float(self.base))
+            self.base, self.coefficients - self.kinks.coefficients(len(self.coefficients), float(self.base))
         )
 
     def later(self, turn: Turn, angle: float) -> Spectrum:
         """Return the signal shifted later by an angle [rad], also given as a share of its period."""
         turns = phasors([-turn], np.arange(len(self.coefficients)))
         moved = self.coefficients * turns.reshape(-1, *(1,) * (self.coefficients.ndim - 1))
-        corners = None if self.corners is None else self.corners.moved(angle).folded(self.period, 1)
-        return Spectrum(self.base, moved, corners)
+        kinks = None if self.kinks is None else self.kinks.moved(angle).folded(self.period, 1)
+        return Spectrum(self.base, moved, kinks)
 
     @property
     def series(self) -> Spectrum:
         """The signal without closed-form kinks: averages of it are exact, samples near a kink are not."""
-        return self if self.corners is None else Spectrum(self.base, self.coefficients)
+        return self if self.kinks is None else Spectrum(self.base, self.coefficients)
 
     @property
     def bends(self) -> NDArray[np.float64]:
         """Angles at which the slope jumps, shape (k,) [rad]."""
-        return np.zeros(0) if self.corners is None else self.corners.bending
+        return np.zeros(0) if self.kinks is None else self.kinks.bending
 
     def holding(self, coefficients: NDArray[np.complex128]) -> Spectrum:
         """Return the signal with other coefficients."""
-        return Spectrum(self.base, coefficients, self.corners)
+        return Spectrum(self.base, coefficients, self.kinks)
 
     def each(self, linear: Callable[[NDArray[Any]], NDArray[Any]]) -> Spectrum:
         """Return the signal through a real linear map of values, a function of arrays (n, ...)."""
-        corners = None if self.corners is None else self.corners.each(linear)
-        return Spectrum(self.base, linear(self.coefficients), corners)
+        kinks = None if self.kinks is None else self.kinks.each(linear)
+        return Spectrum(self.base, linear(self.coefficients), kinks)
 
     def averaged(self, step: float) -> Spectrum:
         """Average under a triangle of half-width `step` [rad]: sinc^2 times each order (P7)."""
@@ -137,12 +137,12 @@ class Spectrum:
         Parameters
         ----------
         behind
-            Angle behind a step at which corners are read [rad]. Parts of a sum have to agree on the side of a jump,
+            Angle behind a step at which kinks are read [rad]. Parts of a sum have to agree on the side of a jump,
             which rounding decides otherwise: `BEHIND` is enough.
         """
-        if self.corners is not None:
+        if self.kinks is not None:
             angles = self.period * np.arange(samples) / samples + behind
-            return self.smooth.sample(samples) + self.corners.values(angles, self.period)
+            return self.smooth.sample(samples) + self.kinks.values(angles, self.period)
         if len(self.coefficients) <= FEW:
             # a product with few waves takes less time than a transform
             flat = self.coefficients.reshape(len(self.coefficients), -1)
@@ -169,22 +169,22 @@ class Spectrum:
         used = np.flatnonzero(smooth.reshape(len(smooth), -1).any(axis=1))
         waves = np.exp(1j * np.outer(angles, self.orders[used]))
         found = np.asarray(np.tensordot(waves, smooth[used], axes=(1, 0)).real)
-        return found if self.corners is None else found + self.corners.values(angles, self.period)
+        return found if self.kinks is None else found + self.kinks.values(angles, self.period)
 
     @property
     def integral(self) -> Spectrum:
         """Integral over the crank angle of the alternating part, without a mean."""
         whole = np.zeros_like(self.coefficients)
         whole[1:] = (self.coefficients[1:].T / (1j * self.orders[1:])).T
-        return Spectrum(self.base, whole, None if self.corners is None else self.corners.moved(0.0, 1))
+        return Spectrum(self.base, whole, None if self.kinks is None else self.kinks.moved(0.0, 1))
 
     @property
     def derivative(self) -> Spectrum:
         """Derivative by the angle; where the signal jumps, that of its orders alone."""
         steep = (self.coefficients.T * (1j * self.orders)).T
-        if self.corners is None or self.corners.jumps[:, 0].any():
+        if self.kinks is None or self.kinks.jumps[:, 0].any():
             return Spectrum(self.base, steep)
-        return Spectrum(self.base, steep, self.corners.derivative)
+        return Spectrum(self.base, steep, self.kinks.derivative)
 
     def extended(self, count: int) -> Spectrum:
         """Return the signal with at least `count` coefficients."""
@@ -200,8 +200,8 @@ class Spectrum:
         step = int(factor)
         spread = np.zeros(((len(self.coefficients) - 1) * step + 1, *self.coefficients.shape[1:]), dtype=complex)
         spread[::step] = self.coefficients
-        corners = None if self.corners is None else self.corners.repeated(self.period, step)
-        return Spectrum(base, spread, corners)
+        kinks = None if self.kinks is None else self.kinks.repeated(self.period, step)
+        return Spectrum(base, spread, kinks)
 
     @cached_property
     def step(self) -> int:
@@ -223,8 +223,8 @@ class Spectrum:
         fine, step = self, times(base, self.base)
         if not step:
             fine, step = self.rebased(_common(base, self.base)), (base / self.base).numerator
-        corners = None if fine.corners is None else fine.corners.folded(fine.period / step, step)
-        return Spectrum(base, fine.coefficients[::step], corners)
+        kinks = None if fine.kinks is None else fine.kinks.folded(fine.period / step, step)
+        return Spectrum(base, fine.coefficients[::step], kinks)
 
     def kept(self, highest: float) -> Spectrum:
         """Return the signal without orders above `highest`; it keeps its kinks only with all orders."""
@@ -239,12 +239,12 @@ class Spectrum:
         if len(a.coefficients) < len(b.coefficients):
             a, b = b, a
         total = a.coefficients.astype(complex)
-        if b.corners is not None and len(a.coefficients) > len(b.coefficients):
-            # corners have orders beyond those that are listed
-            further = b.corners.coefficients(len(total), float(b.base))
+        if b.kinks is not None and len(a.coefficients) > len(b.coefficients):
+            # kinks have orders beyond those that are listed
+            further = b.kinks.coefficients(len(total), float(b.base))
             total[len(b.coefficients) :] += further[len(b.coefficients) :]
         total[: len(b.coefficients)] += b.coefficients
-        return Spectrum(a.base, total, joined([a.corners, b.corners]))
+        return Spectrum(a.base, total, join_kinks([a.kinks, b.kinks]))
 
 
 class Mapped(Spectrum):
@@ -272,9 +272,9 @@ class Mapped(Spectrum):
         return self._whole.coefficients
 
     @property
-    def corners(self) -> Corners | None:
+    def kinks(self) -> SignalKinks | None:
         """Kinks of the source, mapped."""
-        return self._whole.corners
+        return self._whole.kinks
 
     @property
     def step(self) -> int:
@@ -300,7 +300,7 @@ class Mapped(Spectrum):
         return self.linear(self.source.sample(samples, behind))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Spectrum, (self.base, self.coefficients, self.corners)
+        return Spectrum, (self.base, self.coefficients, self.kinks)
 
 
 @lru_cache(maxsize=32)
@@ -357,9 +357,9 @@ def spectrum_of(samples: NDArray[np.float64], base: Fraction) -> Spectrum:
     return Spectrum(base, coefficients)
 
 
-def bent_spectrum(
+def spectrum_with_kinks(
     signal: Callable[[NDArray[np.float64]], NDArray[np.float64]], samples: int, base: Fraction,
-    breaks: NDArray[np.float64], most: int = MOST_CORNERS,
+    breaks: NDArray[np.float64], most: int = MOST_SIGNAL_KINKS,
 ) -> Spectrum:  # fmt: skip
     """Return the spectrum of a function of the angle whose derivatives jump (L5a).
 
@@ -370,21 +370,21 @@ def bent_spectrum(
     samples
         Steps over the period.
     breaks
-        Angles where a derivative may jump, shape (k,) [rad]; the strongest corners are taken out.
+        Angles where a derivative may jump, shape (k,) [rad]; the strongest kinks are taken out.
     """
     period = math.tau / float(base)
     angles = period * np.arange(samples) / samples
-    corners = found_corners(signal, breaks, period)
-    if corners is not None:
-        corners = corners.strongest(most)
-    if corners is None:
+    kinks = find_kinks(signal, breaks, period)
+    if kinks is not None:
+        kinks = kinks.strongest(most)
+    if kinks is None:
         return spectrum_of(signal(angles), base)
     # a step on a jump is taken behind it
     behind = angles + SAME_ANGLE
-    rest = spectrum_of(signal(behind) - corners.values(behind, period), base)
+    rest = spectrum_of(signal(behind) - kinks.values(behind, period), base)
     turned = np.exp(-1j * SAME_ANGLE * rest.orders).reshape(-1, *(1,) * (rest.coefficients.ndim - 1))
     smooth = rest.coefficients * turned
-    return Spectrum(base, smooth + corners.coefficients(len(smooth), float(base)), corners)
+    return Spectrum(base, smooth + kinks.coefficients(len(smooth), float(base)), kinks)
 
 
 def order_amplitude(coefficient: NDArray[np.complex128]) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.machine import Engine, Role, Shaft, SliderCrank
-from laufruhe.numerics.turns import as_turn, cis, direction
+from laufruhe.numerics.exact_angles import as_turn, cis, direction
 
 _ROUNDING = 1e-9
 

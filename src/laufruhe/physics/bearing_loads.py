@@ -18,6 +18,7 @@ bearings (B6), still linear. What gears and belts add is not modelled.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
@@ -26,11 +27,10 @@ from typing import TypeAlias
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.machine import Bearing, Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank
+from laufruhe.machine import Bearing, Cycle, Engine, GasModel, OperatingPoint, Rotor, Shaft, SliderCrank
 from laufruhe.numerics.arrays import Array, ComplexArray
-from laufruhe.numerics.spectrum import Spectrum, bent_spectrum
-from laufruhe.numerics.turns import as_turn, cis, star_sum
-from laufruhe.physics.bearing_shares import shares_of
+from laufruhe.numerics.exact_angles import as_turn, cis, star_sum
+from laufruhe.numerics.spectrum import Spectrum, spectrum_with_kinks
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import pressure_breaks, thrust_at
 from laufruhe.physics.mechanism import resolved_orders
@@ -280,7 +280,7 @@ def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fideli
             total += np.stack(felt(part, part.fires_at + part.shaft.ratio * since, thrust, False), axis=1)
         return np.asarray(total)
 
-    from_firing = bent_spectrum(loads, fidelity.gas_steps, cycle.base_order, pressure_breaks(gas, part, cycle))
+    from_firing = spectrum_with_kinks(loads, fidelity.gas_steps, cycle.base_order, pressure_breaks(gas, part, cycle))
     return fidelity.kept_of_gas(from_firing.later(as_turn(part.firing_angle) / cycle.turns, part.firing_angle))
 
 
@@ -296,3 +296,84 @@ def _side_by_side(
         total = total + load.each(partial(np.einsum, "k,nd->nkd", one))
     total.coefficients.setflags(write=False)
     return total
+
+
+@lru_cache(maxsize=256)
+def shares_of(bearings: tuple[Bearing, ...], places: tuple[tuple[Shaft, float], ...], crankshaft: str) -> Array:
+    """Return the share of a load at each place that each bearing carries, shape (bearings, places) (B4, B6)."""
+    shares = np.zeros((len(bearings), len(places)))
+    for shaft in dict.fromkeys(bearing.shaft for bearing in bearings):
+        rows = [k for k, bearing in enumerate(bearings) if bearing.shaft == shaft]
+        columns = [k for k, (on, _) in enumerate(places) if on == shaft]
+        found = SHARES[crankshaft]([bearings[k].x for k in rows], [places[k][1] for k in columns])
+        shares[np.ix_(rows, columns)] = found
+    shares.setflags(write=False)
+    return shares
+
+
+def lever_shares(bearings: Sequence[float], places: Sequence[float]) -> Array:
+    """Return the shares by the lever rule, shape (bearings, places) (B4).
+
+    A load beside all bearings hangs over: the two nearest carry it, the far one upwards.
+    """
+    order = np.argsort(bearings)
+    x = np.asarray(bearings, dtype=float)[order]
+    shares = np.zeros((len(x), len(places)))
+    if not len(places):
+        return shares
+    if len(x) < 2:
+        raise ModelError("a shaft that is loaded needs two main bearings at least; add one")
+    columns = np.arange(len(places))
+    first = np.clip(np.searchsorted(x, places, side="right") - 1, 0, len(x) - 2)
+    far = (np.asarray(places) - x[first]) / (x[first + 1] - x[first])
+    shares[first, columns], shares[first + 1, columns] = 1.0 - far, far
+    return shares[np.argsort(order)]
+
+
+def beam_shares(bearings: Sequence[float], places: Sequence[float]) -> Array:
+    """Return the shares of a continuous uniform beam on rigid supports, as `lever_shares` (B6).
+
+    Bending between bearings and loads is a cubic exactly, so that a beam element each is exact.
+    """
+    shares = lever_shares(bearings, places)
+    if len(bearings) == 2:
+        return shares
+    x = np.unique([*bearings, *places])
+    stiffness = np.zeros((2 * len(x), 2 * len(x)))
+    for k, length in enumerate(np.diff(x) / np.ptp(x)):
+        a, b, c = 12.0 / length**3, 6.0 / length**2, 2.0 / length
+        element = [[a, b, -a, b], [b, 2 * c, -b, c], [-a, -b, a, -b], [b, c, -b, 2 * c]]
+        stiffness[2 * k : 2 * k + 4, 2 * k : 2 * k + 4] += element
+    held, loaded = 2 * np.searchsorted(x, bearings), 2 * np.searchsorted(x, places)
+    free = np.setdiff1d(np.arange(2 * len(x)), held)
+    moved = np.zeros((2 * len(x), len(held)))
+    moved[held, np.arange(len(held))] = 1.0
+    # what a support carries of a load is how far the beam comes down there as that support does (Maxwell, Betti)
+    moved[free] = -np.linalg.solve(stiffness[np.ix_(free, free)], stiffness[np.ix_(free, held)])
+    return np.asarray(moved[loaded].T)
+
+
+SHARES = {"cut": lever_shares, "beam": beam_shares}
+
+
+SIDES = math.radians(60.0)
+"""A load wears its bearing this far to either side."""
+
+
+def wear_of(path: ComplexArray, angles: Array) -> Array:
+    """Return the load of every direction over the cycle as a share of the largest (B10).
+
+    Parameters
+    ----------
+    path
+        Force on the bearing at equal steps of the cycle [N], shape (n,), in the plane across the crank axis (C4).
+    angles
+        Directions [rad], shape (k,).
+
+    Returns
+    -------
+    Shares from 0 to 1, shape (k,); zero where nothing loads the bearing.
+    """
+    apart = np.abs(np.angle(np.exp(1j * (np.angle(path)[:, None] - angles))))
+    total = (np.abs(path)[:, None] * (apart <= SIDES)).sum(axis=0)
+    return np.asarray(total / (total.max() or 1.0))

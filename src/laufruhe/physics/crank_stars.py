@@ -1,4 +1,4 @@
-"""Crank stars by the numbers that fix their balance: force and couple of every order (S1, S2).
+"""Crank stars, their enumeration, and their force and couple of every order (S1-S3).
 
 A star puts every throw on one of P equal steps of a turn. Of identical throws it fixes
 everything that inertia does to the block by two complex numbers an order,
@@ -10,14 +10,16 @@ so millions of stars are compared without a load being computed.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.turns import phasors
+from laufruhe.numerics.exact_angles import phasors
 
 Stars = NDArray[np.uint8]
 
@@ -109,3 +111,142 @@ def canonical(stars: Stars, phases: int, mirror: bool, reflect: bool) -> Stars:
         smaller = differs.any(axis=1) & (other[rows, first] < best[rows, first])
         best = np.where(smaller[:, None], other, best)
     return best
+
+
+BLOCK = 1 << 14
+
+
+@dataclass(frozen=True)
+class StarSpace:
+    """Stars of identical throws on equal steps of a turn.
+
+    Attributes
+    ----------
+    phases
+        Steps P of a turn.
+    patterns
+        How many throws stand on each step, shape (patterns, P); the first throw is on
+        step 0.
+    places
+        Of the throws along x [m].
+    mirror, reflect
+        Whether a star equals its front-back mirror image, and the star that turns the
+        other way round, in all that is asked of it (S2).
+    """
+
+    phases: int
+    patterns: tuple[tuple[int, ...], ...]
+    places: tuple[float, ...]
+    mirror: bool = False
+    reflect: bool = False
+
+    @property
+    def throws(self) -> int:
+        """Number of throws."""
+        return len(self.places)
+
+    @property
+    def first(self) -> tuple[int, ...]:
+        """First star: throws on the steps in their order."""
+        return tuple(step for step, times in enumerate(self.patterns[0]) for _ in range(times))
+
+    @property
+    def size(self) -> int:
+        """Number of stars with the first throw on step 0, images counted."""
+        total = 0
+        for pattern in self.patterns:
+            rest = [pattern[0] - 1, *pattern[1:]]
+            total += math.factorial(sum(rest)) // math.prod(math.factorial(count) for count in rest)
+        return total
+
+    def canonical(self, stars: Stars) -> Stars:
+        """Return the canonical image of each star."""
+        return canonical(stars, self.phases, self.mirror, self.reflect)
+
+    def blocks(self) -> Iterator[Stars]:
+        """Yield all stars, one of each set of images, in blocks (n, throws)."""
+        for root in self.roots:
+            for block in _grown(self, root):
+                own = np.all(self.canonical(block) == block, axis=1)
+                if own.any():
+                    yield block[own]
+
+    @property
+    def roots(self) -> tuple[Partial, ...]:
+        """The first throw alone, for every pattern."""
+        order, found = outside_in(self.throws), []
+        for pattern in self.patterns:
+            left = np.array([pattern], dtype=np.uint8)
+            left[0, 0] -= 1
+            found.append(Partial(np.zeros((1, self.throws), dtype=np.uint8), left, order[:1], order[1:]))
+        return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class Partial:
+    """Stars whose outer throws are placed.
+
+    Attributes
+    ----------
+    stars
+        Shape (n, throws), steps; undefined where not yet placed.
+    counts
+        Shape (n, P): throws that each step still takes.
+    placed
+        Indices of the placed throws, in the order in which they were placed.
+    open
+        Indices of the others.
+    """
+
+    stars: Stars
+    counts: NDArray[np.uint8]
+    placed: tuple[int, ...]
+    open: tuple[int, ...]
+
+
+def outside_in(throws: int) -> tuple[int, ...]:
+    """Return the order first, last, second, ... of throws: it distinguishes images early."""
+    return tuple(k // 2 if k % 2 == 0 else throws - 1 - k // 2 for k in range(throws))
+
+
+def _grown(space: StarSpace, first: Partial) -> Iterator[Stars]:
+    # depth first, so that at most a block for every throw and step waits
+    waiting = [first]
+    while waiting:
+        partial = waiting.pop()
+        if not partial.open:
+            yield partial.stars
+            continue
+        rows, steps = np.nonzero(partial.counts)
+        stars, counts = partial.stars[rows], partial.counts[rows]
+        stars[:, partial.open[0]] = steps
+        counts[np.arange(len(rows)), steps] -= 1
+        placed, left = (*partial.placed, partial.open[0]), partial.open[1:]
+        first_images = _first_of_images(space, Partial(stars, counts, placed, left))
+        stars, counts = stars[first_images], counts[first_images]
+        for start in range(0, len(stars), BLOCK):
+            part = slice(start, start + BLOCK)
+            waiting.append(Partial(stars[part], counts[part], placed, left))
+
+
+def _first_of_images(space: StarSpace, partial: Partial) -> NDArray[np.bool_]:
+    """Return a mask of stars of which no image is already known to come earlier (S2).
+
+    Image and star compare throw by throw from the front, as far as the steps that both need are placed.
+    """
+    keep = np.ones(len(partial.stars), dtype=bool)
+    placed, last = set(partial.placed), space.throws - 1
+    steps = partial.stars.astype(np.int16)
+    for swap, turn in ((False, True), (True, False), (True, True)):
+        if (swap and not space.mirror) or (turn and not space.reflect):
+            continue
+        undecided = np.ones(len(steps), dtype=bool)
+        for k in range(1, space.throws):
+            source = last - k if swap else k
+            if not {k, source} <= placed or (swap and last not in placed):
+                break
+            image = steps[:, source] - (steps[:, last] if swap else 0)
+            image = (-image if turn else image) % space.phases
+            keep &= ~(undecided & (image < steps[:, k]))
+            undecided &= image == steps[:, k]
+    return keep

@@ -1,4 +1,4 @@
-"""A rigid block on elastic mounts: response and mount forces, order by order (E1-E5, E11, E12).
+"""A rigid block on elastic mounts: response and mount forces, order by order (E1-E5, E11, E12, E50, E51).
 
 Motion q = (u, theta) of the centre of gravity follows from the wrench w about it by
 
@@ -17,17 +17,18 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, UncarriedLoadError
 from laufruhe.machine.block import Block
+from laufruhe.machine.dynamic import Dynamic, FluidTrack
 from laufruhe.machine.mount import Mount, every_spring
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.dynamic_springs import DynamicSprings, dynamic_springs
 from laufruhe.physics.modes import Modes, modes_of
 from laufruhe.physics.rigid_body import carried, moved_wrench, point_motion
 
@@ -328,3 +329,55 @@ def single_transmissibility(ratio: Array, loss_factor: float = 0.0, damping_rati
     """
     lag = loss_factor + 2.0 * damping_ratio * np.asarray(ratio)
     return np.asarray(np.hypot(1.0, lag) / np.hypot(1.0 - np.asarray(ratio) ** 2, lag))
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicSprings:
+    """Frequency-dependent springs of a mounting, along their own axes.
+
+    Attributes
+    ----------
+    laws
+        Of every one.
+    rows
+        Travel along its axis for each motion of the block, shape (n, 6).
+    directions
+        Of its force among those of the mounts, shape (3 mounts, n).
+    """
+
+    laws: tuple[Dynamic, ...]
+    rows: Array
+    directions: Array
+
+    def __bool__(self) -> bool:
+        return bool(self.laws)
+
+    @property
+    def has_law(self) -> bool:
+        """True if all of them have equations in time; measured stiffness has none."""
+        return all(isinstance(law, FluidTrack) for law in self.laws)
+
+    def added(self, omegas: Array) -> ComplexArray:
+        """Return the stiffness beyond that at rest, shape (frequencies, n) [N/m]."""
+        found = [law.at(np.asarray(omegas, dtype=float)) - law.static for law in self.laws]
+        return np.array(found, dtype=complex).reshape(len(self.laws), len(omegas)).T
+
+    def impedance(self, omegas: Array, shapes: Any) -> ComplexArray:
+        """Return the added impedance in coordinates of shapes (6, k), shape (frequencies, k, k)."""
+        seen = self.rows @ shapes
+        return np.asarray(np.einsum("wn,ni,nj->wij", self.added(omegas), seen, seen))
+
+    def forces(self, omegas: Array, shapes: Any) -> ComplexArray:
+        """Return the added mount forces per coordinate of shapes (6, k), shape (frequencies, 3 mounts, k)."""
+        return np.asarray(np.einsum("wn,rn,nj->wrj", self.added(omegas), self.directions, self.rows @ shapes))
+
+
+def dynamic_springs(mounts: Sequence[Mount], motions: Array) -> DynamicSprings:
+    """Return the frequency-dependent springs of mounts with motions G, shape (mounts, 3, 6)."""
+    found = [(place, spring, law) for place, spring in every_spring(mounts) for law in spring.dynamic]
+    axes = np.array([spring.orientation[law.axis] for _, spring, law in found]).reshape(-1, 3)
+    rows = np.array([axis @ motions[place] for axis, (place, _, _) in zip(axes, found, strict=True)]).reshape(-1, 6)
+    directions = np.zeros((3 * len(mounts), len(found)))
+    for n, (place, _, _) in enumerate(found):
+        directions[3 * place : 3 * place + 3, n] = axes[n]
+    return DynamicSprings(tuple(law for _, _, law in found), rows, directions)

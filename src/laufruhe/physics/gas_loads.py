@@ -11,12 +11,12 @@ import numpy as np
 
 from laufruhe.machine import Cycle, Engine, GasModel, SliderCrank
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.corners import joined
-from laufruhe.numerics.spectrum import Spectrum, bent_spectrum
-from laufruhe.numerics.turns import Turn, as_turn, star_sum
+from laufruhe.numerics.exact_angles import Turn, as_turn, star_sum
+from laufruhe.numerics.kinks import join_kinks
+from laufruhe.numerics.spectrum import Spectrum, spectrum_with_kinks
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_cycle import alike_under, pressure_breaks, thrust_at
-from laufruhe.physics.wrench import ROLL
+from laufruhe.physics.rigid_body import ROLL
 
 
 def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -33,10 +33,10 @@ def gas_loads(engine: Engine, gas: GasModel, fidelity: Fidelity = EXACT) -> Spec
         multiples = np.arange(len(torque.coefficients))
         star = star_sum(np.tile(ROLL, (len(parts), 1)), delays, multiples)
         load = Spectrum(engine.cycle.base_order, torque.coefficients[:, None] * star)
-        if torque.corners is not None:
-            rolling = torque.corners.each(lambda jumps: jumps[:, None] * ROLL)
-            corners = joined([rolling.moved(part.firing_angle) for part in parts] if rolling else [])
-            load = replace(load, corners=corners and corners.folded(load.period, 1))
+        if torque.kinks is not None:
+            rolling = torque.kinks.each(lambda jumps: jumps[:, None] * ROLL)
+            kinks = join_kinks([rolling.moved(part.firing_angle) for part in parts] if rolling else [])
+            load = replace(load, kinks=kinks and kinks.folded(load.period, 1))
         total = total + load
     return total
 
@@ -62,7 +62,7 @@ class _CylinderKey:
 def _one_cylinder(gas: GasModel, key: _CylinderKey, cycle: Cycle, samples: int) -> Spectrum:
     # its kinks are taken out before the transform (L5a)
     part, breaks = key.part, pressure_breaks(gas, key.part, cycle)
-    torque = bent_spectrum(lambda angles: _torque_at(gas, part, cycle, angles), samples, cycle.base_order, breaks)
+    torque = spectrum_with_kinks(lambda angles: _torque_at(gas, part, cycle, angles), samples, cycle.base_order, breaks)
     torque.coefficients.setflags(write=False)
     return torque
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from laufruhe.machine import Engine
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.wrench import ROLL
+from laufruhe.physics.rigid_body import ROLL
 
 
 def geared_factor(engine: Engine) -> float:

@@ -22,7 +22,7 @@ from laufruhe.machine.bodies import Motion
 from laufruhe.numerics.arrays import ComplexArray
 from laufruhe.physics import order_coefficients
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.wrench import plane_wrench
+from laufruhe.physics.rigid_body import plane_wrench
 
 _TAIL = 1e-15
 _MOST_STEPS = 1 << 16

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from laufruhe.errors import UncarriedLoadError
 from laufruhe.machine import Mount
 from laufruhe.machine.mount import every_spring
+from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
+from laufruhe.numerics.norms import lengths
 from laufruhe.numerics.spectrum import Mapped, Spectrum
-from laufruhe.physics.rigid_body import point_motion
-from laufruhe.physics.wrench import WRENCH
+from laufruhe.physics.rigid_body import WRENCH, point_motion
 
 FREE_STRETCH = 1e-10
 UNCARRIED_SHARE = 1e-9
@@ -106,3 +107,27 @@ def _rigid_mounting(mounts: tuple[Mount, ...]) -> RigidMounting:
 
 def _scales(arm: float) -> NDArray[np.float64]:
     return np.array([1.0, 1.0, 1.0, arm, arm, arm])
+
+
+@dataclass(frozen=True)
+class CycleMeasures:
+    """Mean, maximum and root mean square over the cycle of a force's magnitude [N]."""
+
+    mean: float
+    max: float
+    rms: float
+
+    def times(self, factor: float) -> CycleMeasures:
+        """Return the measures in another unit."""
+        return CycleMeasures(factor * self.mean, factor * self.max, factor * self.rms)
+
+
+def cycle_measures(samples: Array) -> CycleMeasures:
+    """Return mean, maximum and rms of |F(phi)| from samples (n, components) (M4; Hasselgruber, Figs. 10-28)."""
+    size = lengths(samples)
+    return CycleMeasures(float(size.mean()), float(size.max()), float(np.sqrt(np.mean(size**2))))
+
+
+def turning_amplitudes(lateral: complex, vertical: complex) -> tuple[float, float]:
+    """Return the amplitudes of the parts of z + i y that turn with the crank, as e^{ix}, and against it (C4, C8)."""
+    return 0.5 * float(abs(vertical + 1j * lateral)), 0.5 * float(abs(vertical - 1j * lateral))

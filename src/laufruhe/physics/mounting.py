@@ -13,7 +13,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.mount_forces import RigidMounting, rigid_mounting
-from laufruhe.physics.time_mounting import TimeMounting
+from laufruhe.physics.steady_state import TimeMounting
 
 
 class Mounting(Protocol):

@@ -1,4 +1,4 @@
-"""Motion of points, wrenches and springs of a rigid body (M1, E1, E2).
+"""Motion of points, wrenches (Fx, Fy, Fz, Mx, My, Mz) and springs of a rigid body (M1, E1, E2, C2).
 
 The kernels take the maths namespace of `numerics.namespaces`: one formula for numbers
 and for symbols.
@@ -9,6 +9,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from laufruhe.machine import Shaft
 from laufruhe.numerics.namespaces import Maths
 
 
@@ -54,3 +58,29 @@ def along_axes(lib: Maths, axes: Any, values: Sequence[Any]) -> Any:
 def carried(motion: Any, spring: Any) -> Any:
     """Return G' K G of one mount, shape (6, 6) (E3)."""
     return motion.T @ spring @ motion
+
+
+WRENCH = ("Fx", "Fy", "Fz", "Mx", "My", "Mz")
+ROLL = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0])
+
+
+def plane_wrench(lateral: Any, vertical: Any, x: float, shaft: Shaft) -> NDArray[Any]:
+    """Return the wrench of a force in the plane at x through a shaft's axis, shape (6, ...) of forces (...) (C2)."""
+    return np.array(plane_parts(lateral, vertical, x, shaft))
+
+
+def plane_parts(lateral: Any, vertical: Any, x: float, shaft: Shaft) -> tuple[Any, Any, Any, Any, Any, Any]:
+    """Return the six parts of that wrench."""
+    roll = shaft.y * vertical - shaft.z * lateral
+    return lateral - lateral, lateral, vertical, roll, -x * vertical, x * lateral
+
+
+def turning_parts(lateral: Any, vertical: Any) -> tuple[Any, Any]:
+    """Return the parts F e^{i h phi} and B e^{-i h phi} of z + i y, with the crank and against it (C4).
+
+    Parameters
+    ----------
+    lateral, vertical
+        Coefficients of one order (C8).
+    """
+    return 0.5 * (vertical + 1j * lateral), 0.5 * np.conj(vertical - 1j * lateral)

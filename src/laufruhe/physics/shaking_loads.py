@@ -15,16 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, GasModel, OperatingPoint, Rotor, SliderCrank
+from laufruhe.numerics.exact_angles import cancelling_sums
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.numerics.turns import cancelling_sums
-from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_moment
 from laufruhe.physics.mechanism import effects_of, mass_effects
+from laufruhe.physics.rigid_body import plane_parts
 from laufruhe.physics.star_loads import order_index, star_loads
+from laufruhe.physics.torque import crank_torque
 from laufruhe.physics.uneven_speed import uneven_geared_loads, uneven_loads, uneven_rotor_loads
-from laufruhe.physics.wrench import plane_parts
 
 _Parts: TypeAlias = tuple[complex, ...]
 

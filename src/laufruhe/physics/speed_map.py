@@ -16,8 +16,8 @@ from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_moment
 from laufruhe.physics.mount_forces import rigid_mounting
+from laufruhe.physics.rigid_body import ROLL
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.wrench import ROLL
 
 
 def split_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> tuple[Spectrum, Spectrum | None]:

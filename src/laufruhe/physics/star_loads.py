@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine import Cycle, Engine, SliderCrank
+from laufruhe.numerics.exact_angles import as_turn, cis, star_orders
 from laufruhe.numerics.spectrum import Spectrum, as_order
-from laufruhe.numerics.turns import as_turn, cis, star_orders
 from laufruhe.physics.mechanism import Direction, Effect
-from laufruhe.physics.wrench import ROLL, plane_parts
+from laufruhe.physics.rigid_body import ROLL, plane_parts
 
 
 def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], Iterable[Effect]]) -> Spectrum:

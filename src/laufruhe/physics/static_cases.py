@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.errors import SolverError
-from laufruhe.machine.block import Block
-from laufruhe.machine.load_case import LoadCase
+from laufruhe.machine.block import Block, LoadCase
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.physics.elastic_mounts import ElasticMounting

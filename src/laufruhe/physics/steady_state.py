@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError, SolverError
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.spectrum import Spectrum
+from laufruhe.numerics.spectrum import Spectrum, spectrum_of
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.time_model import TimeModel, time_model
 
@@ -134,3 +134,63 @@ def static_size(model: TimeModel, loads: NDArray[np.complex128]) -> float:
     """Return a typical coordinate of the block under loads; never zero."""
     stiffness = float(np.linalg.norm(model.stiffness)) or 1.0
     return float(np.abs(loads).max(initial=0.0)) / stiffness or 1e-9
+
+
+INTEGRATION = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class TimeMounting:
+    """Steady state by integration, with bump stops, and the viscous loss of E26.
+
+    Attributes
+    ----------
+    mounting
+        Block and mounts.
+    samples
+        Steps over the period at which the motion is read; orders above half of them are lost.
+    """
+
+    mounting: ElasticMounting
+    samples: int
+    _found: dict[tuple[int, float], tuple[Spectrum, SteadyState]] = field(default_factory=dict, repr=False)
+
+    def forces(self, wrench: Spectrum, speed: float) -> Spectrum:
+        """Return the forces of the engine on its mounts, shape (n, mounts, 3) [N] (C7).
+
+        Raises
+        ------
+        SolverError
+            If no motion repeats itself.
+        """
+        return spectrum_of(self._state(wrench, speed).forces, wrench.base)
+
+    def travel(self, wrench: Spectrum, speed: float) -> Spectrum:
+        """Return the displacement of the engine at every mount, shape (n, mounts, 3) [m]."""
+        return spectrum_of(self._state(wrench, speed).travels, wrench.base)
+
+    def _state(self, wrench: Spectrum, speed: float) -> SteadyState:
+        # forces and travel are of one integration; the wrench is kept, so that its id stays its own
+        key = id(wrench), speed
+        if key not in self._found:
+            state = periodic_state(self.mounting, wrench, speed, self.samples, INTEGRATION)
+            self._found[key] = wrench, state
+        return self._found[key][1]
+
+
+def viscous_forces(mounting: ElasticMounting, wrench: Spectrum, speed: float) -> Spectrum:
+    """Return the mount forces by order of the equations that time integrates, without bump stops (E25, E26).
+
+    What integration alone is off by shows beside these; what E26 changes shows beside
+    `ElasticMounting.forces`.
+
+    Returns
+    -------
+    Shape (n, mounts, 3) [N].
+    """
+    model = time_model(mounting)
+    omega = wrench.orders[:, None, None] * speed
+    impedance = model.stiffness + 1j * omega * model.damping - omega**2 * np.eye(model.size)
+    y = np.linalg.solve(impedance, (wrench.coefficients @ model.load.T)[..., None])
+    forces = (model.forces + 1j * omega * model.drag) @ y
+    return Spectrum(wrench.base, forces.reshape(len(omega), -1, 3))

@@ -12,8 +12,7 @@ from laufruhe.machine.dynamic import FluidTrack
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
-from laufruhe.physics.dynamic_springs import DynamicSprings
-from laufruhe.physics.elastic_mounts import ElasticMounting
+from laufruhe.physics.elastic_mounts import DynamicSprings, ElasticMounting
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import moved_wrench
 

@@ -1,26 +1,38 @@
-"""Torque of the crankshaft over the cycle, the energy that a flywheel has to store (T1-T3).
+"""Torque of the crankshaft over the cycle, stored energy and irregularity of its speed (T1-T4, V1, V14).
 
     T = -A (p - p_crankcase) ds/dphi - (1/2) w^2 dJ/dphi                     (T1; textbook eqs. 18 to 20)
 
 with J the inertia of pistons and rods reduced to the crank (F3): what they store, they take from the torque. The load
 takes its mean; the rest goes into the flywheel and comes back, and what has to be stored is the largest less the
-smallest of its integral (T2; textbook 2.7, example 4).
+smallest of its integral (T2; textbook 2.7, example 4). The degree of irregularity is exact at every inertia,
+
+    w^2 = 2 (E + W) / (J_0 + J),   mean of w_0 / w over the angle = 1        (T3, T4)
+
+with W the work of the gas less that of the load. W and J are functions of the angle alone (F2-F4), so for each inertia
+J_0 of the flywheel one number E is left.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
-from laufruhe.machine import Engine, OperatingPoint
+from laufruhe.errors import ModelError
+from laufruhe.machine import Cycle, Engine, OperatingPoint, SliderCrank
+from laufruhe.numerics.arrays import Array, ComplexArray
+from laufruhe.numerics.roots import rising_root
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.irregularity import swing_of
-from laufruhe.physics.reduced_inertia import turning_inertia
+from laufruhe.physics.gas_loads import gas_loads
+from laufruhe.physics.mechanism import TWO_ORDER_ROLL, Direction, Effect, reduced, resolved_orders, two_order_roll
+from laufruhe.physics.rigid_body import ROLL
+from laufruhe.physics.star_loads import star_loads
+from laufruhe.physics.uneven_speed import gas_torque, moving_inertia, start_energy
 
-FINE = 8
+FINE_WORK = 8
 """Times as many steps as the fidelity has, at which the work is compared."""
 
 
@@ -72,11 +84,169 @@ def torque_facts(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
     """Return mean, extremes and stored work of the torque, and the irregularity of the crank speed."""
     torque = crank_torque(engine, point, fidelity)
     # it bends where the gas does: its ends may stand there
-    values = np.concatenate([torque.sample(FINE * fidelity.samples), torque.values(torque.bends)])
+    values = np.concatenate([torque.sample(FINE_WORK * fidelity.samples), torque.values(torque.bends)])
     mean = float(torque.coefficients[0].real)
     inertia = turning_inertia(engine, fidelity)
     uneven = None if inertia is None else swing_of(engine, point, fidelity).irregularity(inertia)
     return TorqueFacts(
         mean, mean * point.speed, float(values.min()), float(values.max()),
-        work_stored(torque, FINE * fidelity.samples), uneven,
+        work_stored(torque, FINE_WORK * fidelity.samples), uneven,
     )  # fmt: skip
+
+
+def crank_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
+    """Return the torque of gas, pistons and rods on the crankshaft at even speed, as it drives the output (T1).
+
+    Returns
+    -------
+    Spectrum of shape (n,) [N m].
+    """
+    gas = fidelity.gas_of(point)
+    masses = fidelity.kept(star_loads(engine, point.speed, lambda part: (_of_masses(part, fidelity),)))
+    total = masses if gas is None else masses + fidelity.kept(gas_loads(engine, gas, fidelity))
+    return total.each(lambda wrench: wrench @ ROLL)
+
+
+def cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity = EXACT) -> ComplexArray:
+    """Return the coefficients of one cylinder's torque by order of the cycle [N m], counted from its firing (T1)."""
+    first = replace(part, name="cylinder", x=0.0, throw=part.bank + part.fires_at, firing_angle=0.0)
+    return _cylinder_torque(cycle, first, replace(point, name="", weight=1.0), fidelity)
+
+
+@lru_cache(maxsize=256)
+def _cylinder_torque(cycle: Cycle, part: SliderCrank, point: OperatingPoint, fidelity: Fidelity) -> ComplexArray:
+    found = crank_torque(Engine("one cylinder", cycle, (part,)), point, fidelity)
+    series = found.rebased(cycle.base_order).coefficients
+    series.setflags(write=False)
+    return series
+
+
+def _of_masses(part: SliderCrank, fidelity: Fidelity) -> Effect:
+    """Return the torque at unit speed of the mechanism's own crank, in the sense of the output (T1)."""
+    is_rigid, is_short = fidelity.rod == "rigid", fidelity.kinematics == "two-order"
+    key = "torque", replace(part, name="", x=0.0, throw=0.0, bank=0.0, firing_angle=0.0), is_rigid, is_short
+
+    def torque(alpha: np.ndarray) -> tuple[np.ndarray]:
+        _, slope = reduced(part.motion(np, alpha), is_rigid)
+        return (-0.5 * part.shaft.ratio * slope,)
+
+    def series() -> ComplexArray:
+        if is_short and type(part) is SliderCrank:
+            return part.reciprocating_mass * part.crank_radius**2 * part.shaft.ratio * two_order_roll(part.rod_ratio)
+        table = np.asarray(resolved_orders(torque, np.ones((1, 1)), part.name)[0])
+        return table[: TWO_ORDER_ROLL + 1] if is_short else table
+
+    return Effect(Direction.ROLL, 1.0, key, series)
+
+
+FINE_SPEED = 4
+"""Times as many steps as the fidelity has, at which the ends of the speed are sought."""
+
+
+@dataclass(frozen=True, eq=False)
+class Swing:
+    """Causes of the speed fluctuation of an engine at one operating point.
+
+    Attributes
+    ----------
+    speed, torque
+        Mean [rad/s], [N m].
+    work, inertia
+        W [J] and J [kg m2] at equal crank angles, shape (n,).
+    bent_work, bent_inertia
+        The same where the torque bends.
+    """
+
+    speed: float
+    torque: float
+    work: Array
+    inertia: Array
+    bent_work: Array
+    bent_inertia: Array
+
+    def speeds(self, inertia: float) -> Array:
+        """Return the crank speed over the cycle with an inertia beside pistons and rods [rad/s] (F2-F4).
+
+        Raises
+        ------
+        ModelError
+            If the crank would stop.
+        """
+        if inertia + self.inertia.min() <= 0.0:
+            raise ModelError("the moving parts have no positive inertia; raise the inertia of the flywheel")
+        energy = start_energy(self.work, inertia + self.inertia, self.speed)
+        work = np.concatenate([self.work, self.bent_work])
+        total = inertia + np.concatenate([self.inertia, self.bent_inertia])
+        # between the angles that tell the energy it may fall under zero
+        return np.asarray(np.sqrt(2.0 * np.maximum(energy + work, 0.0) / total))
+
+    def irregularity(self, inertia: float) -> float:
+        """Return the speed range over the mean speed (T3; textbook eq. 24); infinite if the crank would stop."""
+        try:
+            speeds = self.speeds(inertia)
+        except ModelError:
+            return np.inf
+        return float((speeds.max() - speeds.min()) / self.speed)
+
+    def least_inertia(self, degree: float) -> float:
+        """Return the least inertia beside pistons and rods for a degree of irregularity [kg m2] (T3).
+
+        Zero where none is needed. The degree falls as the inertia grows.
+        """
+        if self.irregularity(0.0) <= degree:
+            return 0.0
+        enough = float(np.ptp(self.work)) / (degree * self.speed**2) + float(np.ptp(self.inertia)) / degree
+        while self.irregularity(enough) > degree:
+            enough *= 2.0
+        return rising_root(lambda inertia: degree - self.irregularity(inertia), 0.0, enough)
+
+
+def swing_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Swing:
+    """Return work and inertia over the cycle; rotors, mounts and flywheel are not part of them."""
+    bare = replace(engine, rotors=(), mounts=(), bearings=(), flywheel=None, extras=(), geared=())
+    return _found_swing(bare, point, fidelity)
+
+
+@lru_cache(maxsize=64)
+def _found_swing(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Swing:
+    torque, steps = gas_torque(engine, point, fidelity), FINE_SPEED * fidelity.samples
+    angles = engine.cycle.angle * np.arange(steps) / steps
+    work = torque.integral
+    mean, (steady, bent) = float(torque.coefficients[0].real), (angles, torque.bends)
+    own, own_bent = (moving_inertia(engine, fidelity, at)[0] for at in (steady, bent))
+    return Swing(point.speed, mean, work.sample(steps), own, work.values(bent), own_bent)
+
+
+def irregularity(engine: Engine, point: OperatingPoint, inertia: float, fidelity: Fidelity = EXACT) -> float:
+    """Return the degree of irregularity with an inertia beside pistons and rods [kg m2] (T3)."""
+    return swing_of(engine, point, fidelity).irregularity(inertia)
+
+
+_STEPS = 1024
+
+
+def reduced_inertia(part: SliderCrank) -> float:
+    """Return the mean inertia of piston, rod and pin mass reduced to the crank [kg m2] (V1; textbook 2.9).
+
+    With a long rod half the reciprocating mass at the crank radius.
+    """
+    return _reduced_inertia(replace(part, name="", x=0.0, throw=part.bank, firing_angle=0.0))
+
+
+@lru_cache(maxsize=256)
+def _reduced_inertia(part: SliderCrank) -> float:
+    inertia, _ = reduced(part.motion(np, 2.0 * math.pi * np.arange(_STEPS) / _STEPS))
+    return part.rotating_mass * part.crank_radius**2 + float(np.mean(inertia * np.ones(_STEPS)))
+
+
+def turning_inertia(engine: Engine, fidelity: Fidelity) -> float | None:
+    """Return the inertia beside pistons and rods [kg m2]: of uneven speed, flywheel or extension; else None.
+
+    None where none of these is told.
+    """
+    if fidelity.is_uneven:
+        return fidelity.crank_inertia
+    if engine.flywheel is not None:
+        return engine.flywheel.inertia
+    told = (extra.turning_inertia(engine.slider_cranks) for extra in engine.extras)
+    return next((inertia for inertia in told if inertia is not None), None)

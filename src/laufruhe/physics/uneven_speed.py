@@ -17,13 +17,13 @@ import numpy as np
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine, OperatingPoint, Rotor, SliderCrank
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.spectrum import Spectrum, bent_spectrum, spectrum_of
-from laufruhe.numerics.turns import as_turn, cis
+from laufruhe.numerics.exact_angles import as_turn, cis
+from laufruhe.numerics.spectrum import Spectrum, spectrum_of, spectrum_with_kinks
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.gas_loads import gas_loads
 from laufruhe.physics.geared_inertia import geared_factor
 from laufruhe.physics.mechanism import cylinder_wrench, reduced
-from laufruhe.physics.wrench import ROLL, plane_wrench
+from laufruhe.physics.rigid_body import ROLL, plane_wrench
 
 _ROUNDS = 60
 _CONVERGED = 1e-14
@@ -56,9 +56,9 @@ class _Turning:
     @property
     def bends(self) -> Array:
         """Times of kinks of the gas torque, and so of the acceleration."""
-        if self.torque.corners is None:
+        if self.torque.kinks is None:
             return np.zeros(0)
-        angles, shift = self.torque.corners.angles, self.pace.integral
+        angles, shift = self.torque.kinks.angles, self.pace.integral
         return np.asarray(angles + shift.values(angles) - shift.values(np.zeros(1)))
 
     def at(self, times: Array) -> CrankMotion:
@@ -68,7 +68,7 @@ class _Turning:
     def loads(self, wrench: Callable[[CrankMotion], Array]) -> Spectrum:
         """Return the loads (n, 6) of a wrench that follows from the motion (F5), in orders of the mean speed."""
         steps, bends = self.fidelity.samples, self.bends
-        return bent_spectrum(lambda times: wrench(self.at(times)), steps, self.torque.base, bends, len(bends))
+        return spectrum_with_kinks(lambda times: wrench(self.at(times)), steps, self.torque.base, bends, len(bends))
 
 
 def crank_motion(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> CrankMotion:

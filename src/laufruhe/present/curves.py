@@ -13,10 +13,10 @@ from laufruhe.machine import Chambers, Engine, OperatingPoint, SliderCrank
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.physics.cylinder_volume import swept_volume
+from laufruhe.physics.rigid_body import turning_parts
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.physics.speed_map import speed_map, split_loads
 from laufruhe.physics.working_chambers import chamber_pressure, chambers_thrust
-from laufruhe.physics.wrench import turning_parts
 from laufruhe.present.measures import hardest_point, has_loads
 from laufruhe.present.mounting import critical_speed, excited_frequencies, facts_of, main_order
 from laufruhe.problem.channels import mounting_in

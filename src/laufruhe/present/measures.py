@@ -10,7 +10,7 @@ from laufruhe.machine import Chambers
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.spectrum import Spectrum, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
-from laufruhe.physics.reduced_inertia import turning_inertia
+from laufruhe.physics.torque import turning_inertia
 from laufruhe.problem.channels import (
     CHANNELS,
     CRANK_PIN_FORCE,

@@ -15,20 +15,18 @@ from numpy.typing import NDArray
 
 from laufruhe.extension import extended
 from laufruhe.machine import Block, Engine, Flywheel, OperatingPoint, Role
+from laufruhe.machine.block import LoadCase
 from laufruhe.machine.clearances import Span, distances, reaches
-from laufruhe.machine.load_case import LoadCase
 from laufruhe.numerics.norms import MEAN, NORMS
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics import bearing_loads as bearings
 from laufruhe.physics import mount_numbers
-from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.elastic_mounts import ElasticMounting, elastic_mounting
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.irregularity import Swing, swing_of
 from laufruhe.physics.modes import MOTIONS
 from laufruhe.physics.mount_forces import rigid_mounting
-from laufruhe.physics.reduced_inertia import turning_inertia
 from laufruhe.physics.static_cases import settled
+from laufruhe.physics.torque import Swing, crank_torque, swing_of, turning_inertia
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 

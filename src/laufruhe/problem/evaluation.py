@@ -16,7 +16,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import NORMS, lengths
 from laufruhe.numerics.spectrum import Spectrum, common_base, times
 from laufruhe.physics.fidelity import EXACT, Fidelity
-from laufruhe.physics.metrics import CycleMeasures, cycle_measures
+from laufruhe.physics.mount_forces import CycleMeasures, cycle_measures
 from laufruhe.physics.mounting import mounting_of, travel_of
 from laufruhe.physics.shaking_loads import shaking_loads
 from laufruhe.problem.channels import MOUNT_FORCE, LoadChannel, NumberChannel

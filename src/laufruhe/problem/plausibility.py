@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from laufruhe.errors import Complaint
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.machine.mount import every_spring
-from laufruhe.numerics.turns import as_turn, within
+from laufruhe.numerics.exact_angles import as_turn, within
 from laufruhe.units import shown
 
 FASTEST = 30.0

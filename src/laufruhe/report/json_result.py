@@ -12,9 +12,9 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.balance_factor import balance_factors
 from laufruhe.physics.modes import MOTIONS
+from laufruhe.physics.rigid_body import WRENCH
 from laufruhe.physics.static_cases import settled
 from laufruhe.physics.torque import torque_facts
-from laufruhe.physics.wrench import WRENCH
 from laufruhe.present.measures import is_met, limits_of, moment_orders, mount_orders, places_of, shaking_orders
 from laufruhe.present.mounting import facts_of, is_elastic
 from laufruhe.problem.channels import LoadChannel, mounting_in

@@ -16,11 +16,9 @@ import numpy as np
 from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.processes import run_concurrently
-from laufruhe.physics.bearing_wear import wear_of
+from laufruhe.physics.bearing_loads import wear_of
 from laufruhe.physics.fidelity import Fidelity
-from laufruhe.physics.irregularity import swing_of
-from laufruhe.physics.reduced_inertia import turning_inertia
-from laufruhe.physics.torque import torque_parts
+from laufruhe.physics.torque import swing_of, torque_parts, turning_inertia
 from laufruhe.physics.willans import FrictionTest
 from laufruhe.present.curves import (
     KINDS,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from laufruhe.numerics.turns import as_turn, within
+from laufruhe.numerics.exact_angles import as_turn, within
 from laufruhe.present.measures import breaks_a_limit, has_firing, is_changed
 from laufruhe.present.numbers import figure, number, percent, share, trimmed
 from laufruhe.present.static_load import static_sentence

@@ -22,7 +22,7 @@ from laufruhe.numerics.budget import passed
 from laufruhe.numerics.workers import SERIAL, working_on
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import forget, shaking_loads
-from laufruhe.physics.time_mounting import TimeMounting, viscous_forces
+from laufruhe.physics.steady_state import TimeMounting, viscous_forces
 from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value

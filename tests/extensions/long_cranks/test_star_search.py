@@ -16,8 +16,7 @@ from laufruhe.extensions.long_cranks.throw_halves import Free, Window, meeting, 
 from laufruhe.load_models.amplitudes import AmplitudeTerm
 from laufruhe.machine.layouts import inline
 from laufruhe.numerics.workers import SERIAL, working_on
-from laufruhe.physics.crank_stars import star_sums
-from laufruhe.physics.star_space import StarSpace, outside_in
+from laufruhe.physics.crank_stars import StarSpace, outside_in, star_sums
 from laufruhe.solvers.stars.enumeration import enumerate_stars
 
 NONE = (0.0,) * 4

@@ -13,7 +13,7 @@ from laufruhe.cli import app
 from laufruhe.errors import InputError
 from laufruhe.extensions.robust.tolerance import Law, Scope, tolerances_of, with_errors
 from laufruhe.files.reader import load
-from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
+from laufruhe.machine.rotor import grade_of, permitted_unbalance
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from problem_files import FOUR, MOUNTS, PROBLEMS, changed, shaft

@@ -15,14 +15,13 @@ from laufruhe.errors import InputError, ModelError
 from laufruhe.extensions.rotary.unit import RotaryUnit
 from laufruhe.files.reader import load_tables
 from laufruhe.machine import Engine, OperatingPoint, PressureTrace, Seiliger, Wiebe
-from laufruhe.numerics.turns import cis
+from laufruhe.numerics.exact_angles import cis
 from laufruhe.physics.bearing_loads import main_bearing_forces, pin_forces
 from laufruhe.physics.cylinder_volume import chamber_volume
 from laufruhe.physics.fidelity import EXACT
 from laufruhe.physics.gas_cycle import pressure_at
-from laufruhe.physics.irregularity import swing_of
 from laufruhe.physics.shaking_loads import shaking_loads
-from laufruhe.physics.torque import crank_torque
+from laufruhe.physics.torque import crank_torque, swing_of
 from laufruhe.physics.uneven_speed import crank_motion
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem

@@ -15,8 +15,8 @@ from laufruhe.extensions.sizes import strength
 from laufruhe.extensions.sizes.machine import Bolts, PistonPin, RunningGear, Shank, Webs, moving_of, resized
 from laufruhe.machine import Bearing, Engine, OperatingPoint
 from laufruhe.physics.bearing_loads import pin_forces, piston_pin_forces
-from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT
+from laufruhe.physics.torque import crank_torque
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import MEASURES, Limit, Measure

@@ -27,9 +27,8 @@ from laufruhe.extensions.torsion.physics import (
     vector_sums,
 )
 from laufruhe.machine import Engine, OperatingPoint, SliderCrank
-from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import EXACT
-from laufruhe.physics.reduced_inertia import reduced_inertia
+from laufruhe.physics.torque import crank_torque, reduced_inertia
 from laufruhe.physics.uneven_speed import moving_inertia
 from problem_files import PROBLEMS
 

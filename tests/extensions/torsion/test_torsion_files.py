@@ -13,7 +13,7 @@ from laufruhe.errors import InputError
 from laufruhe.extensions.torsion.machine import Torsion, stiffness_of
 from laufruhe.extensions.torsion.physics import chain_of
 from laufruhe.files.reader import load_tables, tables_of
-from laufruhe.physics.reduced_inertia import reduced_inertia
+from laufruhe.physics.torque import reduced_inertia
 from laufruhe.problem.problem import Problem
 from problem_files import PROBLEMS
 

@@ -23,8 +23,7 @@ from laufruhe.machine import Role
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.norms import Grid, Norm
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.crank_stars import Stars, phase_waves, star_sums
-from laufruhe.physics.star_space import StarSpace
+from laufruhe.physics.crank_stars import Stars, StarSpace, phase_waves, star_sums
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
 from laufruhe.problem.measure import Measure, bends_of, load_rows

@@ -22,8 +22,7 @@ from laufruhe.numerics.arrays import Array, Indices
 from laufruhe.numerics.budget import in_time, limited, passed
 from laufruhe.numerics.progress import report_progress
 from laufruhe.numerics.workers import SERIAL, executor_for, unordered_map, worker_count
-from laufruhe.physics.crank_stars import Stars
-from laufruhe.physics.star_space import StarSpace
+from laufruhe.physics.crank_stars import Stars, StarSpace
 from laufruhe.solvers.stars.enumeration import SLACK, BestStars, StarSearchResult
 
 WORTH_SHARING = 20_000_000

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices
-from laufruhe.physics.crank_stars import Stars, phase_waves
-from laufruhe.physics.star_space import StarSpace
+from laufruhe.physics.crank_stars import Stars, StarSpace, phase_waves
 
 Counts = NDArray[np.uint8]
 _AT_ONCE = 1 << 19

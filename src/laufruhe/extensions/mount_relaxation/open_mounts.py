@@ -25,7 +25,7 @@ from laufruhe.extensions.mount_relaxation.parameter_maps import (
 from laufruhe.machine.mount import every_spring
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.namespaces import NUMBERS
-from laufruhe.physics.dynamic_springs import DynamicSprings
+from laufruhe.physics.elastic_mounts import DynamicSprings
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import carried, point_motion
 from laufruhe.problem.channels import mounting_in

@@ -15,7 +15,7 @@ import numpy as np
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts
 from laufruhe.extensions.mount_relaxation.parameter_maps import PlaceTerm, SpringTerm
 from laufruhe.numerics.arrays import Array, ComplexArray
-from laufruhe.physics.dynamic_springs import DynamicSprings
+from laufruhe.physics.elastic_mounts import DynamicSprings
 
 # share of the largest of its kind that counts as no difference
 SAME = 1e-12

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.machine.layouts import stations
-from laufruhe.physics.bearing_shares import lever_shares
+from laufruhe.physics.bearing_loads import lever_shares
 from laufruhe.physics.elastic_mounts import single_transmissibility
 from laufruhe.physics.modes import GRAVITY, sag_for_critical_speed, sag_frequency
 from laufruhe.studies.text import NEGLIGIBLE, NOTICEABLE

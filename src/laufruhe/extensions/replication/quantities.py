@@ -13,8 +13,8 @@ from laufruhe.extensions.replication.expressions import check_among
 from laufruhe.files import fields as f
 from laufruhe.files.measures import QuantityTable, Scene
 from laufruhe.numerics.spectrum import order_amplitude
-from laufruhe.physics.metrics import turning_parts
 from laufruhe.physics.modes import MOTIONS
+from laufruhe.physics.mount_forces import turning_amplitudes
 from laufruhe.problem.channels import CHANNELS, mounting_in
 from laufruhe.problem.evaluation import measured, samples_of
 from laufruhe.problem.measure import MEASURES, Measure
@@ -122,7 +122,7 @@ def _by_order(part: slice, result: Result, table: AskedTable) -> Labelled:
 
 def _turning(part: slice, result: Result, table: AskedTable) -> Labelled:
     orders = table.orders or ORDERS
-    values = [list(turning_parts(*result.final.loads[0].wrench.at(order)[part][-2:])) for order in orders]
+    values = [list(turning_amplitudes(*result.final.loads[0].wrench.at(order)[part][-2:])) for order in orders]
     return Labelled(values, {"order": list(orders), "turns": ["with the crank", "against the crank"]})
 
 

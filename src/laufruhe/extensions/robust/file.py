@@ -33,7 +33,7 @@ from laufruhe.files.fields import Table
 from laufruhe.files.problem_file import Given, Key, Note
 from laufruhe.files.rotors import name_of_unbalance
 from laufruhe.machine import Engine, Rotor
-from laufruhe.machine.balance_grade import grade_of, permitted_unbalance
+from laufruhe.machine.rotor import grade_of, permitted_unbalance
 from laufruhe.machine.slider_crank import SliderCrank
 from laufruhe.problem.problem import Path, Problem
 

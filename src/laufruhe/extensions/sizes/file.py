@@ -32,7 +32,7 @@ from laufruhe.files.problem_file import Given, Key
 from laufruhe.files.rotors import check_factors
 from laufruhe.machine import CRANKSHAFT, Bearing, SliderCrank
 from laufruhe.machine.layouts import Throw
-from laufruhe.numerics.turns import as_turn, cis
+from laufruhe.numerics.exact_angles import as_turn, cis
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
 from laufruhe.problem.problem import Problem
 

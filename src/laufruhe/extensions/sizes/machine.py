@@ -14,9 +14,8 @@ from typing import Any, ClassVar, Self, TypeAlias
 
 from laufruhe.errors import ModelError
 from laufruhe.machine import Engine
-from laufruhe.machine.bearing import Bearing
 from laufruhe.machine.extra import Extra
-from laufruhe.machine.rotor import Rotor
+from laufruhe.machine.rotor import Bearing, Rotor
 from laufruhe.machine.slider_crank import SliderCrank
 
 Size: TypeAlias = tuple[str, str]

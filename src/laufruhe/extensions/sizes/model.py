@@ -262,7 +262,7 @@ class SizeModel:
 def _unswept(signals: Sequence[Spectrum], angles: Array, beside: float) -> Mask:
     """Angles that no bend of a signal at several lengths passes, nor comes as near as `beside`, on the way."""
     period = signals[0].period
-    own = [np.zeros(0) if each.corners is None else each.corners.angles for each in signals]
+    own = [np.zeros(0) if each.kinks is None else each.kinks.angles for each in signals]
     if len({len(each) for each in own}) > 1:
         raise ValueError("a load has other bends at another length of the rod")
     # what stands at zero may be told as a whole period

@@ -30,9 +30,9 @@ from laufruhe.machine import CRANKSHAFT, Bearing, Engine, OperatingPoint, Slider
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.bearing_loads import crank_forces, pin_forces
-from laufruhe.physics.crank_torque import crank_torque
 from laufruhe.physics.fidelity import Fidelity
 from laufruhe.physics.shaking_loads import rotor_loads
+from laufruhe.physics.torque import crank_torque
 
 T = TypeVar("T")
 

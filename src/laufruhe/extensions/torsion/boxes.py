@@ -24,7 +24,7 @@ from laufruhe.extensions.torsion.machine import Torsion
 from laufruhe.extensions.torsion.physics import Resonance, dynamic_stiffness, inertias, receptances, throw_torques
 from laufruhe.machine import Flywheel
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices
-from laufruhe.physics.reduced_inertia import turning_inertia
+from laufruhe.physics.torque import turning_inertia
 from laufruhe.problem.dependence import depends, falls_with_flywheel
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
@@ -36,7 +36,7 @@ from laufruhe.prove.mounts.ranges import SLACK
 
 # orders whose share of the squares is less, in the middle of the bounds and at their corners, are left out
 LEAST_SHARE = 1e-10
-MOST_CORNERS = 16
+MOST_SIGNAL_KINKS = 16
 _SAME = 1e-9
 
 
@@ -168,7 +168,7 @@ class TwistBoxes:
         own, speed = self.coordinates, loads.point.speed
         torques = throw_torques(self.problem.engine, loads.point, loads.fidelity)
         middle = 0.5 * (own.lower + own.upper)
-        corners = itertools.islice(itertools.product(*zip(own.lower, own.upper, strict=True)), MOST_CORNERS)
+        corners = itertools.islice(itertools.product(*zip(own.lower, own.upper, strict=True)), MOST_SIGNAL_KINKS)
         kept = np.zeros(len(torques.orders), dtype=bool)
         for x in (middle, *map(np.array, corners)):
             try:

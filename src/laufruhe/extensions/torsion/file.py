@@ -18,7 +18,7 @@ from laufruhe.files.nested import Place
 from laufruhe.files.problem_file import Given, Key
 from laufruhe.machine import CRANKSHAFT, SliderCrank
 from laufruhe.machine.layouts import Throw
-from laufruhe.physics.reduced_inertia import reduced_inertia
+from laufruhe.physics.torque import reduced_inertia
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
 from laufruhe.problem.problem import Problem
 

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 from laufruhe.errors import ModelError
 from laufruhe.machine import SliderCrank
 from laufruhe.machine.extra import Extra
-from laufruhe.physics.reduced_inertia import reduced_inertia
+from laufruhe.physics.torque import reduced_inertia
 from laufruhe.problem.decision import Kind
 
 TORSION = Kind(8, "torsion", "discs and shafts of the crankshaft", is_alone=True)

@@ -22,10 +22,10 @@ from laufruhe.errors import ModelError
 from laufruhe.extensions.torsion.machine import Absorber, Torsion
 from laufruhe.machine import CRANKSHAFT, Cycle, Engine, OperatingPoint, SliderCrank
 from laufruhe.numerics.arrays import Array, ComplexArray
+from laufruhe.numerics.exact_angles import as_turn, phasors
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.numerics.turns import as_turn, phasors
-from laufruhe.physics.crank_torque import cylinder_torque
 from laufruhe.physics.fidelity import EXACT, Fidelity
+from laufruhe.physics.torque import cylinder_torque
 
 Factors: TypeAlias = Callable[[Torsion, Array, float], ComplexArray]
 """Of a chain, by order [1] and speed [rad/s] what each section makes of its twist, shape (orders, sections)."""

@@ -13,7 +13,7 @@ from laufruhe.machine.engine import Cycle
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.rotor import CRANKSHAFT, Role, Rotor, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
-from laufruhe.numerics.turns import SAME_TURN, Turn, angle_of, as_turn, cis, within
+from laufruhe.numerics.exact_angles import SAME_TURN, Turn, angle_of, as_turn, cis, within
 
 
 @dataclass(frozen=True)

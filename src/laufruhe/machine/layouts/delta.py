@@ -15,7 +15,7 @@ from laufruhe.machine.layouts.build import Throw
 from laufruhe.machine.layouts.places import Layout, stations
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
 from laufruhe.machine.slider_crank import SliderCrank
-from laufruhe.numerics.turns import Turn, angle_of, as_turn, cis, within
+from laufruhe.numerics.exact_angles import Turn, angle_of, as_turn, cis, within
 
 
 @dataclass(frozen=True)

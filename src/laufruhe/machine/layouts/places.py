@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from laufruhe.errors import ModelError
-from laufruhe.numerics.turns import Turn, as_turn
+from laufruhe.numerics.exact_angles import Turn, as_turn
 
 
 @dataclass(frozen=True)

@@ -313,17 +313,17 @@ def mean_square(signal: Spectrum) -> Array:
     power = 0.5 * np.sum(np.abs(c) ** 2, axis=(0, 2))
     # the steady part does not alternate
     own = power - 0.5 * np.sum(np.abs(c[0]) ** 2, axis=-1) + np.sum(c[0].real ** 2, axis=-1)
-    if signal.corners is None:
+    if signal.kinks is None:
         return np.asarray(own)
-    return np.asarray(own + lengths(signal.corners.beyond(len(c), float(signal.base))[1]) ** 2)
+    return np.asarray(own + lengths(signal.kinks.beyond(len(c), float(signal.base))[1]) ** 2)
 
 
 def amplitudes(signal: Spectrum) -> Array:
     """Return the sum of the orders' amplitudes at every place, an upper bound of the signal, shape (places,)."""
     own = order_amplitude(signal.coefficients).sum(axis=0)
-    if signal.corners is None:
+    if signal.kinks is None:
         return np.asarray(own)
-    return np.asarray(own + lengths(signal.corners.beyond(len(signal.coefficients), float(signal.base))[0]))
+    return np.asarray(own + lengths(signal.kinks.beyond(len(signal.coefficients), float(signal.base))[0]))
 
 
 def curvature(signal: Spectrum) -> tuple[Array, Array]:
@@ -331,18 +331,18 @@ def curvature(signal: Spectrum) -> tuple[Array, Array]:
     smooth = signal.smooth
     bent = Spectrum(smooth.base, smooth.coefficients * (smooth.orders**2)[:, None, None])
     most, mean = amplitudes(bent), np.sqrt(mean_square(bent))
-    if signal.corners is None:
+    if signal.kinks is None:
         return most, mean
-    size = lengths(signal.corners.curvature(signal.period))
-    bends = lengths(np.abs(signal.corners.jumps[:, 1]).sum(axis=0)) / signal.period
+    size = lengths(signal.kinks.curvature(signal.period))
+    bends = lengths(np.abs(signal.kinks.jumps[:, 1]).sum(axis=0)) / signal.period
     return most + size.max(axis=0), mean + size.mean(axis=0) + bends
 
 
 def jumped(signal: Spectrum) -> Array:
     """Return the sum of the signal's own jumps over its period, shape (places,)."""
-    if signal.corners is None:
+    if signal.kinks is None:
         return np.zeros(signal.coefficients.shape[1])
-    return lengths(np.abs(signal.corners.jumps[:, 0]).sum(axis=0)) / signal.period
+    return lengths(np.abs(signal.kinks.jumps[:, 0]).sum(axis=0)) / signal.period
 
 
 def fine_lengths(signal: Spectrum, steps: int, times: int) -> tuple[Array, float]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.numerics.balls import smallest_balls
+from laufruhe.numerics.enclosing_ball import enclosing_balls
 from laufruhe.numerics.norms.maximum import in_place
 from laufruhe.numerics.norms.norm import (  # fmt: skip
     MOST_KINKS,
@@ -50,13 +50,13 @@ class PeakToPeak(Norm):
 
     def values(self, grid: Grid, many: Array) -> Array:
         """Return the largest diameter of each of many signals."""
-        balls = smallest_balls(_signals(many, grid.steps))
+        balls = enclosing_balls(_signals(many, grid.steps))
         return np.asarray(2.0 * balls.radii.reshape(len(many), -1).max(axis=1, initial=0.0))
 
     def subgradient(self, grid: Grid, rows: Array) -> Array:
         """Return radii to the points that hold the largest ball, by their shares of its centre."""
         z = np.zeros_like(rows)
-        balls = smallest_balls(_signals(rows, grid.steps))
+        balls = enclosing_balls(_signals(rows, grid.steps))
         if balls.radii.max(initial=0.0) > 0.0:
             largest = int(np.argmax(balls.radii))
             at, shares = largest * grid.steps + balls.held[largest], balls.shares[largest]
@@ -69,7 +69,7 @@ class PeakToPeak(Norm):
 
         No more points than directions and one have shares of their own; all others are mixtures of these.
         """
-        balls, found = smallest_balls(_signals(rows, grid.steps)), list[Array]()
+        balls, found = enclosing_balls(_signals(rows, grid.steps)), list[Array]()
         largest = float(balls.radii.max(initial=0.0))
         for k in np.flatnonzero(balls.radii >= (1.0 - TOUCHES) * largest) if largest else ():
             first = int(k) * grid.steps
@@ -188,4 +188,4 @@ def _reach(steps: Array, bent: Array) -> float:
 
 
 def _diameter(signals: Array) -> float:
-    return float(2.0 * smallest_balls(signals).radii.max(initial=0.0))
+    return float(2.0 * enclosing_balls(signals).radii.max(initial=0.0))

@@ -116,7 +116,7 @@ class RootMeanQuad(Norm):
             series = signal.series
             sampled += share * float((lengths(series.sample(steps)) ** 4).mean())
             exact += share * float((lengths(series.sample(4 * len(series.coefficients) + 1)) ** 4).mean())
-            if signal.corners is not None:
-                sums, roots = map(lengths, signal.corners.beyond(len(signal.coefficients), float(signal.base)))
+            if signal.kinks is not None:
+                sums, roots = map(lengths, signal.kinks.beyond(len(signal.coefficients), float(signal.base)))
                 beyond += share * float((sums**2 * roots**2).mean())
         return float(abs(sampled**0.25 - exact**0.25) + beyond**0.25)

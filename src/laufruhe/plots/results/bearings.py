@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from laufruhe.physics.bearing_wear import wear_of
+from laufruhe.physics.bearing_loads import wear_of
 from laufruhe.plots.style import (
     ORANGE,
     Series,

@@ -13,9 +13,7 @@ from matplotlib.ticker import MultipleLocator
 
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum
-from laufruhe.physics.irregularity import swing_of
-from laufruhe.physics.reduced_inertia import turning_inertia
-from laufruhe.physics.torque import TorqueFacts, torque_facts, torque_parts
+from laufruhe.physics.torque import TorqueFacts, swing_of, torque_facts, torque_parts, turning_inertia
 from laufruhe.plots.style import GREEN, ORANGE, PALE, SKY, Series, entry, finish_page, page, series_of, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, in_thousands, round_ticks
 from laufruhe.present.measures import asks_torque, has_loads

@@ -20,8 +20,7 @@ from laufruhe.load_models.led_model import LedModel, carried
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import curvature
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
-from laufruhe.physics.irregularity import FINE
-from laufruhe.physics.reduced_inertia import turning_inertia
+from laufruhe.physics.torque import FINE_SPEED, turning_inertia
 from laufruhe.physics.uneven_speed import gas_torque, moving_inertia, start_energy
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
@@ -45,7 +44,7 @@ class LeadSwing:
         if inertia is None:
             raise ModelError("degree of irregularity: the inertia of what turns is not told; add [flywheel]")
         self._start, self._turning = model.start, inertia
-        self._steps = FINE * fidelity.samples
+        self._steps = FINE_SPEED * fidelity.samples
         names = model.names
         engines = [
             carried(problem, test).engine for test in (lambda n: n not in names, *(name.__eq__ for name in names))

@@ -221,7 +221,7 @@ def least_on_arcs(
 def _bends(signal: Spectrum) -> list[tuple[Array, Array, Array]]:
     """Return angles of kinks, and jumps of slope and value there, for every place of a signal."""
     places = signal.coefficients.shape[1]
-    if signal.corners is None:
+    if signal.kinks is None:
         return [(np.zeros(0), np.zeros(0), np.zeros(0))] * places
-    jumps = signal.corners.jumps
-    return [(signal.corners.angles, lengths(jumps[:, 1, k]), lengths(jumps[:, 0, k])) for k in range(places)]
+    jumps = signal.kinks.jumps
+    return [(signal.kinks.angles, lengths(jumps[:, 1, k]), lengths(jumps[:, 0, k])) for k in range(places)]

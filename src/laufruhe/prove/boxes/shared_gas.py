@@ -28,8 +28,8 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid, lengths
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.mounting import mounting_of
+from laufruhe.physics.rigid_body import ROLL
 from laufruhe.physics.seiliger_cycle import seiliger_cut_off
-from laufruhe.physics.wrench import ROLL
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Measure, load_rows, selected

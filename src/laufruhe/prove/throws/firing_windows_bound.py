@@ -17,8 +17,7 @@ import numpy as np
 from laufruhe.load_models.amplitudes import AmplitudeObjective, directions
 from laufruhe.machine.firing import firing_lattice
 from laufruhe.numerics.arrays import Array
-from laufruhe.physics.crank_stars import Stars
-from laufruhe.physics.star_space import StarSpace
+from laufruhe.physics.crank_stars import Stars, StarSpace
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Intervals
 from laufruhe.problem.problem import Phasing, Problem

@@ -9,8 +9,7 @@ import numpy as np
 
 from laufruhe.load_models.star_model import StarProblem
 from laufruhe.numerics.arrays import Array, Mask
-from laufruhe.physics.crank_stars import Stars
-from laufruhe.physics.star_space import StarSpace
+from laufruhe.physics.crank_stars import Stars, StarSpace
 from laufruhe.problem.decision import Domain
 from laufruhe.prove.certificate import ROUNDING, Multipliers
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from laufruhe.physics.metrics import CycleMeasures
+from laufruhe.physics.mount_forces import CycleMeasures
 from laufruhe.present.measures import Places, evaluations_with_loads, places_of
 from laufruhe.present.numbers import DASH, number, percent
 from laufruhe.present.tables import Table

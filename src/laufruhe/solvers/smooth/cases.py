@@ -10,7 +10,7 @@ import numpy as np
 
 from laufruhe.load_models.mount_symbols import SymbolicMounts, elimination
 from laufruhe.machine import Engine
-from laufruhe.machine.load_case import LoadCase
+from laufruhe.machine.block import LoadCase
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.elastic_mounts import ElasticMounting
 from laufruhe.physics.static_cases import case_wrench, settled, stops_of

@@ -17,8 +17,7 @@ from laufruhe.load_models.star_model import StarModel
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.progress import report_progress
-from laufruhe.physics.crank_stars import Stars
-from laufruhe.physics.star_space import StarSpace
+from laufruhe.physics.crank_stars import Stars, StarSpace
 from laufruhe.prove.certificate import room_of
 from laufruhe.prove.throws.star_cuts import Cut
 from laufruhe.solvers.stars.star_program import Solved, shaft_owners, solve_design

@@ -11,8 +11,7 @@ from laufruhe.load_models.pair_tables import PairObjective
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import report_progress
-from laufruhe.physics.crank_stars import Stars
-from laufruhe.physics.star_space import StarSpace
+from laufruhe.physics.crank_stars import Stars, StarSpace
 
 SLACK = 1e-9
 """Share by which a value is no better than another."""

@@ -13,8 +13,7 @@ from laufruhe.load_models.firing_model import FiringModel, slot_space
 from laufruhe.load_models.star_model import StarModel
 from laufruhe.machine.firing import even_patterns, firing_lattice, order_slots
 from laufruhe.machine.layouts import Layout, even_throws
-from laufruhe.physics.crank_stars import Stars
-from laufruhe.physics.star_space import StarSpace
+from laufruhe.physics.crank_stars import Stars, StarSpace
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.machine import firing
-from laufruhe.numerics.turns import as_turn, star_sum
+from laufruhe.numerics.exact_angles import as_turn, star_sum
 from laufruhe.problem.phasing import Candidate, Intervals, OrderCriterion
 from laufruhe.problem.problem import Phasing, Problem
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from laufruhe.numerics.norms import NORMS
-from laufruhe.physics.reduced_inertia import turning_inertia
+from laufruhe.physics.torque import turning_inertia
 from laufruhe.problem.channels import STORED_WORK
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit, Measure, Term

@@ -18,7 +18,7 @@ from laufruhe.errors import ModelError
 from laufruhe.load_models.amplitudes import amplitude_objective
 from laufruhe.machine.firing import firing_turns, from_one, intervals_of
 from laufruhe.machine.firing_slots import FiringPattern, FiringSlots
-from laufruhe.numerics.turns import angle_of
+from laufruhe.numerics.exact_angles import angle_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import SOONEST, Candidate, Intervals, OrderCriterion, bounded_stars
 from laufruhe.problem.problem import Phasing

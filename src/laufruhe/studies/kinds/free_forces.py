@@ -22,7 +22,7 @@ from laufruhe.files.fields import Table
 from laufruhe.files.study_tables import CaseTable
 from laufruhe.machine import Engine, SliderCrank
 from laufruhe.numerics.spectrum import order_amplitude
-from laufruhe.physics.metrics import turning_parts
+from laufruhe.physics.mount_forces import turning_amplitudes
 from laufruhe.physics.order_coefficients import piston_acceleration_orders
 from laufruhe.physics.shaking_loads import reciprocating_loads
 from laufruhe.present import picture as p
@@ -70,7 +70,7 @@ def free_load(engine: Engine, order: int, spacing: float) -> FreeLoad:
     unit = part.reciprocating_mass * part.crank_radius * SPEED**2 * float(amplitude)
     load = reciprocating_loads(engine, SPEED).at(order)
     force, couple = load[1:3] / unit, load[4:6] / (unit * spacing)
-    (_, force_against), (_, couple_against) = turning_parts(*force), turning_parts(*couple)
+    (_, force_against), (_, couple_against) = turning_amplitudes(*force), turning_amplitudes(*couple)
     return FreeLoad(float(order_amplitude(force)), float(order_amplitude(couple)), force_against, couple_against)
 
 

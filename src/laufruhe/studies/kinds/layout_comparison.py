@@ -15,7 +15,7 @@ from laufruhe.errors import InputError, ModelError
 from laufruhe.files import fields as f
 from laufruhe.files.measures import QuantityName, QuantityTable, Scene
 from laufruhe.files.study_tables import CaseTable
-from laufruhe.physics.irregularity import swing_of
+from laufruhe.physics.torque import swing_of
 from laufruhe.present.picture import Picture
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import MEASURES, Measure

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from laufruhe.numerics.balls import smallest_balls
+from laufruhe.numerics.enclosing_ball import enclosing_balls
 
 
 def sets_of(kind: str, d: int) -> np.ndarray:
@@ -28,7 +28,7 @@ def sets_of(kind: str, d: int) -> np.ndarray:
 def test_a_ball_holds_all_and_has_its_centre_between_points_on_it(kind: str, d: int) -> None:
     """Both together show that none is smaller."""
     points = sets_of(kind, d)
-    balls, size = smallest_balls(points), np.abs(points).max(axis=(1, 2))
+    balls, size = enclosing_balls(points), np.abs(points).max(axis=(1, 2))
     rows = np.arange(len(points))[:, None]
     held = points[rows, balls.held]
     apart = np.linalg.norm(points - balls.centres[:, None], axis=2).max(axis=1)
@@ -44,10 +44,10 @@ def test_a_ball_holds_all_and_has_its_centre_between_points_on_it(kind: str, d: 
 
 def test_many_together_are_as_one_by_one() -> None:
     points = sets_of("anywhere", 3)
-    alone = [smallest_balls(each[None]).radii[0] for each in points]
-    np.testing.assert_allclose(smallest_balls(points).radii, alone, rtol=1e-14)
+    alone = [enclosing_balls(each[None]).radii[0] for each in points]
+    np.testing.assert_allclose(enclosing_balls(points).radii, alone, rtol=1e-14)
 
 
 def test_nothing_has_no_ball() -> None:
-    assert smallest_balls(np.zeros((0, 5, 3))).radii.shape == (0,)
-    np.testing.assert_array_equal(smallest_balls(np.zeros((2, 5, 3))).radii, 0.0)
+    assert enclosing_balls(np.zeros((0, 5, 3))).radii.shape == (0,)
+    np.testing.assert_array_equal(enclosing_balls(np.zeros((2, 5, 3))).radii, 0.0)

@@ -38,7 +38,7 @@ class Balls:
     shares: Array
 
 
-def smallest_balls(points: Array) -> Balls:
+def enclosing_balls(points: Array) -> Balls:
     """Return the smallest enclosing balls of points, shape (sets, k, d).
 
     The farthest point joins those that hold a ball, and the ball of these few is found by trying every choice of them

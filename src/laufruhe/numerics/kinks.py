@@ -1,6 +1,6 @@
 """Kinks of a periodic signal: angles at which its derivatives jump, in closed form (L5a).
 
-No sum of finitely many orders bends at an angle; it cuts the corner off. The function of period P
+No sum of finitely many orders bends at an angle; it rounds the kink off. The function of period P
 whose m-th derivative jumps by one at zero, and by nothing else anywhere, is a polynomial between its jumps,
 
     f_m(phi) = -P^m B_(m+1)(phi / P) / (m + 1)!,    c_j = (2 / P) / (i j b)^(m+1),    b = 2 pi / P,
@@ -26,7 +26,7 @@ DEGREES = 4
 """The value itself and as many derivatives but one, whose jumps are found."""
 SAME_ANGLE = 1e-10
 _WIDTH = 0.06
-"""Longest stretch beside a corner from which its derivatives are taken [rad]."""
+"""Longest stretch beside a kink from which its derivatives are taken [rad]."""
 _NODES = 6
 _PLACES = 0.5 - 0.5 * np.cos(math.pi * (np.arange(_NODES) + 0.5) / _NODES)
 # least stretch, and the degree of a polynomial whose coefficients it determines to enough digits
@@ -39,7 +39,7 @@ _BLOCK = 1 << 16
 
 
 @dataclass(frozen=True, eq=False)
-class Corners:
+class SignalKinks:
     """Jumps of the derivatives of a signal.
 
     Attributes
@@ -122,7 +122,7 @@ class Corners:
         steps = period * np.arange(_STEPS) / _STEPS
         return self.values(np.concatenate([steps, self.angles - SAME_ANGLE, self.angles + SAME_ANGLE]), period, 2)
 
-    def each(self, linear: Callable[[Array], Array]) -> Corners | None:
+    def each(self, linear: Callable[[Array], Array]) -> SignalKinks | None:
         """Return the kinks through a real linear map of values (n, ...), or None without any."""
         k, degrees = self.jumps.shape[:2]
         flat = np.asarray(linear(self.jumps.reshape(k * degrees, *self.jumps.shape[2:])))
@@ -134,34 +134,34 @@ class Corners:
         return type(self)(self.angles + by, np.concatenate([none, self.jumps], axis=1))
 
     @property
-    def derivative(self) -> Corners | None:
+    def derivative(self) -> SignalKinks | None:
         """Kinks of the derivative of a continuous signal."""
         return _left(self.angles, self.jumps[:, 1:])
 
-    def repeated(self, period: float, times: int) -> Corners | None:
+    def repeated(self, period: float, times: int) -> SignalKinks | None:
         """Return the kinks of the same signal counted over several of its periods."""
-        return joined([self.moved(k * period) for k in range(times)])
+        return join_kinks([self.moved(k * period) for k in range(times)])
 
-    def folded(self, period: float, times: int) -> Corners | None:
+    def folded(self, period: float, times: int) -> SignalKinks | None:
         """Return the kinks of a signal that repeats `times` within `period`, over its own period."""
-        return merged(_within(self.angles, period), self.jumps / times)
+        return merge_kinks(_within(self.angles, period), self.jumps / times)
 
-    def strongest(self, count: int) -> Corners | None:
+    def strongest(self, count: int) -> SignalKinks | None:
         """Return the `count` kinks that bend most over a degree."""
         steps = math.radians(1.0) ** np.arange(self.jumps.shape[1])
         size = np.einsum("km,m->k", np.abs(self.jumps).reshape(*self.jumps.shape[:2], -1).max(axis=2), steps)
         kept = np.sort(np.argsort(-size, kind="stable")[:count])
-        return merged(self.angles[kept], self.jumps[kept])
+        return merge_kinks(self.angles[kept], self.jumps[kept])
 
 
-def joined(parts: Sequence[Corners | None]) -> Corners | None:
+def join_kinks(parts: Sequence[SignalKinks | None]) -> SignalKinks | None:
     """Return the kinks of a sum of signals."""
-    found = [corners for corners in parts if corners is not None]
+    found = [kinks for kinks in parts if kinks is not None]
     if len(found) < 2:
         return found[0] if found else None
-    degrees = max(corners.jumps.shape[1] for corners in found)
-    jumps = [_pad(corners.jumps, degrees) for corners in found]
-    return merged(np.concatenate([corners.angles for corners in found]), np.concatenate(jumps))
+    degrees = max(kinks.jumps.shape[1] for kinks in found)
+    jumps = [_pad(kinks.jumps, degrees) for kinks in found]
+    return merge_kinks(np.concatenate([kinks.angles for kinks in found]), np.concatenate(jumps))
 
 
 def _pad(jumps: Array, degrees: int) -> Array:
@@ -170,7 +170,7 @@ def _pad(jumps: Array, degrees: int) -> Array:
     return out
 
 
-def merged(angles: Array, jumps: Array) -> Corners | None:
+def merge_kinks(angles: Array, jumps: Array) -> SignalKinks | None:
     """Merge kinks at equal angles; None if nothing is left."""
     _, first, inverse = np.unique(np.round(angles / SAME_ANGLE), return_index=True, return_inverse=True)
     total = np.zeros((len(first), *jumps.shape[1:]))
@@ -178,17 +178,17 @@ def merged(angles: Array, jumps: Array) -> Corners | None:
     return _left(angles[first], total)
 
 
-def _left(angles: Array, jumps: Array) -> Corners | None:
+def _left(angles: Array, jumps: Array) -> SignalKinks | None:
     used = jumps.reshape(len(jumps), -1).any(axis=1)
     if len(angles) and used.all():
-        return Corners(angles, jumps)
-    return Corners(angles[used], jumps[used]) if used.any() else None
+        return SignalKinks(angles, jumps)
+    return SignalKinks(angles[used], jumps[used]) if used.any() else None
 
 
-def found_corners(signal: Callable[[Array], Array], breaks: Array, period: float) -> Corners | None:
+def find_kinks(signal: Callable[[Array], Array], breaks: Array, period: float) -> SignalKinks | None:
     """Find the kinks of a function of the angle at the angles where its derivatives may jump.
 
-    The derivatives on either side are those of polynomials through values beside the corner.
+    The derivatives on either side are those of polynomials through values beside the kink.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def found_corners(signal: Callable[[Array], Array], breaks: Array, period: float
     at = at[np.unique(np.round(at / SAME_ANGLE), return_index=True)[1]]
     if not len(at):
         return None
-    # a stretch ends at the next corner
+    # a stretch ends at the next kink
     after = np.diff(at, append=at[0] + period)
     stretches = np.minimum(np.stack([after, np.roll(after, 1)], axis=1), _WIDTH)
     sides = np.array([1.0, -1.0])
@@ -221,7 +221,7 @@ def found_corners(signal: Callable[[Array], Array], breaks: Array, period: float
     jumps = found[:, 0] + found[:, 1]
     # polynomials meet to a rounding where nothing jumps
     jumps[:, 0] *= np.abs(jumps[:, 0]) > _MET * np.abs(values).max(initial=0.0)
-    return merged(at, jumps)
+    return merge_kinks(at, jumps)
 
 
 def _within(angles: Array, period: float) -> Array:

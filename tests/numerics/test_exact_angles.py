@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from laufruhe.numerics.turns import MAX_DENOMINATOR, angle_of, as_turn, cancelling_sums, cis, phasors, star_sum
+from laufruhe.numerics.exact_angles import MAX_DENOMINATOR, angle_of, as_turn, cancelling_sums, cis, phasors, star_sum
 
 EPS = float(np.finfo(float).eps)
 PARTS = st.builds(Fraction, st.integers(-60_000, 60_000), st.integers(1, MAX_DENOMINATOR))
