@@ -23,7 +23,7 @@ INDEPENDENT, BALANCED = 1e-3, 1e-2
 _SPARE = 1e-6
 ACTIVE = 1e-5
 """Share of a limit, and of the scale of a decision, by which it may be missed and be active."""
-MOST_VANISHING, _WAYS, MOST_SIGNAL_KINKS = 64, 8, 256
+MOST_VANISHING, _WAYS, MOST_CORNERS = 64, 8, 256
 """Rows that vanish of a number that is told, ways in which a segment stands for a disc, and corners of a hull."""
 
 
@@ -101,7 +101,7 @@ class Slopes:
 
         All rows of a signal of constant length are as long as the longest; a circle of 256 corners lacks 1e-4.
         """
-        step = -(-len(self.hull) // MOST_SIGNAL_KINKS)
+        step = -(-len(self.hull) // MOST_CORNERS)
         if step == 1:
             return self.hull
         ways = (self.hull - self.hull.mean(axis=0))[::step]

@@ -43,7 +43,7 @@ REACH, INSIDE = 1e-9, 1e-7
 # bisections of the slice that is cut off a side
 HALVINGS = 10
 # corners of a box from which feasible positions are sought
-MOST_SIGNAL_KINKS = 16
+MOST_CORNERS = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,7 +227,7 @@ class PlaceSearch(RebalancedSearch[_Box]):
         def slope(places: Array) -> Array:
             return np.asarray(2.0 * (places - middle) / width**2)
 
-        corners = [np.array(corner) for corner in islice(product(*sides), MOST_SIGNAL_KINKS)]
+        corners = [np.array(corner) for corner in islice(product(*sides), MOST_CORNERS)]
         feasible = []
         for start in (middle, *corners):
             end = minimize(distance, start, jac=slope, method="SLSQP", bounds=sides, constraints=[limits])
