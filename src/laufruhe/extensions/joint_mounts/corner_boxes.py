@@ -41,7 +41,7 @@ from laufruhe.prove.witness import Known, check_around
 
 MOST_OPEN = 5
 """Open numbers of mounts, whose corners and coefficients are 2 and 4 to their power."""
-MOST_SIGNAL_KINKS, ROWS = 1200, 7e6
+MOST_CORNERS, ROWS = 1200, 7e6
 """Corners whose multipliers are sought, and rows of all of them."""
 BOXES = 4
 """Boxes of three numbers or fewer, for each corner."""
@@ -129,7 +129,7 @@ class DesignBoxes:
     @property
     def most_corners(self) -> int:
         """As many as their rows allow."""
-        return int(min(MOST_SIGNAL_KINKS, ROWS / max(self.loads.rows, 1)))
+        return int(min(MOST_CORNERS, ROWS / max(self.loads.rows, 1)))
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         """Least objective on every box, and the side worth halving."""

@@ -36,7 +36,7 @@ from laufruhe.prove.mounts.ranges import SLACK
 
 # orders whose share of the squares is less, in the middle of the bounds and at their corners, are left out
 LEAST_SHARE = 1e-10
-MOST_SIGNAL_KINKS = 16
+MOST_CORNERS = 16
 _SAME = 1e-9
 
 
@@ -168,7 +168,7 @@ class TwistBoxes:
         own, speed = self.coordinates, loads.point.speed
         torques = throw_torques(self.problem.engine, loads.point, loads.fidelity)
         middle = 0.5 * (own.lower + own.upper)
-        corners = itertools.islice(itertools.product(*zip(own.lower, own.upper, strict=True)), MOST_SIGNAL_KINKS)
+        corners = itertools.islice(itertools.product(*zip(own.lower, own.upper, strict=True)), MOST_CORNERS)
         kept = np.zeros(len(torques.orders), dtype=bool)
         for x in (middle, *map(np.array, corners)):
             try:
