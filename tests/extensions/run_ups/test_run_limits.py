@@ -107,7 +107,7 @@ def test_loads_add_up_and_on_bump_stops_they_do_not() -> None:
     asked = "run-up travel", "1 mm"
     problem = problem_of(asked)
     (measure,) = simulated_measures(problem)
-    rows = RunRows.of(problem, [measure])
+    rows = RunRows.from_problem(problem, [measure])
     values = [1.0, 0.02j]
     x = np.concatenate([domain.columns_of(u) for domain, u in zip(domains_of(problem.decisions), values, strict=True)])
     point, worst = problem.points[0], rows.worst(measure, x)
@@ -116,7 +116,7 @@ def test_loads_add_up_and_on_bump_stops_they_do_not() -> None:
     mounts = tables_of(READY)["mounts"]
     stop = {"gap": "1 mm", "stiffness": "500 N/mm"}
     stopped = {**mounts, "places": [{**place, "stop": stop} for place in mounts["places"]]}
-    assert RunRows.of(problem_of(asked, mounts=stopped), [measure]) is None
+    assert RunRows.from_problem(problem_of(asked, mounts=stopped), [measure]) is None
 
 
 def test_a_run_up_is_designed_for_where_few_angles_forbid_a_mean() -> None:

@@ -79,7 +79,7 @@ def test_forces_of_stops_that_grow_within_a_step_are_integrated_exactly() -> Non
     model, step = time_model(elastic_mounting(mounting.block, [stopped, *rest])), 0.004
     run = LinearRun(model, Sweep(0.0, 1.0, step, 4))
     side = _side_by_side([run], step)
-    rates, _, inverse = run.kept
+    rates, _, inverse = run.modes
     met = np.flatnonzero(model.stops)
     into = inverse @ model.travels[met].T
     for k, rate in enumerate(rates):

@@ -387,7 +387,7 @@ def test_a_cut_off_that_moves_with_the_rod_is_left_out_of_the_bound() -> None:
     assert result.certificate.kind is Proof.WITHIN_GAP
     assert result.certificate.gap < 0.02
     model, rng, kept = SizeModel(problem), np.random.default_rng(4), 0
-    rows = model.still_rows(problem.limits[0].measure)
+    rows = model.fixed_rows(problem.limits[0].measure)
     assert all(0.9 < own.mean() < 1.0 for own in rows)
     found = np.array([entry.value for entry in result.decisions])
     for _ in range(60):

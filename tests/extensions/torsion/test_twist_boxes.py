@@ -106,4 +106,4 @@ def test_coordinates_are_turned_back() -> None:
     own = TwistBoxes(problem, evaluate(problem)).coordinates
     for share in (0.0, 0.4, 1.0):
         values = [d.lower + share * (d.upper - d.lower) for d in problem.decisions]
-        assert own.decisions(own.of(np.array(values))) == pytest.approx(values, rel=1e-12)
+        assert own.decisions(own.from_decisions(np.array(values))) == pytest.approx(values, rel=1e-12)

@@ -52,9 +52,11 @@ def rotor_chambers(problem: Problem, part: SliderCrank, point: OperatingPoint, c
     turns = math.tau * len(lags)
     angles = np.linspace(0.0, turns, count)
     since = [np.mod(angles - lag, turns) for lag in lags]
-    volume = np.array([chamber_volume(part, each) for each in since])
+    volume = np.array([chamber_volume(part, angle) for angle in since])
     if gas is None:
         return RotorChambers(angles, volume, None, None)
     cycle = problem.engine.cycle
-    pressure = np.array([-thrust_at(gas, part, cycle, each) / part.piston_area for each in since])
-    return RotorChambers(angles, volume, pressure, np.array([chamber_torque(gas, part, cycle, each) for each in since]))
+    pressure = np.array([-thrust_at(gas, part, cycle, angle) / part.piston_area for angle in since])
+    return RotorChambers(
+        angles, volume, pressure, np.array([chamber_torque(gas, part, cycle, angle) for angle in since])
+    )

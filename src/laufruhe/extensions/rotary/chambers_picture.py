@@ -26,14 +26,14 @@ def applies(result: Result) -> bool:
 def figure(result: Result) -> Figure:
     """Draw each chamber of rotor 1, and the torque that they make together."""
     part, point = rotors_of(result.final.engine)[0], result.problem.points[hardest_point(result)]
-    found = rotor_chambers(result.problem, part, point, STEPS)
-    degrees = np.degrees(found.angles)
-    drawn = page(1 if found.torque is None else 3, 1, (WIDE, HIGH), gap=0.35)
-    _lines(drawn.panels[0], degrees, 1e6 * found.volume)
-    if found.pressure is not None and found.torque is not None:
-        _lines(drawn.panels[1], degrees, 1e-5 * found.pressure)
-        _lines(drawn.panels[2], degrees, found.torque)
-        drawn.panels[2].plot(degrees, found.torque.sum(axis=0), color=INK, linewidth=1.6)
+    chambers = rotor_chambers(result.problem, part, point, STEPS)
+    degrees = np.degrees(chambers.angles)
+    drawn = page(1 if chambers.torque is None else 3, 1, (WIDE, HIGH), gap=0.35)
+    _lines(drawn.panels[0], degrees, 1e6 * chambers.volume)
+    if chambers.pressure is not None and chambers.torque is not None:
+        _lines(drawn.panels[1], degrees, 1e-5 * chambers.pressure)
+        _lines(drawn.panels[2], degrees, chambers.torque)
+        drawn.panels[2].plot(degrees, chambers.torque.sum(axis=0), color=INK, linewidth=1.6)
     words = ("volume over\nthe least [cm³]", "pressure over\nthe crankcase [bar]", "torque [N m]")
     for axes, label in zip(drawn.panels, words, strict=False):
         axes.axhline(0.0, color=FAINT, linewidth=0.7, zorder=0.5)
@@ -43,7 +43,7 @@ def figure(result: Result) -> Figure:
     align_labels(drawn.panels)
     drawn.panels[-1].set_xlabel("angle of the eccentric shaft [°]")
     legend = [entry(f"chamber {k + 1}", color=colour, linewidth=2.0) for k, colour in enumerate(COLOURS)]
-    legend += [] if found.torque is None else [entry("all", color=INK, linewidth=2.0)]
+    legend += [] if chambers.torque is None else [entry("all", color=INK, linewidth=2.0)]
     lines = f"{part.name[:1].upper()}{part.name[1:]} at {point.name}; each chamber fires a turn after the one before."
     return finish_page(drawn, result, "Chambers of a rotor", lines, legend)
 

@@ -19,7 +19,7 @@ from laufruhe.machine.slider_crank import SliderCrank
 
 @dataclass(frozen=True, kw_only=True)
 class RotorMechanism(Mechanism):
-    """What the rotors of an engine share; `rod_rotating_mass` is the rotor's.
+    """Numbers that the rotors of an engine share; `rod_rotating_mass` is the rotor's.
 
     Attributes
     ----------
@@ -32,8 +32,8 @@ class RotorMechanism(Mechanism):
     rotor_inertia: float
 
     def _made_of(self, plain: SliderCrank, number: int) -> SliderCrank:
-        own = {key: getattr(self, key) for key in ("rotor_radius", "rotor_width", "rotor_inertia")}
-        return RotaryUnit(**numbers_of(plain) | own | {"name": f"rotor {number}"})
+        numbers = {key: getattr(self, key) for key in ("rotor_radius", "rotor_width", "rotor_inertia")}
+        return RotaryUnit(**numbers_of(plain) | numbers | {"name": f"rotor {number}"})
 
 
 class Rotary(Inline):
@@ -51,13 +51,13 @@ class Rotary(Inline):
     )
 
     def cycle(self, said: Cycle) -> Cycle:
-        """Each chamber makes its four strokes in three turns of the shaft, so that a rotor fires every turn."""
+        """Return the cycle of a rotor, which fires every turn: each chamber makes its four strokes in three turns."""
         if said is not Cycle.FOUR_STROKE:
             raise KeyedError("cycle", "is not that of a rotary engine, whose chambers make four strokes", str(said))
         return Cycle.TWO_STROKE
 
     def mechanism(self, own: Mapping[str, Any], **shared: Any) -> RotorMechanism:
-        """Rotor and eccentric.
+        """Return rotor and eccentric.
 
         Raises
         ------
@@ -67,9 +67,9 @@ class Rotary(Inline):
         for key in ("eccentricity", "rotor_radius", "rotor_width", "rotor_mass"):
             if own[key] is None:
                 raise KeyedError(key, "is missing; add it")
-        least, radius = FLANKS * own["eccentricity"], own["rotor_radius"]
-        if radius <= least:
-            rule = f"does not let the rotor turn, it must be over three eccentricities, {units.shown(least, 'm')}"
+        shortest, radius = FLANKS * own["eccentricity"], own["rotor_radius"]
+        if radius <= shortest:
+            rule = f"does not let the rotor turn, it must be over three eccentricities, {units.shown(shortest, 'm')}"
             raise KeyedError("rotor_radius", f"{rule}; enlarge it", units.shown(radius, "m"))
         return RotorMechanism(
             own["eccentricity"], math.inf, 0.0, rod_rotating_mass=own["rotor_mass"], rotor_radius=radius,

@@ -18,11 +18,13 @@ def _chambers(result: Result) -> Table:
     rows = []
     for point in result.problem.points:
         for part in rotors_of(result.final.engine):
-            found = rotor_chambers(result.problem, part, point, STEPS * len(part.swept.lags) + 1)
-            nothing = np.full_like(found.volume, math.nan)
-            pressure, torque = (nothing if each is None else each for each in (found.pressure, found.torque))
-            for k, columns in enumerate(zip(found.volume, pressure, torque, strict=True)):
-                values = np.column_stack([np.degrees(found.angles), *columns]).tolist()
+            chambers = rotor_chambers(result.problem, part, point, STEPS * len(part.swept.lags) + 1)
+            nothing = np.full_like(chambers.volume, math.nan)
+            pressure, torque = (
+                nothing if quantity is None else quantity for quantity in (chambers.pressure, chambers.torque)
+            )
+            for k, columns in enumerate(zip(chambers.volume, pressure, torque, strict=True)):
+                values = np.column_stack([np.degrees(chambers.angles), *columns]).tolist()
                 rows += [[point.name, part.name, k + 1, *row] for row in values]
     head = ["point", "rotor", "chamber", "angle [deg]", "volume over the least [m^3]",
             "pressure over the crankcase [Pa]", "torque [N m]"]  # fmt: skip

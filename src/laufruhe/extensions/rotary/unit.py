@@ -27,7 +27,7 @@ class RotaryUnit(SliderCrank):
     Attributes
     ----------
     rotor_radius
-        From the rotor's centre to its apexes [m]; `crank_radius` is the eccentricity.
+        Distance from the rotor's centre to its apexes [m]; `crank_radius` is the eccentricity.
     rotor_width
         Along the shaft [m].
     rotor_inertia
@@ -44,14 +44,14 @@ class RotaryUnit(SliderCrank):
         if self.rotor_width <= 0.0 or self.rotor_inertia < 0.0:
             raise ModelError(f"{self.name}: the rotor's width must be positive and its inertia not negative")
         if self.rotor_radius <= FLANKS * self.crank_radius:
-            radius, least = units.shown(self.rotor_radius, "m"), units.shown(FLANKS * self.crank_radius, "m")
+            radius, lower = units.shown(self.rotor_radius, "m"), units.shown(FLANKS * self.crank_radius, "m")
             raise ModelError(
-                f"{self.name}: the rotor cannot turn, its radius of {radius} must be over three eccentricities, {least}"
+                f"{self.name}: the rotor cannot turn, its radius of {radius} must be over three eccentricities, {lower}"
             )
 
     @property
     def path(self) -> Hashable:
-        """What its chambers depend on, besides the angle of the eccentric."""
+        """Key of what its chambers depend on, besides the angle of the eccentric."""
         return self.crank_radius, self.rotor_radius, self.rotor_width
 
     @cached_property
@@ -68,7 +68,7 @@ class RotaryUnit(SliderCrank):
 
     @property
     def stroke(self) -> float:
-        """Of a piston of that area that sweeps as much as a chamber [m] (Y3)."""
+        """Stroke of a piston of that area that sweeps as much as a chamber [m] (Y3)."""
         return 3.0 * self.crank_radius
 
     @property
@@ -78,7 +78,7 @@ class RotaryUnit(SliderCrank):
 
     @property
     def smallest_volume(self) -> float:
-        """Of a chamber whose flank is the inner envelope of the housing, without a recess [m3] (Y2)."""
+        """Volume of a chamber whose flank is the inner envelope of the housing, without a recess [m3] (Y2)."""
         e, radius = self.crank_radius, self.rotor_radius
         lean = math.asin(FLANKS * e / radius)
         sector = math.pi * e**2 / 3.0 + 2.0 * e * radius * math.cos(lean)
@@ -101,32 +101,33 @@ class RotaryUnit(SliderCrank):
         return self.crank_radius + self.rotor_radius / 9.0
 
     def lean(self, lib: Any, angles: Any) -> Any:
-        """Direction of the gas on a flank, along its normal through the rotor's centre (Y4; textbook eqs. 21, 22)."""
+        """Return the direction of the gas on a flank, its normal through the rotor (Y4; textbook eqs. 21, 22)."""
         third = angles / 3.0
         return lib.cos(third) + 1j * lib.sin(third)
 
     def motion(self, lib: Any, alpha: Any) -> Motion:
-        """The rotor turns at a third of the shaft's speed; its mass counts at the eccentric, where it is (Y6)."""
+        """Return the motion of a rotor, which turns at a third of the shaft's speed (Y6).
+
+        Its mass counts at the eccentric, where it is.
+        """
         points = super().motion(lib, alpha).points
         return Motion(points, ((self.rotor_inertia, (0.0 * alpha + 1.0 / 3.0, 0.0 * alpha)),))
 
     def outlines(self, alpha: float) -> tuple[Outline, ...]:
-        """Housing and rotor (Y1)."""
+        """Return housing and rotor (Y1)."""
         rotor = self.crank_radius * cmath.exp(1j * alpha) + self._flanks() * cmath.exp(1j * alpha / 3.0)
         housing = self.housing(np.linspace(0.0, math.tau, 181))
         return Outline(housing, self.rotor_width, False), Outline(rotor, self.rotor_width, True)
 
     def housing(self, turn: Any) -> Any:
-        """Peritrochoid that the apexes run on, at angles of an apex about its rotor's centre (Y1; textbook eq. 7)."""
+        """Return the peritrochoid of the apexes, at angles of one about its rotor's centre (Y1; textbook eq. 7)."""
         # at alpha = 0 the flank, and no apex, looks to where it fires
         return self.crank_radius * np.exp(3j * (turn - math.pi / 3.0)) + self.rotor_radius * np.exp(1j * turn)
 
     def _flanks(self) -> Any:
-        """Rotor about its own centre when alpha = 0: arcs through the apexes that clear the housing."""
         return np.concatenate([self._flank() * cmath.exp(1j * math.tau * k / FLANKS) for k in range(FLANKS)])
 
     def _flank(self) -> Any:
-        """One flank, a circle through its apexes and the middle of the inner envelope (Y1)."""
         half, rise = math.sqrt(0.75) * self.rotor_radius, 0.5 * self.rotor_radius - 2.0 * self.crank_radius
         height = np.linspace(-half, half, 31)
         if rise <= 0.0:

@@ -26,35 +26,34 @@ from laufruhe.prove.mounts.box_response import BoxModel
 # long steps that a run has at least
 LEAST_STEPS = 60
 # share of a limit of travel that a stop is beyond it
-APART = 1e-3
+MARGIN = 1e-3
 
 
 class RunBoxes:
-    """Of a problem whose open numbers are stiffnesses alone.
+    """Bounds of run-ups over boxes of stiffness, where nothing else is open (E65).
 
     Parameters
     ----------
     model
-        Of the boxes.
+        Model of the boxes.
     measures
-        Of run-ups.
+        Measures of run-ups.
     """
 
     def __init__(self, model: BoxModel, measures: Sequence[Measure]) -> None:
         self._model, self._matrices, self.measures = model, RunMatrices(model), tuple(measures)
         self._peaks = RunPeaks(model.problem, measures)
-        self._rows: dict[Measure, Rows] = {measure: self._matrices.asked(measure) for measure in measures}
+        self._rows: dict[Measure, Rows] = {measure: self._matrices.maps_of(measure) for measure in measures}
 
     @property
     def cost(self) -> int:
-        """Of one box, in numbers."""
+        """Return the work of one box, in numbers."""
         sides, n = len(self._model.lower), 2 * self._matrices.size
         columns = 1 + sides + len(pairs_of(sides))
         return len(self._rows) * sum(run.sweep.count // run.times for run in self._runs) * columns * n
 
     @cached_property
     def _scale(self) -> float:
-        """Quickest undamped motion of all [rad/s]."""
         above = self._model.upper - self._model.lower
         return float(np.sqrt(np.linalg.eigvalsh(self._matrices.motion.position.at(above[None])[0])[-1]))
 
@@ -67,45 +66,48 @@ class RunBoxes:
             runs.append(RunMoments(sweep, wrenches, self._matrices.base.load, max(int(most), 1)))
         return tuple(runs)
 
-    def under(self, measure: Measure, lower: Array, upper: Array, asked: Mask | None = None) -> Under:
-        """Of boxes, shapes (boxes, open numbers), or of those asked for; an infinite rest where nothing is known."""
+    def under(self, measure: Measure, lower: Array, upper: Array, mask: Mask | None = None) -> Under:
+        """Return linear functions under a measure on boxes, shapes (boxes, open numbers), or on those of a mask.
+
+        The rest is infinite where no bound is known.
+        """
         of = self._equations(lower, upper)
         step = max(run.step for run in self._runs)
         known = of.known & (np.linalg.norm(of.matrix, 2, axis=(-2, -1)) * step <= FARTHEST)
-        which = np.flatnonzero(known if asked is None else known & asked)
+        which = np.flatnonzero(known if mask is None else known & mask)
         out = Under(np.zeros(len(lower)), np.zeros_like(lower), np.full(len(lower), np.inf), np.ones_like(lower))
         if len(which):
             of = of if len(which) == len(lower) else self._equations(lower[which], upper[which])
-            found = self._under(measure, of)
+            bounds = self._under(measure, of)
             for name in ("value", "slopes", "rest", "bends"):
-                getattr(out, name)[which] = getattr(found, name)
+                getattr(out, name)[which] = getattr(bounds, name)
         return out
 
     def _equations(self, lower: Array, upper: Array) -> Equations:
         return equations(self._model, self._matrices, self._scale, lower, upper)
 
     def _under(self, measure: Measure, of: Equations) -> Under:
-        felt, d = self._rows[measure]
-        maps = mapped(felt, of.above, of.halves, of.turn, of.roots)
-        found = [_Look(of, run, maps, d).under() for run in self._runs]
-        bounds = [np.nan_to_num(each.least, nan=-np.inf) for each in found]
+        maps_of, d = self._rows[measure]
+        maps = mapped(maps_of, of.above, of.halves, of.turn, of.roots)
+        looks = [_Look(of, run, maps, d).under() for run in self._runs]
+        bounds = [np.nan_to_num(one.least, nan=-np.inf) for one in looks]
         best, pick = np.argmax(bounds, axis=0), np.arange(of.count)
         parts = ("value", "slopes", "rest", "bends")
-        return Under(*(np.array([getattr(each, part) for each in found])[best, pick] for part in parts))
+        return Under(*(np.array([getattr(one, part) for one in looks])[best, pick] for part in parts))
 
 
 def bounds_runs(problem: Problem) -> bool:
-    """Whether run-ups are asked about that go in steps, and that meet no bump stop in any design allowed."""
+    """Return whether boxes bound the run-ups of a problem: they go in steps, and no allowed design meets a stop."""
     measures = simulated_measures(problem)
     peaks = RunPeaks(problem, measures)
     return bool(measures) and peaks.is_known and (not peaks.is_stopped or _stays_off_stops(problem, peaks))
 
 
 def _stays_off_stops(problem: Problem, peaks: RunPeaks) -> bool:
-    """Whether what keeps the limits meets no stop, so that its run-up is that without stops.
+    """Return whether no design that keeps the limits meets a stop, so that its run-up is that without stops.
 
-    Travel may not come to the gap of any. In steps in which stops alone turn no motion by more than half a radian, they
-    take back a 24th of what goes beyond their gaps: what meets one is seen beyond it, and is not allowed.
+    Limits hold travel under every gap. In steps in which stops alone turn no motion by more than half a radian, they
+    take back a 24th of what goes beyond their gaps: a design that meets one is seen beyond it, and is not allowed.
     """
     travels = [measure for measure in peaks.measures if measure.unit == "m"]
     limits = (limit for limit in problem.limits if limit.measure in travels)
@@ -113,22 +115,21 @@ def _stays_off_stops(problem: Problem, peaks: RunPeaks) -> bool:
     model = time_model(mounting_in(problem.engine))
     gaps = model.gaps[model.stops > 0.0]
     firm = any(quickest(model) * sweep.step > QUICKEST for sweep in peaks.sweeps)
-    return not firm and most * (1.0 + APART) < float(gaps.min())
+    return not firm and most * (1.0 + MARGIN) < float(gaps.min())
 
 
 def _tops(squares: Array) -> Array:
-    """Of every time but the first: the top of the parabola through three, where that stands between them."""
     tops = parabola_tops(squares[..., :-2], squares[..., 1:-1], squares[..., 2:])
     return np.concatenate([tops, squares[..., -1:]], axis=-1)
 
 
 class _Look:
-    """At what one run makes of boxes.
+    """Bound what one run reaches on boxes.
 
     Parameters
     ----------
     maps, d
-        What a measure is the largest length of, d rows a place.
+        Maps from motion to the signal of a measure, d rows a place.
     """
 
     def __init__(self, of: Equations, run: RunMoments, maps: Maps, d: int) -> None:
@@ -138,27 +139,27 @@ class _Look:
     def under(self) -> Under:
         """The best of all moments and places, of steps of which one ends where motion at the middle is largest."""
         steps = [self._run.ending_at(int(place)) for place in self._peaks()]
-        count = min(each.count for each in steps)
-        moments = np.stack([each.moments[..., :count].reshape(-1, count) for each in steps])
-        pushes, highest = (np.stack([getattr(each, k)[:count] for each in steps]) for k in ("pushes", "highest"))
+        count = min(one.count for one in steps)
+        moments = np.stack([one.moments[..., :count].reshape(-1, count) for one in steps])
+        pushes, highest = (np.stack([getattr(one, k)[:count] for one in steps]) for k in ("pushes", "highest"))
         return self._of_motion(motion_of(self._steps, moments, pushes, highest))
 
     def _peaks(self) -> Indices:
         """Short steps at which motion at the middles is largest: among long ones, then about the largest of these."""
         of, run = self._of, self._run
-        whole = run.ending_at(0)
-        rows = whole.moments.reshape(-1, whole.count)
+        steps = run.ending_at(0)
+        rows = steps.moments.reshape(-1, steps.count)
         moments = np.broadcast_to(rows, (of.count, *rows.shape))
         middle = self._steps.middle(moments)
         top = 1 + _tops(self._lengths(middle) ** 2).max(axis=1).argmax(axis=1)
         boxes, start = np.arange(of.count), run.times * (top - 1)
         places = start[:, None] + np.arange(2 * run.times)
         short = Steps(of, run.sweep.step, orders=False)
-        finely = run.short(places).reshape(of.count, 2 * run.times, -1)
+        short_moments = run.short(places).reshape(of.count, 2 * run.times, -1)
         z = middle[boxes, :, top - 1][..., None]
         sizes = [self._lengths(z)[..., 0].max(axis=1)]
         for k in range(2 * run.times):
-            z = short.moves[0] @ z + short.loads[0] @ finely[:, k, :, None]
+            z = short.moves[0] @ z + short.loads[0] @ short_moments[:, k, :, None]
             sizes.append(self._lengths(z)[..., 0].max(axis=1))
         places = start + np.arange(2 * run.times + 1)[:, None]
         return np.asarray(start + np.where(places <= run.sweep.count, sizes, 0.0).argmax(axis=0))
@@ -167,7 +168,6 @@ class _Look:
         return np.concatenate([position / self._of.scale, rate], axis=-1)
 
     def _places(self, rows: Array) -> Array:
-        """Rows of places, shape (..., places, d, times)."""
         return rows.reshape(*rows.shape[:-2], -1, self._d, rows.shape[-1])
 
     def _lengths(self, z: Array) -> Array:
@@ -176,11 +176,11 @@ class _Look:
 
     def _of_motion(self, motion: Motion) -> Under:
         maps, pairs = self._maps, self._steps.pairs
-        own, by = self._rows(maps.position, maps.rate), self._rows(maps.positions, maps.rates)
-        value = own @ motion.middle
-        first = own[:, None] @ motion.first + by @ motion.middle[:, None]
+        at_middle, by = self._rows(maps.position, maps.rate), self._rows(maps.positions, maps.rates)
+        value = at_middle @ motion.middle
+        first = at_middle[:, None] @ motion.first + by @ motion.middle[:, None]
         bends = self._rows(np.zeros_like(maps.bends), maps.bends)
-        second = own[:, None] @ motion.second + bends @ motion.middle[:, None]
+        second = at_middle[:, None] @ motion.second + bends @ motion.middle[:, None]
         for number, (j, k) in enumerate(pairs):
             second[:, number] += by[:, j] @ motion.first[:, k]
             if j != k:
@@ -189,20 +189,20 @@ class _Look:
         size = np.linalg.norm(rows, axis=-2)
         along = rows / np.where(size > 0.0, size, 1.0)[..., None, :]
         rest = self._gains(along) * motion.left[:, None] + self._further(motion, by)
-        slopes, bent = (np.einsum("bpdt,bspdt->bspt", along, self._places(each)) for each in (first, second))
+        slopes, bent = (np.einsum("bpdt,bspdt->bspt", along, self._places(order)) for order in (first, second))
         alike = np.array([j == k for j, k in pairs])[:, None, None]
         # a square is not under zero
         bent = np.where(alike, np.maximum(-bent, 0.0), np.abs(bent))
         return self._best(size, slopes, bent, rest)
 
     def _best(self, size: Array, slopes: Array, bent: Array, rest: Array) -> Under:
-        """Of all places and times that which is highest."""
-        least = size - np.abs(slopes).sum(axis=1) - bent.sum(axis=1) - rest
-        known = np.nan_to_num(least, nan=-np.inf)
+        """Return the highest bound of all places and times."""
+        bound = size - np.abs(slopes).sum(axis=1) - bent.sum(axis=1) - rest
+        known = np.nan_to_num(bound, nan=-np.inf)
         boxes = np.arange(len(size))
-        place, time = np.unravel_index(known.reshape(len(size), -1).argmax(axis=1), least.shape[1:])
-        size, rest = (each[boxes, place, time] for each in (size, rest))
-        slopes, bent = (each[boxes, :, place, time] for each in (slopes, bent))
+        place, time = np.unravel_index(known.reshape(len(size), -1).argmax(axis=1), bound.shape[1:])
+        size, rest = (array[boxes, place, time] for array in (size, rest))
+        slopes, bent = (array[boxes, :, place, time] for array in (slopes, bent))
         moved = np.linalg.norm(self._of.first, axis=(-2, -1))
         share = moved / np.maximum(moved.sum(axis=1), 1e-300)[:, None]
         pull = np.abs(slopes) + share * np.minimum(rest, size)[:, None]
@@ -212,7 +212,7 @@ class _Look:
         return Under(size, slopes, rest + bent.sum(axis=1), pull)
 
     def _gains(self, along: Array) -> Array:
-        """What a motion of energy one is felt as at most along directions (boxes, places, d, times), without d."""
+        """Return the largest signal of a motion of energy one along directions (boxes, places, d, times), without d."""
         maps, of = self._maps, self._of
         softest = np.swapaxes(np.linalg.inv(np.linalg.cholesky(of.softest)), 1, 2)
 
@@ -220,18 +220,18 @@ class _Look:
             return np.asarray(np.linalg.norm(self._places(matrices), axis=(-2, -1)))
 
         middle = np.linalg.norm(np.einsum("bpdt,bpdn->bpnt", along, self._places(maps.position @ softest)), axis=2)
-        still = middle + sizes(maps.positions @ softest[:, None]).sum(axis=1)[..., None]
+        position = middle + sizes(maps.positions @ softest[:, None]).sum(axis=1)[..., None]
         moving = sizes(maps.rate) + sizes(maps.rates).sum(axis=1) + sizes(maps.bent)
-        return np.asarray(np.hypot(still, moving[..., None]))
+        return np.asarray(np.hypot(position, moving[..., None]))
 
     def _further(self, motion: Motion, by: Array) -> Array:
-        """What is felt of both orders beyond the second, (boxes, places, times)."""
+        """Return the largest signal of both orders beyond the second, shape (boxes, places, times)."""
         maps, n = self._maps, self._of.softest.shape[-1]
         if maps.is_constant:
             return np.zeros(1)
-        felt = (self._places(by[:, j, None] @ motion.second) for j in range(by.shape[1]))
-        total = sum(np.linalg.norm(each, axis=-2).sum(axis=1) for each in felt)
-        rates = [np.abs(each[..., n:, :]) for each in (motion.middle, motion.first, motion.second)]
+        signals = (self._places(by[:, j, None] @ motion.second) for j in range(by.shape[1]))
+        total = sum(np.linalg.norm(order, axis=-2).sum(axis=1) for order in signals)
+        rates = [np.abs(order[..., n:, :]) for order in (motion.middle, motion.first, motion.second)]
         bends = np.abs(maps.bends).sum(axis=1) @ (rates[1].sum(axis=1) + rates[2].sum(axis=1))
         rest = maps.rest @ (rates[0] + rates[1].sum(axis=1) + rates[2].sum(axis=1))
         return np.asarray(total + np.linalg.norm(self._places(bends + rest), axis=-2))

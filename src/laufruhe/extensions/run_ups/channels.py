@@ -32,7 +32,7 @@ class RunChannel(NumberChannel):
     Attributes
     ----------
     part
-        What it is the largest length of, shape (times, places, d).
+        Signal whose largest length it is, shape (times, places, d).
     """
 
     needs: Need = RUN

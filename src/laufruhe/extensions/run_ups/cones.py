@@ -35,17 +35,17 @@ def solve_run_cones(
 ) -> Result:  # fmt: skip
     """The best unbalances, proven."""
     steps = _Steps(problem, limits, terms, rows)
-    if not steps.found():
+    if not steps.gather():
         names = [limit.name for limit in steps.problem.load_limits]
         return none_within(problem, evaluate(problem), smallest_conflict(steps.affine(averaged=True), names), {})
     for _ in in_time(range(_AGAIN)):
         result = decide(steps.problem)
         x = vector_of(domains_of(problem.decisions), unbalances_of(problem, result)) if result.decisions else None
-        found = result.problem.fidelity
-        if found != problem.fidelity:
+        fidelity = result.problem.fidelity
+        if fidelity != problem.fidelity:
             # steps are of the physics that the answer was found accurate by
-            again = problem.at(found)
-            more = RunRows.of(again, [*rows.constants])
+            again = problem.at(fidelity)
+            more = RunRows.from_problem(again, [*rows.constants])
             return solve_run_cones(again, limits, terms, more or rows, decide)
         if x is not None and result.status is Status.FEASIBLE:
             # the design as given may stand in the place of one that breaks steps which are not known yet
@@ -60,23 +60,23 @@ class _Steps:
     """Steps of the runs that come near the limits of some design, or near its largest where that is minimised."""
 
     def __init__(self, problem: Problem, limits: Sequence[Limit], terms: Sequence[Term], rows: RunRows) -> None:
-        self._whole, self._limits, self._terms, self._rows = problem, limits, terms, rows
+        self._problem, self._limits, self._terms, self._rows = problem, limits, terms, rows
         self._places: dict[Measure, NDArray[np.intp]] = {}
 
     @property
     def problem(self) -> Problem:
-        """With those steps; limits that none comes near are left out."""
+        """Problem with rows of these steps; limits without a near step are left out."""
         known = {measure: self._rows.known(measure, places) for measure, places in self._places.items()}
-        kept = (x for x in self._whole.limits if not x.measure.channel.simulation or x.measure in known)
-        return replace(self._whole, known_rows=known, limits=tuple(kept))
+        limits = (x for x in self._problem.limits if not x.measure.channel.simulation or x.measure in known)
+        return replace(self._problem, known_rows=known, limits=tuple(limits))
 
     def affine(self, samples: int = _COARSE, averaged: bool = False) -> AffineProblem:
-        """At so many angles at most, few by default; means averaged about them exclude no design (P7)."""
+        """Return the program at up to so many angles; means averaged about them exclude no design (P7)."""
         model = AffineModel(self.problem)
         return model.at(min(samples, model.full_samples), averaged)
 
     def add(self, x: Array) -> None:
-        """Those that a design brings near the limits, and its largest."""
+        """Add the steps that a design brings near the limits, and its largest."""
         heights = [(limit.measure, limit.maximum) for limit in self._limits]
         heights += [(term.measure, self._rows.worst(term.measure, x)) for term in self._terms]
         for measure, height in heights:
@@ -86,27 +86,29 @@ class _Steps:
                 self._places[measure] = np.union1d(known, near).astype(np.intp)
 
     def has_all(self, x: Array) -> bool:
-        """Whether a design keeps all steps, and none of them is above those that it is judged by."""
-        kept = all(self._rows.worst(own.measure, x) <= own.maximum * (1.0 + 0.1 * FEASIBLE) for own in self._limits)
-        return kept and all(self._is_top(term.measure, x) for term in self._terms)
+        """Return whether a design keeps the limits in all steps, and has no step above those that it is judged by."""
+        keeps = all(
+            self._rows.worst(limit.measure, x) <= limit.maximum * (1.0 + 0.1 * FEASIBLE) for limit in self._limits
+        )
+        for term in self._terms if keeps else ():
+            known = self._rows.known(term.measure, self._places[term.measure])
+            top = np.linalg.norm(known.constant + known.slope @ x, axis=-1).max()
+            if self._rows.worst(term.measure, x) > float(top) * (1.0 + 0.1 * self._problem.tolerance):
+                return False
+        return keeps
 
-    def _is_top(self, measure: Measure, x: Array) -> bool:
-        known = self._rows.known(measure, self._places[measure])
-        top = np.linalg.norm(known.constant + known.slope @ x, axis=-1).max()
-        return self._rows.worst(measure, x) <= float(top) * (1.0 + 0.1 * self._whole.tolerance)
-
-    def found(self) -> bool:
-        """Whether designs of few angles keep all steps; those that break some add them."""
-        x = vector_of(domains_of(self._whole.decisions))
+    def gather(self) -> bool:
+        """Add steps until a design of few angles keeps all of them; return whether there is one."""
+        x = vector_of(domains_of(self._problem.decisions))
         for _ in in_time(range(_ROUNDS)):
             self.add(x)
             report_progress("steps of the run-up", sum(map(len, self._places.values())))
-            found = solve_cones(self.affine()).x
-            if found is None:
-                found = solve_cones(self.affine(averaged=True)).x
-            if found is None:
+            optimum = solve_cones(self.affine()).x
+            if optimum is None:
+                optimum = solve_cones(self.affine(averaged=True)).x
+            if optimum is None:
                 return False
-            x = found
+            x = optimum
             if self.has_all(x):
                 break
         return True

@@ -27,21 +27,21 @@ class Linear:
     Attributes
     ----------
     lowest
-        Where all of these are at their lower bounds, shape (r, n).
+        Matrix with all of these at their lower bounds, shape (r, n).
     slopes
-        By every open number, shape (open numbers, r, n).
+        Derivatives by every open number, shape (open numbers, r, n).
     """
 
     lowest: Array
     slopes: Array
 
     def at(self, above: Array) -> Array:
-        """So far above the lower bounds, shape (boxes, open numbers) to (boxes, r, n)."""
+        """Return the matrices so far above the lower bounds, shape (boxes, open numbers) to (boxes, r, n)."""
         return np.asarray(self.lowest + np.tensordot(above, self.slopes, axes=1))
 
 
 @dataclass(frozen=True, eq=False)
-class Felt:
+class LinearMaps:
     """P, L and D."""
 
     position: Linear
@@ -58,7 +58,7 @@ class Roots:
     middle, first, second
         Shapes (boxes, n, n), (boxes, open numbers, n, n), and (boxes, pairs, n, n) of j <= l.
     after_first, after_second
-        What entries are off by at most then, shape (boxes, n, n); no numbers where nothing is known.
+        Bounds of the rest of entries after these orders, shape (boxes, n, n); not numbers where none is known.
     """
 
     middle: Array
@@ -79,7 +79,7 @@ class Maps:
     rate, rates, bends
         Q at the middle, by side, and by pairs of sides j <= l, (boxes, pairs, r, n).
     rest
-        What entries of Q are off by at most beyond, shape (boxes, r, n).
+        Bound of the rest of the entries of Q, shape (boxes, r, n).
     """
 
     position: Array
@@ -96,12 +96,12 @@ class Maps:
 
     @property
     def is_constant(self) -> bool:
-        """Whether nothing open is in them."""
+        """Return whether they depend on no open number."""
         return not (self.positions.any() or self.rates.any() or self.bent.any())
 
 
 def pairs_of(count: int) -> list[tuple[int, int]]:
-    """Of sides j <= l."""
+    """Return the pairs of sides j <= l."""
     return [(j, k) for j in range(count) for k in range(j, count)]
 
 
@@ -113,12 +113,12 @@ def roots(squares: Array, slopes: Array, size: int) -> Roots:
     squares, slopes
         Shapes (boxes, 6), above zero, and (boxes, open numbers, 6, 6), none of them negative.
     size
-        Of motion; coordinates beside those of the block have no S.
+        Number of coordinates; those beside the block have no S.
     """
     w = np.sqrt(squares)
     a, b, c = w[:, :, None, None], w[:, None, None, :], w[:, None, :, None]
     third = (a + b + c) / (a * b * c * (a + b) * (b + c) * (a + c))
-    own = np.einsum("baca->bac", third)
+    diagonal = np.einsum("baca->bac", third)
     pair = 1.0 / (w[:, :, None] * w[:, None] * (w[:, :, None] + w[:, None]))
     products = [
         np.einsum("bac,bcd,bacd->bad", slopes[:, j], slopes[:, k], third, optimize=True)
@@ -132,18 +132,18 @@ def roots(squares: Array, slopes: Array, size: int) -> Roots:
     share = np.linalg.eigvalsh(slopes.sum(axis=1) / (w[:, :, None] * w[:, None]))[:, -1]
     left = 1.0 - share
     twice = (most / squares[:, None]) @ most
-    near, far = (np.sqrt(np.einsum("bac,bac->ba", each**2, own)) for each in (most, twice))
+    near, far = (np.sqrt(np.einsum("bac,bac->ba", change**2, diagonal)) for change in (most, twice))
     # half a box that reaches to nothing is not known
     left = np.where(left > 0.0, left, np.nan)[:, None, None]
-    after_first, crossed = (each[:, :, None] * near[:, None] / left for each in (near, far))
+    after_first, crossed = (change[:, :, None] * near[:, None] / left for change in (near, far))
     after_second = np.minimum(crossed, np.swapaxes(crossed, 1, 2))
     wider = [(0, size - 6), (0, size - 6)]
     eye = np.eye(6) / w[:, None]
-    found = (eye, -slopes * pair[:, None], np.stack(second, axis=1), after_first, after_second)
-    return Roots(*(np.pad(each, [(0, 0)] * (each.ndim - 2) + wider) for each in found))
+    parts = (eye, -slopes * pair[:, None], np.stack(second, axis=1), after_first, after_second)
+    return Roots(*(np.pad(change, [(0, 0)] * (change.ndim - 2) + wider) for change in parts))
 
 
-def mapped(felt: Felt, above: Array, halves: Array, turn: Array, s: Roots, of_motion: bool = False) -> Maps:
+def mapped(parts: LinearMaps, above: Array, halves: Array, turn: Array, s: Roots, of_motion: bool = False) -> Maps:
     """Maps of boxes, in the modes of their middles.
 
     Parameters
@@ -151,19 +151,19 @@ def mapped(felt: Felt, above: Array, halves: Array, turn: Array, s: Roots, of_mo
     above, halves
         Middles above the lower bounds, and half widths, shape (boxes, open numbers).
     turn
-        From the coordinates of the modes, shape (boxes, n, n).
+        Matrix from the coordinates of the modes, shape (boxes, n, n).
     of_motion
-        Whether what is felt is in coordinates of the motion too.
+        True if the rows are in coordinates of the motion too.
     """
 
     def seen(matrices: Array) -> Array:
-        own = turn if matrices.ndim == 3 else turn[:, None]
-        out = matrices @ own
-        return np.asarray(np.swapaxes(own, -1, -2) @ out if of_motion else out)
+        modes = turn if matrices.ndim == 3 else turn[:, None]
+        out = matrices @ modes
+        return np.asarray(np.swapaxes(modes, -1, -2) @ out if of_motion else out)
 
     scale = halves[:, :, None, None]
     (p, p_by), (lossy, lossy_by), (drag, drag_by) = (
-        (seen(each.at(above)), seen(scale * each.slopes)) for each in (felt.position, felt.lossy, felt.drag)
+        (seen(part.at(above)), seen(scale * part.slopes)) for part in (parts.position, parts.lossy, parts.drag)
     )
     by_side = lossy_by @ s.middle[:, None] + lossy[:, None] @ s.first + drag_by
     bends = []

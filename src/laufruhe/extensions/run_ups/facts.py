@@ -16,15 +16,15 @@ REACH_OVER, BEYOND = 5.0, 1.5
 
 
 def runs_up(result: Result) -> bool:
-    """Whether there is a run to show: elastic mounts whose stiffness has a law in time."""
+    """Return whether there is a run to show: elastic mounts whose stiffness has a law in time."""
     return is_elastic(result) and mounting_in(result.final.engine).dynamic.has_law
 
 
 def run_of(result: Result) -> Run:
-    """As the problem says, or in three seconds past every critical speed that is not far from the operating points."""
-    given = result.problem.engine.extra(Run)
-    if given is not None:
-        return given
+    """Return the run of the problem, else one of three seconds past every critical speed near the operating points."""
+    run = result.problem.engine.extra(Run)
+    if run is not None:
+        return run
     facts = facts_of(result.final)
     top = max(point.speed for point in result.problem.points)
     critical = [critical_speed(frequency, main_order(facts)) for frequency in excited_frequencies(facts)]

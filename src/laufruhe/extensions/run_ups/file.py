@@ -15,7 +15,7 @@ from laufruhe.problem.problem import Problem
 
 
 class RunUpTable(Table):
-    """From rest to a speed and back, through resonance."""
+    """Run from rest to a speed and back, through resonance."""
 
     up_to: f.Speed
     time: f.Time = f.optional("Time in which the engine runs up from rest.", 3.0)

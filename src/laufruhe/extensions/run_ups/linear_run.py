@@ -36,7 +36,7 @@ class Sweep:
     first, gain
         Crank speed at the start [rad/s], and by how much it grows [rad/s2].
     step, count
-        Of time [s].
+        Length of a time step [s], and number of steps.
     """
 
     first: float
@@ -45,8 +45,9 @@ class Sweep:
     count: int
 
     def wrenches(self, loads: Loads) -> Array:
-        """At the Gauss points of every step, shape (6 points, steps): six components of the first point, then others.
+        """Return the wrenches at the Gauss points of every step, shape (6 points, steps).
 
+        Six components of the first point come before those of the others.
         They do not depend on the mounts.
         """
         out = np.zeros((NODES, 6, self.count))
@@ -62,18 +63,18 @@ class Sweep:
         total = np.zeros((6, len(times)))
         for k, (orders, coefficients) in enumerate(loads):
             part = np.zeros_like(total)
-            for order, own in zip(orders, coefficients, strict=True):
-                for share, wave in ((own.real, np.cos), (-own.imag, np.sin)):
-                    felt = np.flatnonzero(share)
-                    if len(felt):
-                        part[felt] += np.outer(share[felt], wave(order * angle))
+            for order, wrench in zip(orders, coefficients, strict=True):
+                for share, wave in ((wrench.real, np.cos), (-wrench.imag, np.sin)):
+                    components = np.flatnonzero(share)
+                    if len(components):
+                        part[components] += np.outer(share[components], wave(order * angle))
             total += part if k else speed**2 * part
         return total
 
 
 @dataclass(frozen=True, eq=False)
 class Response:
-    """Of the mounts and the block at equal steps of time.
+    """Motion of the mounts and the block at equal steps of time.
 
     Attributes
     ----------
@@ -113,42 +114,44 @@ class LinearRun:
 
     @property
     def is_resolved(self) -> bool:
-        """Whether modes tell the motion between stops: none alike, none that hardly moves within a step."""
+        """Return whether modes give the motion between stops: distinct, and not too stiff for the steps."""
         stiff = float(np.abs(self._rates).max()) * self.sweep.step > _STIFFEST
         return not (stiff or np.linalg.cond(self._shapes) > _DEFECTIVE)
 
     @property
     def is_known(self) -> bool:
-        """Whether they tell all of it: no bump stop."""
+        """Return whether modes give the whole motion: resolved, without bump stops."""
         return self.is_resolved and not self.model.has_stops
 
     @cached_property
-    def kept(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    def modes(self) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
         """Rates, shapes that real parts are taken of, and loads to modes, (m,), (2 n, m), (m, n): of a pair one."""
-        kept = self._rates.imag >= 0.0
-        rates = self._rates[kept]
-        shapes = self._shapes[:, kept] * np.where(rates.imag > 0.0, 2.0, 1.0)
-        return rates, shapes, np.linalg.inv(self._shapes)[kept, self.model.size :]
+        upper = self._rates.imag >= 0.0
+        rates = self._rates[upper]
+        shapes = self._shapes[:, upper] * np.where(rates.imag > 0.0, 2.0, 1.0)
+        return rates, shapes, np.linalg.inv(self._shapes)[upper, self.model.size :]
 
     def driven(self, wrenches: Array) -> ComplexArray:
-        """What wrenches of `Sweep.wrenches` add to the modes in every step, nothing before, shape (m, steps + 1)."""
-        rates, _, inverse = self.kept
-        weights = self.sweep.step * _weights(np.asarray(rates * self.sweep.step, dtype=complex))
+        """Return what wrenches of `Sweep.wrenches` add to the modes in every step, shape (m, steps + 1)."""
+        rates, _, inverse = self.modes
+        points, shares = _quadrature()
+        # integrals of e^{r (1 - s)} L_i(s) over a step of one, shape (modes, Gauss points)
+        weights = self.sweep.step * (np.exp(np.outer(rates * self.sweep.step, 1.0 - points)) @ shares)
         into = inverse @ self.model.load
         driving = np.concatenate([weight[:, None] * into for weight in weights.T], axis=1)
         out = np.zeros((len(rates), self.sweep.count + 1), dtype=complex)
         out.real[:, 1:], out.imag[:, 1:] = driving.real @ wrenches, driving.imag @ wrenches
         return out
 
-    def seen(self, states: ComplexArray) -> Response:
-        """The motion of modes after every step, shape (m, steps + 1)."""
-        shapes = self.kept[1]
+    def response_of(self, states: ComplexArray) -> Response:
+        """Return the motion from the modes after every step, shape (m, steps + 1)."""
+        shapes = self.modes[1]
         y, rate = np.split(shapes.real @ states.real - shapes.imag @ states.imag, 2)
         return Response(self.model, y, rate)
 
     def response(self, wrenches: Array) -> Response:
-        """Under wrenches of `Sweep.wrenches`, from rest."""
-        return self.seen(_stepped(self.driven(wrenches), np.exp(self.kept[0] * self.sweep.step)))
+        """Return the motion from rest under wrenches of `Sweep.wrenches`."""
+        return self.response_of(_stepped(self.driven(wrenches), np.exp(self.modes[0] * self.sweep.step)))
 
 
 def _stepped(driven: ComplexArray, decays: ComplexArray) -> ComplexArray:
@@ -162,9 +165,9 @@ def _stepped(driven: ComplexArray, decays: ComplexArray) -> ComplexArray:
         # each then has what drove it over twice as many steps of its block
         out[..., reach:] += (decays**reach)[:, None, None] * out[..., :-reach]
         reach *= 2
-    carried, whole = np.zeros((blocks, modes), dtype=complex), decays**BLOCK
+    carried, block_decay = np.zeros((blocks, modes), dtype=complex), decays**BLOCK
     for k, last in enumerate(np.ascontiguousarray(out[:, :-1, -1].T), 1):
-        carried[k] = whole * carried[k - 1] + last
+        carried[k] = block_decay * carried[k - 1] + last
     out += carried.T[..., None] * decays[:, None, None] ** np.arange(1, BLOCK + 1)
     return out.reshape(modes, -1)[:, :count]
 
@@ -176,7 +179,6 @@ def _nodes() -> Array:
 
 @lru_cache
 def _quadrature() -> tuple[Array, Array]:
-    """Fine points of a step of one, and their shares times the polynomials of the Gauss points, (points, nodes)."""
     nodes = _nodes()
     points, shares = np.polynomial.legendre.leggauss(FINE)
     points = 0.5 * (points + 1.0)
@@ -196,16 +198,10 @@ def step_moments(count: int) -> Array:
 
 @lru_cache
 def largest_share() -> float:
-    """What a polynomial through the Gauss points is at most over a step, as a share of its largest value at these.
+    """Return the largest value over a step of a polynomial, as a share of its largest at the Gauss points.
 
     The sum of |L_i| is largest at the ends of the step.
     """
     nodes = _nodes()
     ends = [np.prod([(1.0 - o) / (node - o) for o in nodes if o != node]) for node in nodes]
     return float(np.abs(ends).sum())
-
-
-def _weights(rates: ComplexArray) -> ComplexArray:
-    """Of each rate r integrals of e^{r (1 - s)} L_i(s) over a step of one, L_i of its Gauss points, (rates, points)."""
-    points, shares = _quadrature()
-    return np.asarray(np.exp(np.outer(rates, 1.0 - points)) @ shares)

@@ -10,12 +10,12 @@ from laufruhe.machine.extra import Extra
 
 @dataclass(frozen=True)
 class Run(Extra):
-    """From rest to a speed and back, at a constant rate each way.
+    """Run from rest to a speed and back, at a constant rate each way.
 
     Attributes
     ----------
     speed
-        At the end of the run-up [rad/s].
+        Speed at the end of the run-up [rad/s].
     up, down
         Time of run-up and of shut-down [s].
     point

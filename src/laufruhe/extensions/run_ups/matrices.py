@@ -8,7 +8,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from laufruhe.extensions.run_ups.dampers import Felt, Linear
+from laufruhe.extensions.run_ups.dampers import Linear, LinearMaps
 from laufruhe.extensions.run_ups.linear_run import Response
 from laufruhe.extensions.run_ups.peaks import signal_of
 from laufruhe.numerics.arrays import Array
@@ -16,35 +16,35 @@ from laufruhe.physics.time_model import time_model
 from laufruhe.problem.measure import Measure
 from laufruhe.prove.mounts.box_response import BoxModel
 
-Rows: TypeAlias = tuple[Felt, int]
+Rows: TypeAlias = tuple[LinearMaps, int]
 """What a measure is the largest length of, and how many rows a place has."""
 
 
 class RunMatrices:
-    """Of a problem whose open numbers are stiffnesses alone; the fluid of tracks stands after the block.
+    """Matrices of run-ups over open stiffnesses; the fluid of tracks stands after the block.
 
     Attributes
     ----------
     base
-        All stiffnesses at their lower bounds, bump stops left out.
+        Time model with all stiffnesses at their lower bounds, without bump stops.
     """
 
     def __init__(self, model: BoxModel) -> None:
         self._model = model
-        whole = time_model(model.mounting(model.lower))
-        self.base = replace(whole, stops=np.zeros_like(whole.stops))
+        model_at_lower = time_model(model.mounting(model.lower))
+        self.base = replace(model_at_lower, stops=np.zeros_like(model_at_lower.stops))
 
     @property
     def size(self) -> int:
-        """n."""
+        """Number of coordinates, n."""
         return self.base.size
 
     @cached_property
-    def motion(self) -> Felt:
+    def motion(self) -> LinearMaps:
         """Stiffness, loss and damping of E25 and E26."""
         drag = self.base.damping.copy()
         drag[:6, :6] = self._lowest("damping")
-        return Felt(
+        return LinearMaps(
             Linear(self.base.stiffness, self._square("stiffness").slopes),
             self._square("loss"),
             Linear(drag, self._square("damping").slopes),
@@ -56,46 +56,45 @@ class RunMatrices:
         squares, modes = np.linalg.eigh(self._model.stiffness(self._model.upper[None])[0])
         if not squares[0] > 0.0:
             return 0.0
-        held = modes / np.sqrt(squares)
-        ends = np.linalg.eigvalsh(held.T @ self._model.at("loss", self._model.upper[None])[0] @ held)
+        scaled = modes / np.sqrt(squares)
+        ends = np.linalg.eigvalsh(scaled.T @ self._model.at("loss", self._model.upper[None])[0] @ scaled)
         return float(max(0.5 * (ends[0] + ends[-1]), 0.0))
 
     @cached_property
-    def uneven_loss(self) -> Felt:
+    def uneven_loss(self) -> LinearMaps:
         """The loss beyond that of one factor for all."""
         loss, stiffness = self.motion.lossy, self._square("stiffness")
         beyond = (
             getattr(loss, k) - self.loss_factor * getattr(stiffness, k) for k in ("lowest", "slopes")
         )  # fmt: skip
         nothing = Linear(np.zeros_like(loss.lowest), np.zeros_like(loss.slopes))
-        return Felt(nothing, Linear(*beyond), nothing)
+        return LinearMaps(nothing, Linear(*beyond), nothing)
 
-    def asked(self, measure: Measure) -> Rows:
-        """What is felt, a place after the other."""
-        still = np.zeros_like(self.base.drag)
+    def maps_of(self, measure: Measure) -> Rows:
+        """Return the maps of a measure, one place after the other, and the rows of a place."""
+        no_drag = np.zeros_like(self.base.drag)
         count = len(self._model.lower)
 
         def at_rest(forces: Array) -> Array:
-            return self._seen(measure, forces, still, False)
+            return self._seen(measure, forces, no_drag, False)
 
         def moving(drag: Array) -> Array:
-            return self._seen(measure, still, self._padded(drag), True)
+            return self._seen(measure, no_drag, self._padded(drag), True)
 
         def linear(name: str) -> Linear:
-            nothing = moving(np.zeros((len(still), 6)))
+            nothing = moving(np.zeros((len(no_drag), 6)))
             by_side = [moving(self._model.slopes[name][j]) - nothing for j in range(count)]
             return Linear(moving(self._lowest(name)), np.array(by_side))
 
-        springs = [at_rest(self._padded(own)) - at_rest(still) for own in self._model.slopes["springs"]]
-        felt = Felt(Linear(at_rest(self.base.forces), np.array(springs)), linear("losses"), linear("dampers"))
-        return felt, self._shape(measure)[-1]
+        springs = [at_rest(self._padded(slope)) - at_rest(no_drag) for slope in self._model.slopes["springs"]]
+        maps = LinearMaps(Linear(at_rest(self.base.forces), np.array(springs)), linear("losses"), linear("dampers"))
+        return maps, self._shape(measure)[-1]
 
     def _seen(self, measure: Measure, forces: Array, drag: Array, moves: bool) -> Array:
-        """From motion, or from its rate, to what a measure is the length of, shape (rows, n)."""
         one, nothing = np.eye(self.size), np.zeros((self.size, self.size))
         model = replace(self.base, forces=forces, drag=drag)
-        found = signal_of(measure, Response(model, *((nothing, one) if moves else (one, nothing))))
-        return np.asarray(found.reshape(self.size, -1).T)
+        signal = signal_of(measure, Response(model, *((nothing, one) if moves else (one, nothing))))
+        return np.asarray(signal.reshape(self.size, -1).T)
 
     def _shape(self, measure: Measure) -> tuple[int, ...]:
         nothing = np.zeros((self.size, 1))

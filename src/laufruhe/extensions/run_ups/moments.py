@@ -28,7 +28,7 @@ class LongSteps:
     moments
         Shape (moments, 6, steps): of the wrench about the origin.
     pushes, highest
-        What the integral of the length of its share in the motion, and that length, are at most in a step, (steps,).
+        Bounds of the integral of the length of its share in the motion in a step, and of that length, (steps,).
     """
 
     moments: Array
@@ -37,7 +37,7 @@ class LongSteps:
 
     @property
     def count(self) -> int:
-        """Of steps."""
+        """Number of steps."""
         return len(self.pushes)
 
 
@@ -47,11 +47,11 @@ class RunMoments:
     Parameters
     ----------
     wrenches
-        As `Sweep.wrenches` has them.
+        Wrenches as `Sweep.wrenches` returns them.
     load
-        From a wrench to what drives the motion, shape (n, 6).
+        Matrix from a wrench to the driven coordinates, shape (n, 6).
     times
-        So many short steps make a long one.
+        Number of short steps in a long one.
     """
 
     def __init__(self, sweep: Sweep, wrenches: Array, load: Array, times: int) -> None:
@@ -70,23 +70,23 @@ class RunMoments:
         """Long steps of which one ends at a short one; what is before the start is at rest and without load."""
         first = place % self.times
         if first not in self._known:
-            self._known[first] = self._found(first)
+            self._known[first] = self._long_steps(first)
         return self._known[first]
 
     def short(self, places: Array) -> Array:
         """Moments of short steps that begin at these, zero beyond the run, shape (..., moments, 6)."""
         inside = (places >= 0) & (places < self.sweep.count)
-        own = self._wrenches[..., np.where(inside, places, 0)] * inside
+        wrenches = self._wrenches[..., np.where(inside, places, 0)] * inside
         shares = step_moments(MOMENTS) * self.sweep.step ** np.arange(1, MOMENTS + 1)[:, None]
-        return np.asarray(np.moveaxis(np.tensordot(shares, own, axes=1), (0, 1), (-2, -1)))
+        return np.asarray(np.moveaxis(np.tensordot(shares, wrenches, axes=1), (0, 1), (-2, -1)))
 
-    def _found(self, first: int) -> LongSteps:
+    def _long_steps(self, first: int) -> LongSteps:
         ahead = (self.times - first) % self.times
         count = (ahead + self.sweep.count) // self.times
 
         def cut(rows: Array) -> Array:
-            whole = np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(ahead, 0)])[..., : count * self.times]
-            return np.asarray(whole.reshape(*rows.shape[:-1], count, self.times))
+            padded = np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(ahead, 0)])[..., : count * self.times]
+            return np.asarray(padded.reshape(*rows.shape[:-1], count, self.times))
 
         moments = np.einsum("kat,aint->kin", self._weights, cut(self._wrenches), optimize=True)
         highest = cut(self._highest)
@@ -94,12 +94,11 @@ class RunMoments:
 
     @property
     def _weights(self) -> Array:
-        """Of the Gauss points of the short steps in a long one, shape (moments, points, short steps)."""
-        h, found = self.sweep.step, []
+        h, weights = self.sweep.step, []
         shares = step_moments(MOMENTS)
         for later in range(self.times - 1, -1, -1):
             # (l h + u)^k / k! = sum of (l h)^i / i! u^(k - i) / (k - i)!
             powers = [(later * h) ** i / math.factorial(i) for i in range(MOMENTS)]
-            own = [sum(powers[i] * h ** (k - i + 1) * shares[k - i] for i in range(k + 1)) for k in range(MOMENTS)]
-            found.append(np.array(own))
-        return np.stack(found, axis=-1)
+            row = [sum(powers[i] * h ** (k - i + 1) * shares[k - i] for i in range(k + 1)) for k in range(MOMENTS)]
+            weights.append(np.array(row))
+        return np.stack(weights, axis=-1)

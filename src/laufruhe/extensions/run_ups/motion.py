@@ -31,21 +31,21 @@ from laufruhe.prove.mounts.box_response import BoxModel
 # a long step times the quickest motion: as it is chosen, and as far as moments reach
 REACH, FARTHEST = 0.35, 1.0
 # stiffness of the softest motion from which it is held, as a share of that of the stiffest
-HELD = 1e3 * FREE_STIFFNESS
+LEAST_HELD = 1e3 * FREE_STIFFNESS
 # shapes of modes from which exact steps are none in modes
 ALIKE = 1e8
 
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """Of boxes, in the modes of their middles; y is counted in 1 / `scale`.
+    """Equations of motion on boxes, in the modes of their middles; y is counted in 1 / `scale`.
 
     Attributes
     ----------
     above, halves, turn, roots
-        Of the boxes, as `mapped` takes them.
+        Boxes, as `mapped` takes them.
     maps
-        Of the force of motion.
+        Maps from motion to its force.
     matrix, first, second
         A0, A_j and A_jk, shapes (boxes, 2 n, 2 n), (boxes, open numbers, ...), (boxes, pairs, ...).
     load
@@ -53,9 +53,9 @@ class Equations:
     softest
         K of the lower corner, shape (boxes, n, n).
     drives
-        By how much a rate grows at most where losses drive [1/s], shape (boxes,).
+        Largest growth of a rate where losses drive [1/s], shape (boxes,).
     known
-        Whether what is shown is so, shape (boxes,).
+        Mask of boxes for which the bounds hold, shape (boxes,).
     """
 
     scale: float
@@ -74,39 +74,38 @@ class Equations:
 
     @property
     def count(self) -> int:
-        """Boxes."""
+        """Number of boxes."""
         return len(self.halves)
 
 
 def equations(model: BoxModel, matrices: RunMatrices, scale: float, lower: Array, upper: Array) -> Equations:
-    """Of boxes, shapes (boxes, open numbers)."""
+    """Return the equations of motion on boxes, shapes (boxes, open numbers)."""
     above, halves, n = 0.5 * (lower + upper) - model.lower, 0.5 * (upper - lower), matrices.size
     squares, modes = np.linalg.eigh(model.stiffness(0.5 * (lower + upper)))
     soft, stiff = (np.linalg.eigvalsh(model.stiffness(x)) for x in (lower, upper))
-    held = soft[:, 0] > HELD * stiff[:, -1]
+    is_held = soft[:, 0] > LEAST_HELD * stiff[:, -1]
     turn = np.zeros((len(lower), n, n)) + np.eye(n)
     turn[:, :6, :6] = modes
     slopes = np.swapaxes(modes, 1, 2)[:, None] @ (halves[:, :, None, None] * model.stiffness_slopes) @ modes[:, None]
-    own = roots(np.where(held[:, None], squares, 1.0), slopes, n)
-    maps = mapped(matrices.motion, above, halves, turn, own, True)
-    beyond = mapped(matrices.uneven_loss, above, halves, turn, own, True)
+    root_maps = roots(np.where(is_held[:, None], squares, 1.0), slopes, n)
+    maps = mapped(matrices.motion, above, halves, turn, root_maps, True)
+    beyond = mapped(matrices.uneven_loss, above, halves, turn, root_maps, True)
     corner = np.swapaxes(modes, 1, 2) @ model.stiffness(lower) @ modes
     first = -np.concatenate([maps.positions / scale, maps.rates], axis=-1)
     second = -np.concatenate([np.zeros_like(maps.bends), maps.bends], axis=-1)
-    still = np.zeros((len(lower), n, n))
-    matrix = np.block([[still, still + scale * np.eye(n)], [-maps.position / scale, -maps.rate]])
+    zeros = np.zeros((len(lower), n, n))
+    matrix = np.block([[zeros, zeros + scale * np.eye(n)], [-maps.position / scale, -maps.rate]])
     softest = maps.position - maps.positions.sum(axis=1)
-    held &= np.linalg.eigvalsh(softest)[:, 0] > 0.0
+    is_held &= np.linalg.eigvalsh(softest)[:, 0] > 0.0
     load = np.swapaxes(turn, 1, 2) @ matrices.base.load
     drives = _drives(beyond, matrices.loss_factor * _root(corner))
     return Equations(
-        scale, above, halves, turn, own, maps, matrix, _under(first), _under(second),
-        np.pad(load, [(0, 0), (n, 0), (0, 0)]), softest, drives, held & _apart(matrix, scale),
+        scale, above, halves, turn, root_maps, maps, matrix, _under(first), _under(second),
+        np.pad(load, [(0, 0), (n, 0), (0, 0)]), softest, drives, is_held & _is_resolved(matrix, scale),
     )  # fmt: skip
 
 
 def _under(forces: Array) -> Array:
-    """Matrices that change the rate alone."""
     return np.concatenate([np.zeros_like(forces), forces], axis=-2)
 
 
@@ -116,15 +115,13 @@ def _root(matrices: Array) -> Array:
 
 
 def _drives(beyond: Maps, even: Array) -> Array:
-    """What rates grow by at most: losses that are not of one factor may drive one motion by another (boxes,)."""
     uneven = beyond.rate[:, :6, :6]
-    least = np.linalg.eigvalsh(0.5 * (uneven + np.swapaxes(uneven, 1, 2)) + even)[:, 0]
+    smallest = np.linalg.eigvalsh(0.5 * (uneven + np.swapaxes(uneven, 1, 2)) + even)[:, 0]
     change = np.linalg.norm(beyond.rates, axis=(-2, -1)).sum(axis=1) + np.linalg.norm(beyond.bent, axis=(-2, -1))
-    return np.asarray(np.maximum(change - least, 0.0))
+    return np.asarray(np.maximum(change - smallest, 0.0))
 
 
-def _apart(matrix: Array, scale: float) -> Mask:
-    """Whether the modes at the middle tell its motion, as the exact model asks (E28a)."""
+def _is_resolved(matrix: Array, scale: float) -> Mask:
     n = matrix.shape[-1] // 2
     units = np.repeat([scale, 1.0], n)
     shapes = np.linalg.eig(matrix / units[:, None] * units)[1]
@@ -140,7 +137,7 @@ class Motion:
     middle, first, second
         z0, z_j and z_jk, shapes (boxes, 2 n, times), (boxes, open numbers, ...) and (boxes, pairs, ...).
     left
-        What |r| is at most, shape (boxes, times).
+        Bound of |r|, shape (boxes, times).
     """
 
     middle: Array
@@ -150,7 +147,7 @@ class Motion:
 
 
 class Steps:
-    """Of one length for some boxes: what they make of motion, and of moments."""
+    """Long steps on boxes: matrices from motion and from moments of the load to the motion after a step."""
 
     def __init__(self, of: Equations, step: float, orders: bool = True) -> None:
         self.of, self.step = of, step
@@ -158,26 +155,26 @@ class Steps:
         first, second = (of.first, of.second) if orders else (of.first[:, :0], of.second[:, :0])
         now = np.zeros_like(of.matrix) + np.eye(of.matrix.shape[-1])
         powers = [now, np.zeros_like(first), np.zeros_like(second)]
-        whole = [np.zeros_like(each) for each in powers]
+        moves = [np.zeros_like(power) for power in powers]
         loads: tuple[list[Array], ...] = ([], [], [])
         for k in range(MOMENTS):
-            for into, sums, each in zip(loads, whole, powers, strict=True):
-                sums += each * (step**k / math.factorial(k))
-                into.append(each @ (of.load if each.ndim == 3 else of.load[:, None]))
+            for into, sums, power in zip(loads, moves, powers, strict=True):
+                sums += power * (step**k / math.factorial(k))
+                into.append(power @ (of.load if power.ndim == 3 else of.load[:, None]))
             powers = self._next(powers, first, second)
-        self.moves = whole
+        self.moves = moves
         # moments stand beside the components of the wrench
-        self.loads = [np.concatenate(each, axis=-1) for each in loads]
+        self.loads = [np.concatenate(power, axis=-1) for power in loads]
 
     def _next(self, powers: list[Array], first: Array, second: Array) -> list[Array]:
         now, by, bent = powers
         a = self.of.matrix[:, None]
-        found = [self.of.matrix @ now, a @ by + first @ now[:, None], a @ bent + second @ now[:, None]]
+        following = [self.of.matrix @ now, a @ by + first @ now[:, None], a @ bent + second @ now[:, None]]
         for number, (j, k) in enumerate(self.pairs):
-            found[2][:, number] += first[:, j] @ by[:, k]
+            following[2][:, number] += first[:, j] @ by[:, k]
             if j != k:
-                found[2][:, number] += first[:, k] @ by[:, j]
-        return found
+                following[2][:, number] += first[:, k] @ by[:, j]
+        return following
 
     def middle(self, moments: Array) -> Array:
         """z0 from rest under moments (boxes, moments x 6, steps), shape (boxes, 2 n, steps + 1)."""
@@ -196,7 +193,6 @@ class Steps:
 
 
 def _followed(moves: Array, driven: Array) -> Array:
-    """z_{k+1} = moves z_k + driven_k from nothing, shapes (boxes, m, m), (boxes, columns, m, steps) to steps + 1."""
     boxes, columns, m, count = driven.shape
     out = np.zeros((count + 1, boxes, m, columns))
     out[1:] = np.moveaxis(driven, (3, 0, 2, 1), (0, 1, 2, 3))
@@ -206,14 +202,14 @@ def _followed(moves: Array, driven: Array) -> Array:
 
 
 def motion_of(steps: Steps, moments: Array, pushes: Array, highest: Array) -> Motion:
-    """Of boxes, each under its own moments.
+    """Return the motion on boxes, each under its own moments.
 
     Parameters
     ----------
     moments
         Shape (boxes, moments x 6, steps).
     pushes, highest
-        Of the loads, as `LongSteps` has them, shape (boxes, steps).
+        Bounds of the loads, as `LongSteps` has them, shape (boxes, steps).
     """
     middle = steps.middle(moments)
     first, second = steps.orders(moments, middle)
@@ -227,7 +223,7 @@ def motion_of(steps: Steps, moments: Array, pushes: Array, highest: Array) -> Mo
 
 
 def _force(of: Equations, middle: Array, first: Array, second: Array) -> Array:
-    """What |f| is at most over the boxes at the ends of steps, (boxes, times)."""
+    """Return a bound of |f| over the boxes at the ends of steps, shape (boxes, times)."""
     n = middle.shape[1] // 2
     total = np.zeros((of.count, middle.shape[-1]))
     for j in range(first.shape[1]):
@@ -242,22 +238,22 @@ def _force(of: Equations, middle: Array, first: Array, second: Array) -> Array:
 def _between(
     of: Equations, h: float, middle: Array, first: Array, second: Array, pushes: Array, highest: Array
 ) -> Array:
-    """What the mean of |f| over a step is over that of its ends at most, (boxes, steps).
+    """Return a bound of the mean of |f| over a step beyond that of its ends, shape (boxes, steps).
 
     A curve leaves its chord by an eighth of the square of the step times its largest second derivative, and |y'| of the
     middle, whose loads jump, that of its nearer end by half a step.
     """
-    a, b = (np.linalg.norm(each, 2, axis=(-2, -1)).reshape(of.count, -1) for each in (of.matrix, of.first))
-    c, rest = (np.linalg.norm(each, axis=(-2, -1)).reshape(of.count, -1) for each in (of.second, of.maps.rest))
-    a, b, c, rest = (each.sum(axis=1)[:, None] for each in (a, b, c, rest))
-    sizes = [np.linalg.norm(each[..., :-1], axis=-2) for each in (middle, first, second)]
+    a, b = (np.linalg.norm(matrix, 2, axis=(-2, -1)).reshape(of.count, -1) for matrix in (of.matrix, of.first))
+    c, rest = (np.linalg.norm(matrix, axis=(-2, -1)).reshape(of.count, -1) for matrix in (of.second, of.maps.rest))
+    a, b, c, rest = (matrix.sum(axis=1)[:, None] for matrix in (a, b, c, rest))
+    sizes = [np.linalg.norm(matrix[..., :-1], axis=-2) for matrix in (middle, first, second)]
     grown = np.exp(a * h)
     # sizes within a step, then those of derivatives
     z0 = grown * (sizes[0] + pushes)
     z1 = grown * (sizes[1].sum(axis=1) + h * b * z0)
     z2 = grown * (sizes[2].sum(axis=1) + h * (b * z1 + c * z0))
-    own = a * z0 + highest
-    rates = [own, a * z1 + b * z0, a * z2 + b * z1 + c * z0]
+    rate = a * z0 + highest
+    rates = [rate, a * z1 + b * z0, a * z2 + b * z1 + c * z0]
     bends = [a * rates[1] + b * rates[0], a * rates[2] + b * rates[1] + c * rates[0]]
     chord = b * bends[1] + (c + rest) * (bends[0] + bends[1])
-    return np.asarray(h**2 / 8.0 * chord + 0.5 * h * rest * own)
+    return np.asarray(h**2 / 8.0 * chord + 0.5 * h * rest * rate)

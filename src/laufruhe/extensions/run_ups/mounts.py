@@ -34,17 +34,17 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     Parameters
     ----------
     relaxed
-        Of the same without what is asked of run-ups: a search starts there, and no design goes under its bound.
+        Result without run-ups: the search starts there, and no design goes under its bound.
     """
     started = time.perf_counter()
     initial = evaluate_start(problem)
     stopped = any(spring.stop_stiffness > 0.0 for _, spring in every_spring(problem.engine.mounts))
     starts = min(problem.search.starts, STOPPED_STARTS if stopped else STARTS)
-    few = replace(problem, search=replace(problem.search, starts=starts))
+    limited = replace(problem, search=replace(problem.search, starts=starts))
     # from one start nothing is gained by looking roughly first
     alone = starts == 1
     first = None if relaxed is None or alone else place_of(problem, relaxed)
-    search = MountSearch(few, initial, first=first, beside=True, coarser=1 if alone else COARSER)
+    search = MountSearch(limited, initial, first=first, beside=True, coarser=1 if alone else COARSER)
     bounded = divides(problem) and bounds_runs(problem)
     search.run()
     searched = bool(search.optima) and not stopped and not alone
@@ -52,50 +52,49 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
         search.refined()
     divided = divided_by(problem, search, False) if bounded else Divided(0.0, 0)
     timing = {"solve": time.perf_counter() - started}
-    found = search.chosen
-    if found is None or found.design.excess > KEPT:
+    best = search.chosen
+    if best is None or best.design.excess > KEPT:
         conflict = conflict_of(problem) if divided.bound == math.inf else ()
         result = none_within(problem, initial, conflict, timing)
-        return result if conflict else _none(problem, search, found, result)
-    return _concluded(problem, search, found, initial, relaxed, divided, timing)
+        return result if conflict else _none(problem, search, best, result)
+    return _concluded(problem, search, best, initial, relaxed, divided, timing)
 
 
 def _concluded(
-    problem: Problem, search: MountSearch, found: Found, initial: Evaluation, relaxed: Result | None, divided: Divided,
+    problem: Problem, search: MountSearch, best: Found, initial: Evaluation, relaxed: Result | None, divided: Divided,
     timing: dict[str, float],
 ) -> Result:  # fmt: skip
-    """Of the best design found, with the better of both bounds."""
-    own = None if relaxed is None else relaxed.certificate
-    bare = 0.0 if own is None else own.lower_bound
-    optimum = found.optimum
-    shown = Shown(
-        bound=max(bare, divided.bound),
+    """Return the result of the best design, with the better of both bounds."""
+    certificate = None if relaxed is None else relaxed.certificate
+    relaxed_bound = 0.0 if certificate is None else certificate.lower_bound
+    optimum = best.optimum
+    facts = Shown(
+        bound=max(relaxed_bound, divided.bound),
         reach=Reach.NEAR if divided.boxes else Reach.ASIDE,
         kkt_residual=math.inf if optimum is None else optimum.kkt_residual,
-        method=_method(search.optima, max(found.design.value, numerical_zero(problem)), bare, divided),
-        prices={} if optimum is None else found.joint.prices(optimum),
+        method=_method(search.optima, max(best.design.value, numerical_zero(problem)), relaxed_bound, divided),
+        prices={} if optimum is None else best.joint.prices(optimum),
     )
-    design = replace(found.design, problem=problem)
-    return concluded(design, initial, shown, timing)
+    design = replace(best.design, problem=problem)
+    return concluded(design, initial, facts, timing)
 
 
-def _method(optima: Sequence[LocalOptimum], scale: float, bare: float, divided: Divided) -> str:
+def _method(optima: Sequence[LocalOptimum], scale: float, relaxed_bound: float, divided: Divided) -> str:
     ends = ends_in_words(optima, len(distinct(optima, scale, 1e-3)))
-    if divided.bound > bare:
+    if divided.bound > relaxed_bound:
         bound = f"; bounds of mounts and run-ups looked at in {divided.boxes} box{'es' if divided.boxes > 1 else ''}"
-    elif bare > 0.0:
+    elif relaxed_bound > 0.0:
         bound = "; the bound is that of the same without what is asked of run-ups"
     else:
         bound = "; nothing bounds a run-up alone"
     return f"{ends}, with run-ups integrated{bound}"
 
 
-def _none(problem: Problem, search: MountSearch, found: Found | None, result: Result) -> Result:
-    """No start ended within the limits, which proves nothing."""
+def _none(problem: Problem, search: MountSearch, best: Found | None, result: Result) -> Result:
     names, miss = "the limits", ""
-    if found is not None:
-        names = " and ".join(f"'{name}'" for name in broken_limits(problem.limits, found.design.evaluation))
-        miss = f" (nearest misses by {found.design.excess:.3g} of a limit)"
+    if best is not None:
+        names = " and ".join(f"'{name}'" for name in broken_limits(problem.limits, best.design.evaluation))
+        miss = f" (nearest misses by {best.design.excess:.3g} of a limit)"
     starts = sum(optimum.starts for optimum in search.optima)
     message = f"no design found: from {starts} starts none keeps {names}{miss}; relax it, or open more"
     return replace(result, status=Status.FAILED, message=message)

@@ -39,18 +39,18 @@ class RunPeaks:
     Parameters
     ----------
     problem
-        With a run, on elastic mounts; numbers of mounts and unbalances are open.
+        Problem with a run on elastic mounts; numbers of mounts and unbalances are open.
     coarser
         Times as long as those of the last word steps are. Peaks are then sought between them too.
     """
 
     def __init__(self, problem: Problem, measures: Sequence[Measure], coarser: int = 1) -> None:
-        bare = replace(problem, objective=(), limits=(), ranks=(), origin=None, known_rows={})
-        self._problem, self.measures, self._coarser = bare, tuple(measures), coarser
+        engine_alone = replace(problem, objective=(), limits=(), ranks=(), origin=None, known_rows={})
+        self._problem, self.measures, self._coarser = engine_alone, tuple(measures), coarser
         self._decisions, self._domains = problem.mount_decisions, domains_of(problem.unbalances)
         # a search asks about one design several times in succession
         self._last: tuple[bytes, Array, Array] = (b"", np.zeros(0), np.zeros((0, 0)))
-        self._told: tuple[bytes, Array] = (b"", np.zeros(0))
+        self._known: tuple[bytes, Array] = (b"", np.zeros(0))
 
     def __reduce__(self) -> tuple[type[Self], tuple[Problem, tuple[Measure, ...], int]]:
         # loads over time are made anew where they are needed
@@ -58,47 +58,47 @@ class RunPeaks:
 
     @property
     def is_known(self) -> bool:
-        """Whether steps follow the run."""
+        """Return whether steps follow the run."""
         return bool(self.sweeps)
 
     @property
     def counts(self) -> tuple[int, ...]:
-        """Peaks of every measure."""
+        """Number of peaks of every measure."""
         places = {False: 1, True: len(self._problem.engine.mounts)}
         return tuple(2 * STRETCHES * places[measure.channel.unit != "rad"] for measure in self.measures)
 
-    def values(self, asked: Array) -> Array:
-        """Peaks where open numbers of mounts, then columns of unbalances, have these values; no numbers where none."""
+    def values(self, point: Array) -> Array:
+        """Return the peaks at open numbers of mounts, then columns of unbalances; not numbers where there are none."""
         if self.is_stopped:
             # designs side by side cost hardly more than one
-            return self._at(asked)[1]
-        key = asked.tobytes()
+            return self._at(point)[1]
+        key = point.tobytes()
         if key == self._last[0]:
             return self._last[1]
-        if key != self._told[0]:
-            (found,) = self._found([asked])
-            self._told = key, self._none if found is None else _peaks(found, self._coarser > 1)
-        return self._told[1]
+        if key != self._known[0]:
+            (signals,) = self._signals([point])
+            self._known = key, self._none if signals is None else _peaks(signals, self._coarser > 1)
+        return self._known[1]
 
-    def slopes(self, asked: Array) -> Array:
-        """Of those peaks, shape (peaks, numbers), by differences of the motion at their moments."""
-        return self._at(asked)[2]
+    def slopes(self, point: Array) -> Array:
+        """Return the derivatives of the peaks by differences of the motion at their moments, shape (peaks, numbers)."""
+        return self._at(point)[2]
 
     def rows(self, points: Sequence[Array]) -> list[dict[Measure, Array]] | None:
-        """Of designs what measures are the lengths of, at every step and place of both runs, one after the other.
+        """Return the signals of measures at every step and place of both runs, for each point; None on bump stops.
 
         None where that is not linear in the loads, as on bump stops.
         """
-        found = [] if self.is_stopped else self._found(points)
-        told = [both for both in found if both is not None]
-        if not told or len(told) < len(points):
+        designs = [] if self.is_stopped else self._signals(points)
+        known = [both for both in designs if both is not None]
+        if not known or len(known) < len(points):
             return None
-        pairs = [dict(zip(self.measures, zip(both[::2], both[1::2], strict=True), strict=True)) for both in told]
-        return [{measure: np.concatenate(runs) for measure, runs in each.items()} for each in pairs]
+        pairs = [dict(zip(self.measures, zip(both[::2], both[1::2], strict=True), strict=True)) for both in known]
+        return [{measure: np.concatenate(runs) for measure, runs in pair.items()} for pair in pairs]
 
     @cached_property
     def is_stopped(self) -> bool:
-        """Whether any bump stop can be met."""
+        """Return whether any bump stop can be met."""
         springs = (spring for _, spring in every_spring(self._problem.engine.mounts))
         return any(spring.stop_stiffness > 0.0 and spring.stop_gap < math.inf for spring in springs)
 
@@ -106,22 +106,21 @@ class RunPeaks:
     def _none(self) -> Array:
         return np.full(sum(self.counts), np.nan)
 
-    def _at(self, asked: Array) -> tuple[bytes, Array, Array]:
-        """Peaks and slopes of the design that was asked about last."""
-        key = asked.tobytes()
+    def _at(self, point: Array) -> tuple[bytes, Array, Array]:
+        key = point.tobytes()
         if self._last[0] != key:
-            self._last = (key, *self._sloped(asked))
+            self._last = (key, *self._sloped(point))
         return self._last
 
-    def _sloped(self, asked: Array) -> tuple[Array, Array]:
-        ends, widths = [asked], []
-        for k in range(len(asked)):
-            low, high = self._sides(asked, k)
+    def _sloped(self, point: Array) -> tuple[Array, Array]:
+        ends, widths = [point], []
+        for k in range(len(point)):
+            low, high = self._sides(point, k)
             ends += [low, high]
             widths.append(high[k] - low[k])
-        base, *others = self._found(ends)
+        base, *others = self._signals(ends)
         if base is None or any(other is None for other in others):
-            return self._none, np.full((sum(self.counts), len(asked)), np.nan)
+            return self._none, np.full((sum(self.counts), len(point)), np.nan)
         tops, fine = [top for _, top in _tops(base)], self._coarser > 1
         rows = [
             np.concatenate([_lengths(_squares(part), top, fine) for part, top in zip(other or [], tops, strict=True)])
@@ -130,29 +129,32 @@ class RunPeaks:
         pairs = zip(rows[::2], rows[1::2], widths, strict=True)
         return _peaks(base, fine), np.column_stack([(high - low) / width for low, high, width in pairs])
 
-    def _sides(self, asked: Array, k: int) -> tuple[Array, Array]:
+    def _sides(self, point: Array, k: int) -> tuple[Array, Array]:
         """Two points about one, within the bounds of a number of the mounts."""
         count = len(self._decisions)
         if k < count:
-            own = self._decisions[k]
-            low, high = own.lower, own.upper
+            decision = self._decisions[k]
+            low, high = decision.lower, decision.upper
         else:
             high = next(d.scale for d in self._domains if d.columns.start <= k - count < d.columns.stop)
             low = -high
-        step = STEP * min(high - low, max(abs(float(asked[k])), LEAST_SHARE * (high - low)))
-        ends = (asked.copy(), asked.copy())
-        for end, moved in zip(ends, (asked[k] - step, asked[k] + step), strict=True):
+        step = STEP * min(high - low, max(abs(float(point[k])), LEAST_SHARE * (high - low)))
+        ends = (point.copy(), point.copy())
+        for end, moved in zip(ends, (point[k] - step, point[k] + step), strict=True):
             end[k] = float(np.clip(moved, low, high)) if k < count else moved
         return ends
 
-    def _found(self, points: Sequence[Array]) -> list[list[Array] | None]:
-        """What measures are the lengths of, at every step and place of both runs; None where no steps follow it."""
+    def _signals(self, points: Sequence[Array]) -> list[list[Array] | None]:
+        """Return the signals of measures in both runs for each point; None where no steps follow it."""
         models = [self._model(point[: len(self._decisions)]) for point in points]
         wrenches = [
-            [sum((u * own for u, own in zip(point[len(self._decisions) :], by, strict=True)), bare) for point in points]
-            for bare, by in self._wrenches
+            [
+                sum((u * loads for u, loads in zip(point[len(self._decisions) :], by, strict=True)), base)
+                for point in points
+            ]
+            for base, by in self._wrenches
         ]
-        runs = [responses_to(models, sweep, own) for sweep, own in zip(self.sweeps, wrenches, strict=True)]
+        runs = [responses_to(models, sweep, loads) for sweep, loads in zip(self.sweeps, wrenches, strict=True)]
         return [
             None if any(response is None for response in both) else [
                 signal_of(measure, response) for measure in self.measures for response in both if response is not None
@@ -172,22 +174,22 @@ class RunPeaks:
 
     @cached_property
     def sweeps(self) -> tuple[Sweep, ...]:
-        """Of run-up and shut-down; none where they take too many steps."""
+        """Steps of run-up and shut-down; empty where these are too many."""
         run = self._problem.engine.extra(Run)
         if run is None:
             raise TypeError("there is no run-up")
-        told = ((0.0, run.speed, run.up), (run.speed, 0.0, run.down))
-        found = [sweep_of(*each, self._coarser) for each in told]
-        return tuple(each for each in found if each is not None) if None not in found else ()
+        ways = ((0.0, run.speed, run.up), (run.speed, 0.0, run.down))
+        sweeps = [sweep_of(*way, self._coarser) for way in ways]
+        return tuple(way for way in sweeps if way is not None) if None not in sweeps else ()
 
     @property
     def wrenches(self) -> tuple[Array, ...]:
-        """Of both runs those of the bare design."""
-        return tuple(bare for bare, _ in self._wrenches)
+        """Wrenches of the bare design in both runs."""
+        return tuple(base for base, _ in self._wrenches)
 
     @cached_property
     def _wrenches(self) -> list[tuple[Array, list[Array]]]:
-        """Of both runs: those of the bare design, and of one unit of every column (E28)."""
+        """Return for both runs the wrenches of the bare design, and of one unit of every column (E28)."""
         problem, opened = self._problem, self._problem.unbalances
         run = problem.engine.extra(Run)
         assert run is not None
@@ -199,10 +201,11 @@ class RunPeaks:
         loads = [run_loads(design, point, problem.fidelity) for design in designs]
         out = []
         for sweep in self.sweeps:
-            bare, *others = (
-                sweep.wrenches([(part.orders, part.coefficients) for part in own if part is not None]) for own in loads
+            base, *others = (
+                sweep.wrenches([(part.orders, part.coefficients) for part in parts if part is not None])
+                for parts in loads
             )
-            out.append((bare, [other - bare for other in others]))
+            out.append((base, [other - base for other in others]))
         return out
 
 
@@ -219,13 +222,12 @@ def _peaks(parts: Sequence[Array], between: bool) -> Array:
 
 
 def _squares(vectors: Array) -> Array:
-    """Squared lengths at the start, and at the end of every step, at every place, shape (steps + 1, places)."""
     return np.asarray(np.einsum("sma,sma->sm", vectors, vectors))
 
 
 def _tops(parts: Sequence[Array]) -> list[tuple[Array, NDArray[np.intp]]]:
-    """Of every part its squares, and the step of the largest in every stretch and place, shape (stretches, places)."""
-    found = []
+    """Return for each part its squares, and the step of the largest by stretch and place, shape (stretches, places)."""
+    tops_of_parts = []
     for vectors in parts:
         squares = _squares(vectors)
         count, places = len(squares) // STRETCHES, np.arange(squares.shape[1])
@@ -233,12 +235,11 @@ def _tops(parts: Sequence[Array]) -> list[tuple[Array, NDArray[np.intp]]]:
         tops = inside + count * np.arange(STRETCHES)[:, None]
         # the end of a run stands in its last stretch
         tops[-1] = np.where(squares[-1] > squares[tops[-1], places], len(squares) - 1, tops[-1])
-        found.append((squares, tops))
-    return found
+        tops_of_parts.append((squares, tops))
+    return tops_of_parts
 
 
 def _lengths(squares: Array, tops: NDArray[np.intp], between: bool) -> Array:
-    """Lengths at some steps; between steps the top of the parabola through three, flat."""
     places = np.arange(squares.shape[1])
     middle = squares[tops, places]
     if between:

@@ -29,13 +29,13 @@ def figure(result: Result) -> Figure:
     most, legend = [0.0] * len(_ROWS), []
     for one in series_of(result):
         runs = shown_runs(result, one.design)
-        for found, (style, _) in zip(runs, _RUNS, strict=True):
-            for k, values in enumerate((found.force, found.travel, found.twist)):
+        for envelope, (style, _) in zip(runs, _RUNS, strict=True):
+            for k, values in enumerate((envelope.force, envelope.travel, envelope.twist)):
                 drawn.panels[k].plot(
-                    found.speeds * RPM, factors[k] * values, color=one.colour, linestyle=style, linewidth=1.4
+                    envelope.speeds * RPM, factors[k] * values, color=one.colour, linestyle=style, linewidth=1.4
                 )
                 most[k] = max(most[k], factors[k] * float(values.max(initial=0.0)))
-        force, travel = max(each.worst_force for each in runs), max(each.worst_travel for each in runs)
+        force, travel = max(ways.worst_force for ways in runs), max(ways.worst_travel for ways in runs)
         legend.append(one.entry(f": at most {words(force, 'N', 3)}, {words(travel, 'm', 3)}"))
     for axes, (label, channel), factor, top in zip(drawn.panels, _ROWS, factors, most, strict=True):
         limits = [factor * limit.maximum for limit in limits_on(result, channel)]

@@ -14,8 +14,8 @@ def _applies(problem: Problem) -> bool:
 
 
 def _solve(problem: Problem, decide: Decide, _: Decide) -> Result:
-    found: Result = call_by_name("laufruhe.extensions.run_ups.solver:solve_runs", problem, kinds_of(problem), decide)
-    return found
+    result: Result = call_by_name("laufruhe.extensions.run_ups.solver:solve_runs", problem, kinds_of(problem), decide)
+    return result
 
 
 REDUCTION = Reduction("run-ups", _applies, _solve, before="an objective that nothing open moves")

@@ -21,46 +21,46 @@ NEAR = 0.98
 
 @dataclass(frozen=True, eq=False)
 class RunRows:
-    """Every step of run-up and shut-down.
+    """Rows of every step of run-up and shut-down, affine in the unbalances.
 
     Attributes
     ----------
     constants, slopes
-        Of every measure, at every step and place, shapes (steps, places, d) and (steps, places, d, n).
+        Constants and slopes of every measure, shapes (steps, places, d) and (steps, places, d, n).
     """
 
     constants: dict[Measure, Array]
     slopes: dict[Measure, Array]
 
     @classmethod
-    def of(cls, problem: Problem, measures: Sequence[Measure]) -> RunRows | None:
-        """Of some measures; None where run-ups are not linear in the loads."""
+    def from_problem(cls, problem: Problem, measures: Sequence[Measure]) -> RunRows | None:
+        """Return the rows of measures; None where run-ups are not linear in the loads."""
         count = sum(domain.width for domain in domains_of(problem.unbalances))
-        found = RunPeaks(problem, measures).rows([np.zeros(count), *np.eye(count)])
-        if found is None:
+        signals = RunPeaks(problem, measures).rows([np.zeros(count), *np.eye(count)])
+        if signals is None:
             return None
-        constants, *moved = found
-        slopes = {m: np.stack([each[m] - bare for each in moved], axis=-1) for m, bare in constants.items()}
+        constants, *moved = signals
+        slopes = {m: np.stack([signal[m] - constant for signal in moved], axis=-1) for m, constant in constants.items()}
         return cls(constants, slopes)
 
     def worst(self, measure: Measure, x: Array) -> float:
-        """The largest length at x."""
+        """Return the largest length at x."""
         return float(self._lengths(measure, x).max())
 
     def near(self, measure: Measure, x: Array, height: float) -> NDArray[np.intp]:
-        """Of every stretch and place the longest row, of those that come near a height at x, as flat places of rows."""
+        """Return flat places of the longest row of every stretch and place that comes near a height at x."""
         sizes = self._lengths(measure, x)
         count = -(-len(sizes) // (2 * STRETCHES))
-        found = []
+        places = []
         for start in range(0, len(sizes), count):
             part = sizes[start : start + count]
             tops = part.argmax(axis=0)
-            kept = part[tops, np.arange(part.shape[1])] >= NEAR * height
-            found.append((start + tops[kept]) * sizes.shape[1] + np.flatnonzero(kept))
-        return np.concatenate(found)
+            near = part[tops, np.arange(part.shape[1])] >= NEAR * height
+            places.append((start + tops[near]) * sizes.shape[1] + np.flatnonzero(near))
+        return np.concatenate(places)
 
     def known(self, measure: Measure, places: NDArray[np.intp]) -> KnownRows:
-        """Some of the rows."""
+        """Return some of the rows."""
         constant, slope = self.constants[measure], self.slopes[measure]
         d, n = slope.shape[2:]
         return KnownRows(constant.reshape(-1, d)[places], slope.reshape(-1, d, n)[places])

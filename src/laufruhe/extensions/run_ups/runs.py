@@ -55,28 +55,28 @@ class RunUp:
 
     @property
     def worst_force(self) -> float:
-        """Over the whole run [N]."""
+        """Largest force of the whole run [N]."""
         return float(self.force.max())
 
     @property
     def worst_travel(self) -> float:
-        """Over the whole run [m]."""
+        """Largest travel of the whole run [m]."""
         return float(self.travel.max())
 
     @property
     def worst_twist(self) -> float:
-        """Over the whole run [rad]."""
+        """Largest roll of the whole run [rad]."""
         return float(self.twist.max())
 
 
 def point_of(run: Run, points: Sequence[OperatingPoint]) -> OperatingPoint:
-    """The operating point whose gas drives the engine meanwhile."""
+    """Return the operating point whose gas drives the engine meanwhile."""
     named = [point for point in points if point.name == run.point]
     return named[0] if named else min(points, key=lambda point: point.speed)
 
 
 def runs_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run) -> tuple[RunUp, RunUp]:
-    """Up and down, under the inertia loads of every speed and the gas of one operating point.
+    """Return run-up and shut-down under the inertia loads of every speed and the gas of one operating point.
 
     Raises
     ------
@@ -88,7 +88,9 @@ def runs_of(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run)
 
 @lru_cache(maxsize=32)
 def _found_runs(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: Run) -> tuple[RunUp, RunUp]:
-    mounting, driven = _elastic(engine), replace(engine, block=None, mounts=())
+    if engine.block is None:
+        raise ModelError("a run-up through resonance needs elastic mounts")
+    mounting, driven = elastic_mounting(engine.block, engine.mounts), replace(engine, block=None, mounts=())
 
     def through(first: float, last: float, seconds: float) -> RunUp:
         sweep = sweep_of(first, last, seconds)
@@ -105,7 +107,7 @@ def _found_runs(engine: Engine, point: OperatingPoint, fidelity: Fidelity, run: 
 
 
 def sweep_of(first: float, last: float, seconds: float, coarser: int = 1) -> Sweep | None:
-    """Equal steps of a run, so many times as long as they are for the last word; None where these are too many."""
+    """Return equal steps of a run, `coarser` times as long as for a final evaluation; None where there are too many."""
     fastest = max(first, last) * HIGHEST
     wanted = STEPS_PER_PERIOD * fastest * (seconds / STRETCHES) / math.tau
     if wanted > COARSEST * MOST_STEPS:
@@ -115,20 +117,14 @@ def sweep_of(first: float, last: float, seconds: float, coarser: int = 1) -> Swe
 
 
 def missed_share(run: Run) -> float:
-    """Share of a largest value that may stand between steps, of motion without orders beyond the highest (E28)."""
+    """Return the share of a largest value that may stand between steps, for orders up to the highest (E28)."""
     wanted = STEPS_PER_PERIOD * run.speed * HIGHEST * (max(run.up, run.down) / STRETCHES) / math.tau
     steps = STEPS_PER_PERIOD * min(1.0, MOST_STEPS / wanted)
     return 1.0 / math.cos(math.pi / steps) - 1.0 if steps > 2.0 else math.inf
 
 
-def _elastic(engine: Engine) -> ElasticMounting:
-    if engine.block is None:
-        raise ModelError("a run-up through resonance needs elastic mounts")
-    return elastic_mounting(engine.block, engine.mounts)
-
-
 def run_loads(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> tuple[Spectrum, Spectrum | None]:
-    """Wrench of inertia per square of crank speed, and that of the gas, of the orders that a run follows (E28)."""
+    """Return the wrench of inertia per square of crank speed, and that of the gas, of the orders of a run (E28)."""
     inertia, gas = split_loads(engine, point, fidelity)
     return inertia.kept(HIGHEST), None if gas is None else gas.kept(HIGHEST)
 
@@ -147,7 +143,7 @@ def _envelope(response: Response, first: float, last: float) -> RunUp:
     signals = (response.force, response.travel, response.twist)
     edges = np.arange(0, len(response.twist), (len(response.twist) - 1) // STRETCHES)
     sizes = [np.linalg.norm(signal, axis=-1).max(axis=-1) for signal in signals]
-    most = [np.array([own[a : b + 1].max() for a, b in pairwise(edges)]) for own in sizes]
+    most = [np.array([size[a : b + 1].max() for a, b in pairwise(edges)]) for size in sizes]
     speeds = first + (last - first) * edges[1:] / edges[-1]
     return RunUp(speeds, *most)
 
@@ -163,7 +159,7 @@ def run_through(
     method: Literal["DOP853", "RK45", "Radau"] = "DOP853",
     tolerance: float = 1e-6,
 ) -> RunUp:
-    """Run-up (or shut-down) at constant acceleration, from rest at `first` (E28).
+    """Return a run-up (or shut-down) at constant acceleration, from rest at `first`, integrated by SciPy (E28).
 
     Parameters
     ----------
@@ -187,20 +183,19 @@ def run_through(
     fastest = max(first, last) * float(max(orders.max(initial=0.0) for orders, _ in loads))
     state, edges = np.zeros(2 * model.size), np.linspace(0.0, duration, stretches + 1)
     force, travel, twist = np.zeros((3, stretches))
-    least = 1e-3 * tolerance * static_size(model, loads[0][1] * max(first, last) ** 2)
+    absolute = 1e-3 * tolerance * static_size(model, loads[0][1] * max(first, last) ** 2)
     count = int(STEPS_PER_PERIOD * fastest * (duration / stretches) / (2.0 * np.pi)) + 1
     for k, (start, end) in enumerate(pairwise(edges)):
         times = np.linspace(start, end, min(max(count, LEAST_STEPS), MOST_STEPS))
-        states = integrated(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=least)
+        states = integrated(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=absolute)
         force[k], travel[k], twist[k] = _most(model, *np.split(states, 2))
         state = states[:, -1]
     return RunUp(first + gain * edges[1:], force, travel, twist)
 
 
 def _most(model: TimeModel, y: Array, rate: Array) -> tuple[float, float, float]:
-    """Largest force and travel of any mount, and largest roll."""
     force, travel = model.mount_forces(y, rate), model.mount_travels(y)
-    sizes = (np.linalg.norm(each, axis=-1).max() for each in (force, travel))
+    sizes = (np.linalg.norm(signal, axis=-1).max() for signal in (force, travel))
     force_most, travel_most = (float(size) for size in sizes)
     return force_most, travel_most, float(np.abs(model.roll @ y).max())
 

@@ -25,20 +25,26 @@ def _tables(result: Result) -> list[Table]:
         return []
     run, (up, down) = run_of(result), shown_runs(result, result.final)
     rows = tuple(
-        (name, f"{time:g} s", figure(found.worst_force, "N"), figure(found.worst_travel, "m"),
-         figure(found.worst_twist, "rad"))
-        for name, time, found in (("run-up", run.up, up), ("shut-down", run.down, down))
+        (name, f"{time:g} s", figure(envelope.worst_force, "N"), figure(envelope.worst_travel, "m"),
+         figure(envelope.worst_twist, "rad"))
+        for name, time, envelope in (("run-up", run.up, up), ("shut-down", run.down, down))
     )  # fmt: skip
     note = f"On any mount, between rest and {shown(run.speed, 'rad/s')}, with the gas of {run_point(result).name}."
     return [Table(HEAD, rows, title="Through resonance", note=note, file="through-resonance")]
 
 
 def _record(result: Result) -> dict[str, Any]:
-    """Return the most on any mount, and the largest roll, from rest to a speed and back; null on a resonance."""
     run = run_of(result)
     most = {
-        way: {"time": time, "force": found.worst_force, "travel": found.worst_travel, "twist": found.worst_twist}
-        for way, time, found in zip(("up", "down"), (run.up, run.down), shown_runs(result, result.final), strict=True)
+        way: {
+            "time": time,
+            "force": envelope.worst_force,
+            "travel": envelope.worst_travel,
+            "twist": envelope.worst_twist,
+        }
+        for way, time, envelope in zip(
+            ("up", "down"), (run.up, run.down), shown_runs(result, result.final), strict=True
+        )
     }
     return {"up_to": run.speed, "point": run_point(result).name, **most}
 
@@ -46,8 +52,8 @@ def _record(result: Result) -> dict[str, Any]:
 def _over_speed(result: Result) -> Table:
     rows = [
         [design, way, RPM * speed, force, travel, math.degrees(twist)]
-        for design, found in designs_with_loads(result).items()
-        for way, run in zip(("run-up", "shut-down"), shown_runs(result, found), strict=True)
+        for design, evaluation in designs_with_loads(result).items()
+        for way, run in zip(("run-up", "shut-down"), shown_runs(result, evaluation), strict=True)
         for speed, force, travel, twist in np.column_stack([run.speeds, run.force, run.travel, run.twist]).tolist()
     ]
     return Table(

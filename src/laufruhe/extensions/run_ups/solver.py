@@ -30,30 +30,30 @@ Decide = Callable[[Problem], Result]
 
 
 def solve_runs(problem: Problem, kinds: frozenset[Kind], decide: Decide) -> Result:
-    """The best design where run-ups are minimised or limited.
+    """Return the best design where run-ups are minimised or limited.
 
     Parameters
     ----------
     kinds
-        Of what is open.
+        Kinds of what is open.
     decide
-        What else is asked.
+        Function that decides a problem without run-ups.
 
     Raises
     ------
     ModelError
         If a run-up is minimised over what nothing decides it by.
     """
-    asked = simulated_measures(problem)
-    limits = tuple(limit for limit in problem.limits if limit.measure in asked)
-    terms = tuple(term for term in problem.objective if term.measure in asked)
-    apart = problem.changed(
+    simulated = simulated_measures(problem)
+    limits = tuple(limit for limit in problem.limits if limit.measure in simulated)
+    terms = tuple(term for term in problem.objective if term.measure in simulated)
+    without_runs = problem.changed(
         objective=tuple(term for term in problem.objective if term not in terms),
         limits=tuple(limit for limit in problem.limits if limit not in limits),
     )
     relaxed = None
-    if apart.objective:
-        relaxed = decide(apart)
+    if without_runs.objective:
+        relaxed = decide(without_runs)
         broken = broken_limits(limits, relaxed.final)
         if not relaxed.status.has_design or not (broken or terms):
             # without what is asked of run-ups nothing is missing
@@ -80,10 +80,10 @@ def _designed(
     problem: Problem, kinds: frozenset[Kind], limits: Sequence[Limit], terms: Sequence[Term], relaxed: Result | None,
     decide: Decide,
 ) -> Result | None:  # fmt: skip
-    """A design that is made for them; None where no method does that."""
+    """Return a design by a method for run-ups; None where there is none."""
     if problem.phasing is not None:
         return _of_stars(problem, problem.phasing, decide) if kinds <= _LINEAR | {Kind.STAR} else None
-    rows = RunRows.of(problem, simulated_measures(problem)) if kinds <= _LINEAR else None
+    rows = RunRows.from_problem(problem, simulated_measures(problem)) if kinds <= _LINEAR else None
     if rows is not None:
         return solve_run_cones(problem, limits, terms, rows, decide)
     if not kinds <= _SMOOTH:
@@ -94,7 +94,6 @@ def _designed(
 
 
 def _of_stars(problem: Problem, phasing: Phasing, decide: Decide) -> Result | None:
-    """Each star that fires evenly by itself; None where throws may leave these, or mounts have bump stops."""
     if phasing.continuous or not all(math.isinf(spring.stop_gap) for _, spring in every_spring(problem.engine.mounts)):
         return None
     return solve_each_order(problem, phasing, even_stars(phasing), lambda own, _: decide(replace(own, phasing=None)))

@@ -30,7 +30,7 @@ class _Side:
     decays
         e^{rate h}, shape (designs, modes).
     seen
-        From modes to travel along the own axes of the springs with stops, shape (designs, springs, 2 modes).
+        Matrix from modes to travel along the own axes of the springs with stops, shape (designs, springs, 2 modes).
     first, second
         What a load along those axes that stands, and one that grows to itself, add to modes in a step, shape
         (designs, 2 modes, springs).
@@ -46,7 +46,7 @@ class _Side:
     stops: Array
 
     def pressed(self, z: ComplexArray) -> Array:
-        """Forces of the stops on the block along the own axes, shape (designs, springs, 1)."""
+        """Return the forces of the stops on the block along the own axes, shape (designs, springs, 1)."""
         travel = np.matmul(self.seen, z.view(float)[..., None])
         inside = np.minimum(np.maximum(travel, -self.gaps), self.gaps)
         inside -= travel
@@ -54,7 +54,7 @@ class _Side:
         return inside
 
     def next(self, z: ComplexArray, driven: ComplexArray) -> ComplexArray:
-        """Modes after one step."""
+        """Return the modes after one step."""
         force = self.pressed(z)
         guess = self.decays * z
         guess += driven
@@ -70,24 +70,26 @@ class _Side:
 def responses_to(
     models: Sequence[TimeModel | None], sweep: Sweep, wrenches: Sequence[Array]
 ) -> list[Response | None]:  # fmt: skip
-    """Of several designs of as many springs each, under wrenches of `Sweep.wrenches`; none where steps are no answer.
+    """Return the motion of each design under wrenches of `Sweep.wrenches`; None where steps fail.
 
     With bump stops they are followed side by side, so that one without an answer leaves all without.
     """
     runs = [None if model is None else LinearRun(model, sweep) for model in models]
     known = [run for run in runs if run is not None]
     if not any(run.model.has_stops for run in known):
-        return [run.response(own) if run and run.is_known else None for run, own in zip(runs, wrenches, strict=True)]
+        return [
+            run.response(loads) if run and run.is_known else None for run, loads in zip(runs, wrenches, strict=True)
+        ]
     firm = any(quickest(run.model) * sweep.step > QUICKEST or not run.is_resolved for run in known)
-    if firm or len(known) < len(runs) or len({len(run.kept[0]) for run in known}) > 1:
+    if firm or len(known) < len(runs) or len({len(run.modes[0]) for run in known}) > 1:
         return [None] * len(runs)
     side = _side_by_side(known, sweep.step)
-    driven = np.stack([run.driven(own) for run, own in zip(known, wrenches, strict=True)])
-    return [run.seen(own) for run, own in zip(known, _followed(side, driven), strict=True)]
+    driven = np.stack([run.driven(loads) for run, loads in zip(known, wrenches, strict=True)])
+    return [run.response_of(loads) for run, loads in zip(known, _followed(side, driven), strict=True)]
 
 
 def quickest(model: TimeModel) -> float:
-    """Frequency that the stops alone may give the block at most [rad/s]."""
+    """Return a bound of the frequency that the stops alone give the block [rad/s]."""
     return float(np.linalg.norm(np.sqrt(model.stops)[:, None] * model.travels, 2))
 
 
@@ -96,7 +98,7 @@ def _side_by_side(runs: Sequence[LinearRun], step: float) -> _Side:
     met = np.flatnonzero(np.any([_stiffness(run.model) > 0.0 for run in runs], axis=0))
     parts = []
     for run in runs:
-        model, (rates, shapes, inverse) = run.model, run.kept
+        model, (rates, shapes, inverse) = run.model, run.modes
         into = inverse @ model.travels[met].T
         grown, x = np.exp(rates * step), rates * step
         # series where a rate is next to zero
@@ -105,12 +107,12 @@ def _side_by_side(runs: Sequence[LinearRun], step: float) -> _Side:
         stands = np.where(small, 1.0 + 0.5 * x, (grown - 1.0) / safe)
         grows = np.where(small, 0.5 + x / 6.0, (grown - 1.0 - x) / safe**2)
         seen = model.travels[met] @ shapes[: model.size]
-        first, second = (step * own[:, None] * into for own in (stands, grows))
+        first, second = (step * weight[:, None] * into for weight in (stands, grows))
         stiffness = _stiffness(model)[met]
         gaps = np.where(stiffness > 0.0, model.gaps[met], np.inf)
         parts.append((grown, np.stack([seen.real, -seen.imag], axis=-1).reshape(len(met), -1),
                       _as_rows(first), _as_rows(second), gaps[:, None], stiffness[:, None]))  # fmt: skip
-    return _Side(*(np.stack(each) for each in zip(*parts, strict=True)))
+    return _Side(*(np.stack(part) for part in zip(*parts, strict=True)))
 
 
 def _stiffness(model: TimeModel) -> Array:
@@ -118,20 +120,19 @@ def _stiffness(model: TimeModel) -> Array:
 
 
 def _as_rows(into: ComplexArray) -> Array:
-    """Real and imaginary parts of every mode as rows, shape (2 modes, springs)."""
     return np.ascontiguousarray(np.stack([into.real, into.imag], axis=1).reshape(2 * len(into), -1))
 
 
 def _followed(side: _Side, driven: ComplexArray) -> ComplexArray:
-    """Modes after every step, shape (designs, modes, steps + 1) of what drives them in each."""
+    """Return the modes after every step, shape (designs, modes, steps + 1), from what drives them in each."""
     out = np.array(driven)
     powers = side.decays[..., None] ** np.arange(1, BLOCK + 1)
     count, z = driven.shape[-1], np.ascontiguousarray(driven[..., 0])
     for start in range(1, count, BLOCK):
-        own = driven[..., start : start + BLOCK]
-        free = _free(own, z, side.decays, powers)
+        driving_block = driven[..., start : start + BLOCK]
+        free = _free(driving_block, z, side.decays, powers)
         if _touches(side, free) or np.any(side.pressed(z)):
-            steps = np.ascontiguousarray(np.moveaxis(own, -1, 0))
+            steps = np.ascontiguousarray(np.moveaxis(driving_block, -1, 0))
             for k, driving in enumerate(steps):
                 z = side.next(z, driving)
                 steps[k] = z

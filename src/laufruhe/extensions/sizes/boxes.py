@@ -34,13 +34,13 @@ SLACK, HALVINGS, ROUNDS, MOST_TOUCHED = 1e-9, 10, 3, 200
 # of a load by itself, where dual rows of all together tell more
 FEW_TOUCHED = 4
 # dual rows of the last boxes that are kept, and the share of what is to be shown that halving a side has to gain
-KEPT, TOLD = 2, 0.1
+MOST_KNOWN, WORTH = 2, 0.1
 # share of what is to be shown from which dual rows are asked for at all angles
 NEAR = 2e-3
 
 
 class Cut(NamedTuple):
-    """What is left of a box, what no design in it goes under, the side worth halving, and the dual rows that told."""
+    """Rest of a box, its bound, the side worth halving, and the dual rows that gave the bound."""
 
     lower: Array
     upper: Array
@@ -50,7 +50,7 @@ class Cut(NamedTuple):
 
 
 class SizeBoxes:
-    """What no design in a box goes under.
+    """Bounds of the objective on boxes of sizes.
 
     Raises
     ------
@@ -60,7 +60,7 @@ class SizeBoxes:
     Parameters
     ----------
     ask
-        Who proposes dual rows where unbalances are open.
+        Function that proposes dual rows where unbalances are open.
     """
 
     def __init__(self, model: SizeModel, ask: Ask | None = None) -> None:
@@ -77,11 +77,10 @@ class SizeBoxes:
                 if math.isfinite(edge):
                     most = sense * edge + SLACK * abs(edge)
                     self.limits.append((most, self._number(limit.measure, sense), limit))
-        self._asked, self._together = ask, self._programs(ask)
+        self._ask, self._together = ask, self._programs(ask)
         self.touch(model.lower, model.upper)
 
     def _programs(self, ask: Ask | None) -> SizePrograms | None:
-        """Of boxes; none where sizes alone are open."""
         if ask is None or not self.model.domains:
             return None
         terms = [(weight, number) for weight, number in self.terms if number.pieces]
@@ -96,20 +95,20 @@ class SizeBoxes:
 
         def factors(x: Array) -> Array:
             engine = self.model.engine(x)
-            found = [each.ravel() for piece in pieces for each in self.model.factors(piece, measure, engine)]
-            return np.concatenate(found) if found else np.zeros(1)
+            arrays = [array.ravel() for piece in pieces for array in self.model.factors(piece, measure, engine)]
+            return np.concatenate(arrays) if arrays else np.zeros(1)
 
         if not self.model.moves_rod:
-            still = tuple(Bundle(RodSeries.still(piece, self.model.rod_span[0])) for piece in pieces)
-            return Number(measure, sense, self._ways(factors), still)
+            bundles = tuple(Bundle(RodSeries.fixed(piece, self.model.rod_span[0])) for piece in pieces)
+            return Number(measure, sense, self._ways(factors), bundles)
         start = self.model.problem.engine.slider_cranks[0].rod_length
-        kept = self.model.still_rows(measure)
-        self.is_whole = self.is_whole and all(rows.all() for rows in kept)
-        series = rod_series(self.model.whole_pieces(measure), start, *self.model.rod_span, kept)
+        masks = self.model.fixed_rows(measure)
+        self.is_whole = self.is_whole and all(rows.all() for rows in masks)
+        series = rod_series(self.model.whole_pieces(measure), start, *self.model.rod_span, masks)
         return Number(measure, sense, self._ways(factors), tuple(map(Bundle, series)))
 
     def _ways(self, numbers: Callable[[Array], Array]) -> Ways:
-        """Of numbers that go one way with each size: which way each of them takes all of them, zero where none."""
+        """Return for each size if all numbers rise (1) or fall (-1) with it; zero if none changes."""
         lower, upper = self.model.lower, self.model.upper
         ways = np.zeros(len(lower))
         for start in (lower, upper):
@@ -124,14 +123,14 @@ class SizeBoxes:
         return ways
 
     def _mass_ways(self) -> Ways:
-        """Of masses: none of them passes zero, and each size takes all of them one way at every corner."""
-        found = self.model.mass_corners
+        """Return for each size if all masses grow (1) or fall (-1) with it."""
+        corners = self.model.mass_corners
         low, high = self.model.mass_box
         if np.any((low < 0.0) & (high > 0.0)):
             raise ValueError("a mass of the running gear passes zero")
-        ways = np.zeros(found.ndim - 1)
+        ways = np.zeros(corners.ndim - 1)
         for k, decision in enumerate(self.model.sizes):
-            change = np.diff(np.abs(found), axis=k)
+            change = np.diff(np.abs(corners), axis=k)
             rises, falls = bool(np.any(change > 0.0)), bool(np.any(change < 0.0))
             if rises and falls:
                 raise ValueError(f"masses do not go one way with {decision.name}")
@@ -139,30 +138,30 @@ class SizeBoxes:
         return ways
 
     def keeping(self, limits: Sequence[Limit]) -> SizeBoxes:
-        """The same with some of the limits alone, and nothing wanted."""
+        """Return the same with some of the limits alone, and no objective."""
         other = copy.copy(self)
-        other.terms, other.limits = [], [each for each in self.limits if each[2] in limits]
-        other._together = other._programs(self._asked)
+        other.terms, other.limits = [], [limit for limit in self.limits if limit[2] in limits]
+        other._together = other._programs(self._ask)
         return other
 
     def reach(self, lower: Array, upper: Array) -> Reach:
-        """Of a box."""
+        """Return the ranges of masses and rod length on a box."""
         ends = (self.model.masses(corner(way * self._light, lower, upper)) for way in (1.0, -1.0))
         light, heavy = ends
         rod = self.model.rod_length(lower), self.model.rod_length(upper)
         return Reach(np.minimum(light, heavy), np.maximum(light, heavy), rod, self.model.domains)
 
     def touch(self, lower: Array, upper: Array) -> None:
-        """Bounds that loads meet at masses of a box."""
+        """Add affine functions that loads meet at masses of a box."""
         reach, most = self.reach(lower, upper), MOST_TOUCHED if self._together is None else FEW_TOUCHED
-        (middle, length), given = reach.middle, self.model.start
+        (middle, length), unbalances = reach.middle, self.model.start
         for number in (*(number for _, number in self.terms), *(number for _, number, _ in self.limits)):
             for bundle in number.pieces:
                 for masses in (reach.low, middle) if bundle.count < most else ():
-                    bundle.touch(np.append(masses, given), length)
+                    bundle.touch(np.append(masses, unbalances), length)
 
     def least(self, number: Number, lower: Array, upper: Array, reach: Reach) -> float:
-        """Of a measure on a box."""
+        """Return a lower bound of a measure on a box."""
         at = corner(number.ways, lower, upper)
         if not number.pieces:
             return number.sense * self.model.value(number.measure, at)
@@ -174,22 +173,22 @@ class SizeBoxes:
         ratio = bundle.piece.ratio(factors)
         if ratio is not None:
             return ratio * bundle.least(reach)
-        own, (masses, length) = bundle.scaled(factors), reach.middle
-        own.touch(np.append(masses, self.model.start), length)
-        return own.least(reach)
+        scaled, (masses, length) = bundle.scaled(factors), reach.middle
+        scaled.touch(np.append(masses, self.model.start), length)
+        return scaled.least(reach)
 
     def objective(self, lower: Array, upper: Array, known: Sequence[Together] = ()) -> float:
-        """Least on a box, infinite where dual rows known exclude it."""
+        """Return a lower bound of the objective on a box, infinite where known dual rows exclude it."""
         reach = self.reach(lower, upper)
         # what is known of all loads together is no less than what each tells
         numbers = [(w, number) for w, number in self.terms if not (known and number.pieces)]
-        apart = sum(weight * self.least(number, lower, upper, reach) for weight, number in numbers)
+        bound = sum(weight * self.least(number, lower, upper, reach) for weight, number in numbers)
         if self._together is None or not known:
-            return apart
-        return apart + max(*(self._together.least(each, lower, upper, reach) for each in known), 0.0)
+            return bound
+        return bound + max(*(self._together.least(rows, lower, upper, reach) for rows in known), 0.0)
 
     def breaks(self, lower: Array, upper: Array, k: int | None = None, way: float = 0.0) -> bool:
-        """Whether a limit is broken all over a box; of those limits that go one way with size k, where that is told."""
+        """Return whether a limit is broken all over a box; with k, of limits that go one `way` with size k."""
         reach = self.reach(lower, upper)
         return any(
             self.least(number, lower, upper, reach) > most
@@ -197,66 +196,65 @@ class SizeBoxes:
             if k is None or number.ways[k] == way
         )
 
-    def cut(self, lower: Array, upper: Array, enough: float, known: tuple[Together, ...] = ()) -> Cut | None:
-        """A box without sides that hold no better design; None where nothing is left."""
+    def cut(self, lower: Array, upper: Array, target: float, known: tuple[Together, ...] = ()) -> Cut | None:
+        """Return a box without sides that hold no better design; None where nothing is left."""
         self.touch(lower, upper)
-        if self.breaks(lower, upper) or self.objective(lower, upper, known) >= enough:
+        if self.breaks(lower, upper) or self.objective(lower, upper, known) >= target:
             return None
         for _ in range(ROUNDS):
             before = (upper - lower).sum()
-            known = self.learned(lower, upper, enough, known)
-            if self.objective(lower, upper, known) >= enough:
+            known = self.learned(lower, upper, target, known)
+            if self.objective(lower, upper, known) >= target:
                 return None
             for k in range(len(lower)):
-                lower, upper = self._shaved(lower, upper, k, enough, known)
+                lower, upper = self._shaved(lower, upper, k, target, known)
             if (upper - lower).sum() > 0.9 * before:
                 break
         bound = self.objective(lower, upper, known)
-        if bound >= enough:
+        if bound >= target:
             return None
-        return Cut(lower, upper, bound, self._side(lower, upper, known, bound, enough), known)
+        return Cut(lower, upper, bound, self._side(lower, upper, known, bound, target), known)
 
-    def learned(self, lower: Array, upper: Array, enough: float, known: tuple[Together, ...]) -> tuple[Together, ...]:
-        """What dual rows of the box tell, and those of the last one; exact ones where little is to be shown."""
+    def learned(self, lower: Array, upper: Array, target: float, known: tuple[Together, ...]) -> tuple[Together, ...]:
+        """Return the dual rows of the box and those of the last one; exact ones where the bound is near."""
         if self._together is None:
             return ()
-        near = bool(known) and self.objective(lower, upper, known) >= (1.0 - NEAR) * enough
-        found = self._together.learned(lower, upper, self.reach(lower, upper), near)
-        return known if found is None else (found, *known[: KEPT - 1])
+        near = bool(known) and self.objective(lower, upper, known) >= (1.0 - NEAR) * target
+        rows = self._together.learned(lower, upper, self.reach(lower, upper), near)
+        return known if rows is None else (rows, *known[: MOST_KNOWN - 1])
 
-    def _side(self, lower: Array, upper: Array, known: Sequence[Together], bound: float, enough: float) -> int:
-        """The side whose halving tells most; the longest beside that of all that is open where none tells much."""
+    def _side(self, lower: Array, upper: Array, known: Sequence[Together], bound: float, target: float) -> int:
         middle, gained = 0.5 * (lower + upper), np.zeros(len(lower))
-        for k, here in enumerate(np.eye(len(lower), dtype=bool) if known and enough < math.inf else ()):
+        for k, here in enumerate(np.eye(len(lower), dtype=bool) if known and target < math.inf else ()):
             first = self.objective(lower, np.where(here, middle, upper), known)
             second = self.objective(np.where(here, middle, lower), upper, known)
-            gained[k] = min(first, enough) + min(second, enough) - 2.0 * bound
-        if gained.max() > TOLD * (enough - bound):
+            gained[k] = min(first, target) + min(second, target) - 2.0 * bound
+        if gained.max() > WORTH * (target - bound):
             return int(np.argmax(gained))
         return widest(lower, upper, self.model.upper - self.model.lower)
 
     def _shaved(
-        self, lower: Array, upper: Array, k: int, enough: float, known: Sequence[Together]
+        self, lower: Array, upper: Array, k: int, target: float, known: Sequence[Together]
     ) -> tuple[Array, Array]:
-        """Without as much of the ends of one side as is shown to hold nothing."""
+        """Return the box without as much of both ends of one side as is shown to hold nothing."""
         here = np.arange(len(lower)) == k
 
         def low_empty(edge: float) -> bool:
             part = lower, np.where(here, edge, upper)
-            return self.breaks(*part, k, -1.0) or (bool(known) and self.objective(*part, known) >= enough)
+            return self.breaks(*part, k, -1.0) or (bool(known) and self.objective(*part, known) >= target)
 
         first = _last_empty(low_empty, lower[k], upper[k])
         lower = np.where(here, first, lower)
 
         def high_empty(edge: float) -> bool:
             part = np.where(here, edge, lower), upper
-            return self.objective(*part, known) >= enough or self.breaks(*part, k, 1.0)
+            return self.objective(*part, known) >= target or self.breaks(*part, k, 1.0)
 
         return lower, np.where(here, _last_empty(high_empty, upper[k], lower[k]), upper)
 
 
 def _last_empty(empty: Callable[[float], bool], start: float, end: float) -> float:
-    """How far from its start a side is shown to be empty, by halving."""
+    """Return how far from its start a side is shown to be empty, by halving."""
     done, far = start, end
     for _ in range(HALVINGS if start != end else 0):
         middle = 0.5 * (done + far)
@@ -286,20 +284,20 @@ class _Sizes(Halving):
 
     @property
     def level(self) -> float:
-        """Boxes are cut as far as no design in what is cut off is better than enough."""
+        """Level to which boxes are cut: no design in what is cut off is better."""
         return self.enough
 
-    def bounded(self, lower: Array, upper: Array, told: tuple[Together, ...] = ()) -> tuple[float, Box] | Over:
-        """A box without what is cut off."""
-        found = self._boxes.cut(lower, upper, self.enough, told)
-        if found is None:
+    def bounded(self, lower: Array, upper: Array, known: tuple[Together, ...] = ()) -> tuple[float, Box] | Over:
+        """Return the bound of a box and its rest."""
+        cut = self._boxes.cut(lower, upper, self.enough, known)
+        if cut is None:
             return Over(self.level)
-        box = _SizeBox(found.lower, found.upper, found.side)
-        box.known = found.known
-        return found.bound, box
+        box = _SizeBox(cut.lower, cut.upper, cut.side)
+        box.known = cut.known
+        return cut.bound, box
 
     def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | Over]:
-        """Each half by itself."""
+        """Return the bounds of each half."""
         return [self.bounded(*half, getattr(box, "known", ())) for box in boxes for half in halves(box)]
 
 
@@ -328,7 +326,7 @@ def divided_sizes(
 ) -> Divided:  # fmt: skip
     """Halve boxes, the least first, until none may hold a design that is `room` better than `value` (Z12)."""
     division = _Sizes(boxes, value, room, known)
-    found = division.run(division.bounded(boxes.model.lower, boxes.model.upper), most)
+    bound = division.run(division.bounded(boxes.model.lower, boxes.model.upper), most)
     if known is not None:
         check_around(_Around(boxes, known), known.place, known)
-    return found
+    return bound

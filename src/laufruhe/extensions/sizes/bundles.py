@@ -21,7 +21,7 @@ from laufruhe.problem.measure import Measure
 
 
 class Reach(NamedTuple):
-    """Least and most of the masses, and of the length of the rod, on a box; unbalances lie anywhere in their sets."""
+    """Ranges of the masses and of the length of the rod on a box; unbalances lie anywhere in their sets."""
 
     low: Array
     high: Array
@@ -30,7 +30,7 @@ class Reach(NamedTuple):
 
     @property
     def middle(self) -> tuple[Array, float]:
-        """Masses and length."""
+        """Middle masses and rod length."""
         return 0.5 * (self.low + self.high), 0.5 * (self.rod[0] + self.rod[1])
 
     @property
@@ -40,34 +40,34 @@ class Reach(NamedTuple):
         return np.concatenate([[1.0], np.maximum(np.abs(self.low), np.abs(self.high)), *scales])
 
     def least(self, functions: Array) -> Array:
-        """Of affine functions, shape (n, 1 + columns)."""
+        """Return the least of affine functions, shape (n, 1 + columns)."""
         masses = functions[:, 1 : 1 + MASSES]
-        found = functions[:, 0] + np.where(masses > 0.0, masses * self.low, masses * self.high).sum(axis=1)
+        total = functions[:, 0] + np.where(masses > 0.0, masses * self.low, masses * self.high).sum(axis=1)
         for domain in self.domains:
-            own = functions[:, 1 + MASSES :][:, domain.columns]
-            found = found + np.array([domain.set.least(each) for each in own])
-        return np.asarray(found)
+            columns = functions[:, 1 + MASSES :][:, domain.columns]
+            total = total + np.array([domain.set.least(row) for row in columns])
+        return np.asarray(total)
 
 
 Ways: TypeAlias = Array
 
 
 def least_of(nodes: Array, terms: Array, rest: Array, reach: Reach) -> Array:
-    """Least of functions on a box, shape (t,): their first two terms at its ends, and what the others take from them.
+    """Return the least of functions on a box, shape (t,): their first two terms at its ends, less bounds of the others.
 
     Parameters
     ----------
     nodes
-        Of each function its values at the nodes, shape (t, n, 1 + columns).
+        Values of each function at the nodes, shape (t, n, 1 + columns).
     terms
-        What makes the terms between the lengths of the box of these, shape (n, n).
+        Matrix from these to the terms between the lengths of the box, shape (n, n).
     rest
-        What the series leave out, shape (1 + columns,).
+        Bound of the rest of the series, shape (1 + columns,).
     """
-    own = np.einsum("mn,tnj->mtj", terms, nodes)
-    linear, further, most = own[1:2].sum(axis=0), np.abs(own[2:]).sum(axis=0), reach.most
-    found = np.minimum(*(reach.least(own[0] + end * linear) for end in (-1.0, 1.0)))
-    return np.asarray(found - further @ most - rest @ most)
+    series = np.einsum("mn,tnj->mtj", terms, nodes)
+    linear, further, most = series[1:2].sum(axis=0), np.abs(series[2:]).sum(axis=0), reach.most
+    ends = np.minimum(*(reach.least(series[0] + end * linear) for end in (-1.0, 1.0)))
+    return np.asarray(ends - further @ most - rest @ most)
 
 
 class Bundle:
@@ -79,22 +79,22 @@ class Bundle:
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of functions."""
         return len(self.nodes)
 
     def touch(self, columns: Array, length: float) -> None:
-        """One more that the norm meets at these columns and this length."""
-        z = self.lengths.at(length).subgradient(columns)
+        """Add the function that meets the norm at these columns and this length."""
+        z = self.lengths.at_length(length).subgradient(columns)
         self.nodes = np.concatenate([self.nodes, self.lengths.pulled(z)[None]])
 
     def scaled(self, factors: Sequence[Array]) -> Bundle:
-        """Of other factors of its rows, which nothing has been asked of yet."""
+        """Return an empty bundle with other factors of its rows."""
         return Bundle(self.lengths.scaled(factors))
 
     def least(self, reach: Reach) -> float:
-        """On a box."""
-        found = least_of(self.nodes, self.lengths.terms(*reach.rod), self.lengths.rest, reach)
-        return max(float(found.max(initial=0.0)), 0.0)
+        """Return a lower bound of the norm on a box."""
+        values = least_of(self.nodes, self.lengths.terms(*reach.rod), self.lengths.rest, reach)
+        return max(float(values.max(initial=0.0)), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,34 +114,34 @@ class Grouped:
     price: float
 
     @classmethod
-    def of(cls, lengths: RodSeries, z: Array) -> Grouped:
-        """Of dual rows of a piece, its factors as at the start."""
+    def from_rows(cls, lengths: RodSeries, z: Array) -> Grouped:
+        """Return the groups of dual rows of a piece, with the factors of the start."""
         price = lengths.piece.affine.dual_norm(z)
-        whole = np.concatenate([lengths.constant[..., None], lengths.slope], axis=-1)
-        each = z[:, :, None] * whole
+        rows_of_columns = np.concatenate([lengths.constant[..., None], lengths.slope], axis=-1)
+        products = z[:, :, None] * rows_of_columns
         if not lengths.piece.given:
-            return cls(lengths, (each.sum(axis=(1, 2))[:, None, None],), price)
+            return cls(lengths, (products.sum(axis=(1, 2))[:, None, None],), price)
         groups, start = [], 0
-        for (_, _, rows), given in zip(lengths.piece.at, lengths.piece.given, strict=True):
-            end = start + len(given) * rows
-            own = each[:, start:end]
-            groups.append(own.reshape(len(own), len(given), rows, *own.shape[2:]).sum(axis=2))
+        for (_, _, rows), factors in zip(lengths.piece.at, lengths.piece.given, strict=True):
+            end = start + len(factors) * rows
+            part = products[:, start:end]
+            groups.append(part.reshape(len(part), len(factors), rows, *part.shape[2:]).sum(axis=2))
             start = end
         return cls(lengths, tuple(groups), price)
 
     def weighed(self, factors: Sequence[Array]) -> tuple[Array, float]:
-        """With other factors, shape (n, 1 + columns); and the largest of these over that at the start."""
+        """Return the function with other factors, shape (n, 1 + columns), and their largest ratio to the start's."""
         if not factors:
             return np.asarray(self.groups[0][:, 0, 0]), 1.0
         ratios = [new / old for new, old in zip(factors, self.lengths.piece.given, strict=True)]
         parts = zip(self.groups, ratios, strict=True)
-        total = sum(np.einsum("npdj,pd->nj", own, np.broadcast_to(by, own.shape[1:3])) for own, by in parts)
+        total = sum(np.einsum("npdj,pd->nj", group, np.broadcast_to(by, group.shape[1:3])) for group, by in parts)
         return np.asarray(total), max(float(by.max(initial=0.0)) for by in ratios)
 
 
 @dataclass(frozen=True, eq=False)
 class Number:
-    """A measure, or less than nothing of it, as boxes see it.
+    """Measure, or its negative, as boxes see it.
 
     Attributes
     ----------
@@ -150,7 +150,7 @@ class Number:
     ways
         For each size whether its factors grow with it (1) or fall (-1).
     pieces
-        Of a load, each with what bounds it.
+        Pieces of a load, each with its functions.
     """
 
     measure: Measure
@@ -160,5 +160,5 @@ class Number:
 
 
 def corner(ways: Ways, lower: Array, upper: Array) -> Array:
-    """Where numbers that go these ways are least."""
+    """Return the corner at which numbers that go these ways are least."""
     return np.where(ways >= 0.0, lower, upper)

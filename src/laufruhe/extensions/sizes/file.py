@@ -92,10 +92,10 @@ def _weighed(
     others = tuple(throw for throw in throws if throw.shaft != CRANKSHAFT)
     throws = tuple(throw for throw in throws if throw.shaft == CRANKSHAFT)
     gear = _gear_of(table, parts, throws)
-    bare = Moving(gear, parts, (), bearings)
-    ways, size = dict(gear.throws).values(), bare.throw_unbalance
+    moving = Moving(gear, parts, (), bearings)
+    ways, size = dict(gear.throws).values(), moving.throw_unbalance
     heavy = tuple(replace(t, unbalance=t.unbalance + size * way) for t, way in zip(throws, ways, strict=True))
-    return bare.weighed().parts, (*heavy, *others)
+    return moving.weighed().parts, (*heavy, *others)
 
 
 def _gear_of(table: RunningGearTable, parts: Sequence[SliderCrank], throws: Sequence[Throw]) -> RunningGear:
@@ -124,15 +124,15 @@ def _start(value: float | Open) -> float:
 def _piston_pin(table: PistonPinTable) -> PistonPin:
     bore, diameter = Open.from_value(table.bore), Open.from_value(table.diameter)
     if bore.upper >= diameter.lower:
-        shown, rule = units.shown(bore.upper, "m"), f"does not fit into a pin of {units.shown(diameter.lower, 'm')}"
-        raise Refused("running_gear.piston_pin.bore", shown, rule, "make it smaller")
+        value, rule = units.shown(bore.upper, "m"), f"does not fit into a pin of {units.shown(diameter.lower, 'm')}"
+        raise Refused("running_gear.piston_pin.bore", value, rule, "make it smaller")
     return PistonPin(diameter.start, bore.start, _start(table.length), table.in_bosses, table.span)
 
 
 def _opened(
     table: RunningGearTable | None, engine: EngineTable, bearings: Sequence[MainBearingTable], built: Sequence[Bearing]
 ) -> Iterator[tuple[str, Size, Any]]:
-    """Yield every size that may be open: name, number of the engine, and value in the file."""
+    """Yield every size that may be open: its decision, its number of the engine, and its value in the file."""
     yield "engine.rod_length", ROD_LENGTH, engine.rod_length
     for key in ("diameter", "width"):
         if engine.big_end is not None:
@@ -146,15 +146,14 @@ def _opened(
 
 
 def _read(table: RunningGearTable | None, problem: Problem, given: Given) -> Problem:
-    """Return the problem with the running gear, and with decisions about sizes that are open."""
     engine, throws = problem.engine, [throw for throw in given.throws if throw.shaft == CRANKSHAFT]
-    found = _decisions(table, given.engine, one_by_one(given.file.main_bearings, given.throws), engine.bearings)
-    if found and table is not None and table.density is not None:
+    decisions = _decisions(table, given.engine, one_by_one(given.file.main_bearings, given.throws), engine.bearings)
+    if decisions and table is not None and table.density is not None:
         check_factors(given.file.counterweights, "counts masses that follow from sizes, which are open")
     gear = RunningGear() if table is None else _gear_of(table, engine.slider_cranks, throws)
-    if found or table is not None:
+    if decisions or table is not None:
         engine = engine.with_extra(gear)
-    return replace(problem, engine=engine, decisions=(*problem.decisions, *found))
+    return replace(problem, engine=engine, decisions=(*problem.decisions, *decisions))
 
 
 def _decisions(
@@ -170,8 +169,8 @@ def _decisions(
         if engine.kind.is_free or engine.offset:
             raise Refused("engine.rod_length", None, "is decided in layouts without offset", "fix it, or take a layout")
         if engine.stroke is not None and shortest <= 0.5 * engine.stroke:
-            shown = units.shown(shortest, "m")
-            raise Refused("engine.rod_length", shown, "does not let the crank turn", "raise its lower bound")
+            length = units.shown(shortest, "m")
+            raise Refused("engine.rod_length", length, "does not let the crank turn", "raise its lower bound")
     return decisions
 
 

@@ -119,7 +119,7 @@ class Bolts:
     Attributes
     ----------
     diameter
-        At the root of the thread [m].
+        Diameter at the root of the thread [m].
     """
 
     count: int
@@ -153,11 +153,11 @@ class RunningGear(Extra):
     throws: tuple[tuple[str, complex], ...] = ()
 
     def part(self, name: str) -> Webs | Shank | PistonPin | Bolts:
-        """Return a part; an error if the running gear lacks it."""
-        found: Webs | Shank | PistonPin | Bolts | None = getattr(self, name)
-        if found is None:
+        """Return one of its parts, which it must have."""
+        one: Webs | Shank | PistonPin | Bolts | None = getattr(self, name)
+        if one is None:
             raise ModelError(f"the running gear has no {name.replace('_', ' ')}; add it to [running_gear]")
-        return found
+        return one
 
     def move(self, engine: Engine, changes: Mapping[Any, float], _: Sequence[SliderCrank]) -> Engine:
         """Return an engine with changes of its sizes, and of the masses of these."""
@@ -171,10 +171,10 @@ class RunningGear(Extra):
         """Return the gear of an engine whose lengths and masses are so many times as large."""
         longer: dict[str, object] = {}
         for name in PARTS:
-            own = getattr(self, name)
-            if own is not None:
-                sizes = {f.name: getattr(own, f.name) for f in fields(own) if f.name not in ("count", "in_bosses")}
-                longer[name] = replace(own, **{k: None if v is None else v * length for k, v in sizes.items()})
+            one = getattr(self, name)
+            if one is not None:
+                sizes = {f.name: getattr(one, f.name) for f in fields(one) if f.name not in ("count", "in_bosses")}
+                longer[name] = replace(one, **{k: None if v is None else v * length for k, v in sizes.items()})
         heavy = None if self.density is None else self.density * (mass / length**3)
         return replace(self, density=heavy, **longer)  # type: ignore[arg-type]
 
@@ -200,15 +200,15 @@ class RunningGear(Extra):
             Diameter of the main bearings [m]: the web about it turns about its own middle.
         """
         across, width = big_end or (0.0, 0.0)
-        found = ring_area(across, 0.0) * width * radius
+        total = ring_area(across, 0.0) * width * radius
         if self.webs is not None:
-            found += self.webs.area * ((radius + 0.5 * across) ** 2 - 0.25 * journal**2)
-        return (self.density or 0.0) * found
+            total += self.webs.area * ((radius + 0.5 * across) ** 2 - 0.25 * journal**2)
+        return (self.density or 0.0) * total
 
 
 @dataclass(frozen=True)
 class Moving:
-    """Parts of an engine whose masses or loads depend on sizes."""
+    """Parts of an engine that sizes change: all that turns, reciprocates or carries."""
 
     gear: RunningGear | None
     parts: tuple[SliderCrank, ...]
@@ -243,22 +243,22 @@ class Moving:
     @property
     def sizes(self) -> dict[Size, float]:
         """Sizes that decisions may move [m]."""
-        found: dict[Size, float] = {}
+        sizes: dict[Size, float] = {}
         if self.parts:
-            found[ROD_LENGTH] = self.parts[0].rod_length
+            sizes[ROD_LENGTH] = self.parts[0].rod_length
             if self.parts[0].big_end is not None:
-                found |= {(BIG_END, key): value for key, value in zip(_ACROSS, self.parts[0].big_end, strict=True)}
+                sizes |= {(BIG_END, key): value for key, value in zip(_ACROSS, self.parts[0].big_end, strict=True)}
         for bearing in self.bearings:
-            found |= {(on(bearing), k): getattr(bearing, k) for k in _ACROSS if getattr(bearing, k) is not None}
+            sizes |= {(on(bearing), k): getattr(bearing, k) for k in _ACROSS if getattr(bearing, k) is not None}
         for name in PARTS if self.gear else ():
             part = getattr(self.gear, name)
-            found |= {(name, f.name): getattr(part, f.name) for f in fields(part) if f.name in MOVED} if part else {}
-        return found
+            sizes |= {(name, f.name): getattr(part, f.name) for f in fields(part) if f.name in MOVED} if part else {}
+        return sizes
 
     def resized(self, sizes: Mapping[Size, float]) -> Moving:
         """Return the parts with other sizes, and the masses that follow from them."""
-        bare = self.bare
-        parts, gear = bare.parts, bare.gear
+        unweighed = self.bare
+        parts, gear = unweighed.parts, unweighed.gear
         length, end = sizes.get(ROD_LENGTH), tuple(sizes.get((BIG_END, key)) for key in _ACROSS)
         moved: dict[str, Any] = {}
         if parts and length is not None and length != parts[0].rod_length:
@@ -268,14 +268,14 @@ class Moving:
         if moved:
             parts = tuple(replace(part, **moved) for part in parts)
         bearings = tuple(
-            replace(b, **{key: sizes.get((on(b), key), getattr(b, key)) for key in _ACROSS}) for b in bare.bearings
+            replace(b, **{key: sizes.get((on(b), key), getattr(b, key)) for key in _ACROSS}) for b in unweighed.bearings
         )
         for name in PARTS if gear else ():
-            own = getattr(gear, name)
-            told = {f.name: sizes[name, f.name] for f in fields(own) if (name, f.name) in sizes} if own else {}
-            if told and gear is not None:
-                gear = replace(gear, **{name: replace(own, **told)})
-        return replace(bare, gear=gear, parts=parts, bearings=bearings).weighed()
+            one = getattr(gear, name)
+            changed = {f.name: sizes[name, f.name] for f in fields(one) if (name, f.name) in sizes} if one else {}
+            if changed and gear is not None:
+                gear = replace(gear, **{name: replace(one, **changed)})
+        return replace(unweighed, gear=gear, parts=parts, bearings=bearings).weighed()
 
 
 def moving_of(engine: Engine) -> Moving:
@@ -286,12 +286,12 @@ def moving_of(engine: Engine) -> Moving:
 def resized(engine: Engine, sizes: Mapping[Size, float]) -> Engine:
     """Return the engine with sizes in place of its own, and the masses of these."""
     moved = moving_of(engine).resized(sizes)
-    found = replace(engine, slider_cranks=moved.parts, rotors=moved.rotors, bearings=moved.bearings)
-    return found if moved.gear is None else found.with_extra(moved.gear)
+    changed = replace(engine, slider_cranks=moved.parts, rotors=moved.rotors, bearings=moved.bearings)
+    return changed if moved.gear is None else changed.with_extra(moved.gear)
 
 
 def _heavier(gear: RunningGear, part: SliderCrank, sense: float) -> SliderCrank:
-    reciprocating, rotating, deficit = (sense * each for each in gear.rod_masses(part))
+    reciprocating, rotating, deficit = (sense * mass for mass in gear.rod_masses(part))
     return replace(
         part,
         # what was added and is taken off again may leave a rounding

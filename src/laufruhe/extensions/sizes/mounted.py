@@ -38,53 +38,52 @@ MASSES = ("reciprocating_mass", "rotating_mass", "rod_inertia_deficit")
 def solve_mounted_sizes(problem: Problem) -> Result:
     """The best local optimum of a few searches, with a bound."""
     started = time.perf_counter()
-    initial, held = evaluate_start(problem), _on_given_mounts(problem)
-    check_acts(SizeModel(held))
+    initial, without_mounts = evaluate_start(problem), _on_given_mounts(problem)
+    check_acts(SizeModel(without_mounts))
     program = LocalProgram.of(problem)
-    best = searched(program, [*_first(program, held), *looks(problem)[:LOOKS]], min(problem.search.starts, STARTS))
+    best = searched(
+        program, [*_first(program, without_mounts), *looks(problem)[:LOOKS]], min(problem.search.starts, STARTS)
+    )
     design = judged(problem, program.values(best))
     bound = _bound(problem, design)
-    told = "local programs; bound of the mounts with any masses that the sizes may have" if bound else "local programs"
-    proof = shown(program, design, bound, Reach.ASIDE, told)
+    words = "local programs; bound of the mounts with any masses that the sizes may have" if bound else "local programs"
+    proof = shown(program, design, bound, Reach.ASIDE, words)
     return concluded(design, initial, proof, {"solve": time.perf_counter() - started})
 
 
 def _on_given_mounts(problem: Problem) -> Problem:
-    """Sizes and unbalances alone, and what is asked of loads and these."""
     decisions = tuple(d for d in problem.decisions if d not in problem.mount_decisions)
     terms = tuple(term for term in problem.objective if not term.measure.is_mounting)
     limits = tuple(limit for limit in problem.limits if not limit.measure.is_mounting)
     return replace(problem, decisions=decisions, objective=terms, limits=limits)
 
 
-def _first(program: LocalProgram, held: Problem) -> list[Array]:
-    """As given, and with the best sizes and unbalances on the mounts as given."""
-    problem, given = program.problem, program.shares(program.problem.start)
-    alone = solve_sizes(replace(held, tolerance=ROUGHLY, search=replace(held.search, boxes=1)))
+def _first(program: LocalProgram, without_mounts: Problem) -> list[Array]:
+    problem, start = program.problem, program.shares(program.problem.start)
+    alone = solve_sizes(replace(without_mounts, tolerance=ROUGHLY, search=replace(without_mounts.search, boxes=1)))
     if not alone.status.has_design:
-        return [given]
-    found = dict(zip((d.name for d in held.decisions), _decided(held, alone), strict=True))
-    return [program.shares([found.get(d.name, d.start) for d in problem.decisions]), given]
+        return [start]
+    values = dict(zip((d.name for d in without_mounts.decisions), _decided(without_mounts, alone), strict=True))
+    return [program.shares([values.get(d.name, d.start) for d in problem.decisions]), start]
 
 
-def _decided(held: Problem, result: Result) -> list[Value]:
+def _decided(without_mounts: Problem, result: Result) -> list[Value]:
     """Values of decisions, read back from a result."""
-    told = {entry.name: entry.value for entry in result.decisions}
+    values = {entry.name: entry.value for entry in result.decisions}
     rotors = {r.name: r.unbalance for r in result.final.engine.rotors}
-    bare = {r.name: r.unbalance for r in result.initial.engine.rotors}
+    unbalances = {r.name: r.unbalance for r in result.initial.engine.rotors}
     out: list[Value] = []
-    for decision in held.decisions:
+    for decision in without_mounts.decisions:
         if not decision.is_affine:
-            out.append(told[decision.name])
+            out.append(values[decision.name])
             continue
         drive = decision.rotor_drives[0]
-        moved = (rotors[drive.rotor] - bare[drive.rotor]) / drive.gain
+        moved = (rotors[drive.rotor] - unbalances[drive.rotor]) / drive.gain
         out.append(decision.start + (moved.conjugate() if drive.mirrored else moved))
     return out
 
 
 def _bound(problem: Problem, design: Design) -> float:
-    """Of masses anywhere between their ends; zero where the length of the rod, or sizes themselves, are asked about."""
     model = SizeModel(_on_given_mounts(problem))
     of_sizes = any(term.measure.channel.of_engine is not None or _sized(term.measure) for term in problem.objective)
     if model.moves_rod or of_sizes or design.excess > KEPT:
@@ -111,11 +110,11 @@ def with_masses(problem: Problem, model: SizeModel, values: Sequence[Value]) -> 
         tuple(RotorDrive(name, way) for name, way in ways),
     ]
     moving = [k for k in range(len(half)) if half[k] > 0.0]
-    own = [Decision(f"mass {k}", "kg", Interval(-half[k], half[k]), 0.0, drives[k]) for k in moving]
+    of_masses = [Decision(f"mass {k}", "kg", Interval(-half[k], half[k]), 0.0, drives[k]) for k in moving]
     others = tuple(d for d in problem.decisions if d not in model.sizes)
     limits = tuple(x for x in problem.limits if x.measure.channel.of_engine is None and not _sized(x.measure))
-    found = replace(problem, engine=engine, decisions=(*own, *others), limits=limits)
-    return found, [*(float(masses[k]) for k in moving), *(at[d.name] for d in others)]
+    changed = replace(problem, engine=engine, decisions=(*of_masses, *others), limits=limits)
+    return changed, [*(float(masses[k]) for k in moving), *(at[d.name] for d in others)]
 
 
 def _sized(measure: Measure) -> bool:

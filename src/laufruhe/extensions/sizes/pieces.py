@@ -20,9 +20,9 @@ class Piece:
     Attributes
     ----------
     affine
-        Of the columns; rows at the sizes that the problem starts from.
+        Norm that is affine in the columns; rows at the sizes that the problem starts from.
     at
-        Of every operating point in it, its index, its places (all when None) and the rows of each.
+        Index of every operating point in it, its places (all when None) and the rows of each.
     given
         Factors of these at the start, shape (places, 1 or d) each.
     """
@@ -32,36 +32,41 @@ class Piece:
     given: tuple[Array, ...]
 
     def ratio(self, factors: Sequence[Array]) -> float | None:
-        """Factor of all rows over that at the start; None where they differ."""
-        found = [np.ones(1), *(new / old for new, old in zip(factors, self.given, strict=True))][bool(factors) :]
-        ratios = np.concatenate([each.ravel() for each in found])
+        """Return the ratio of all factors to the start's; None where ratios differ."""
+        arrays = [np.ones(1), *(new / old for new, old in zip(factors, self.given, strict=True))][bool(factors) :]
+        ratios = np.concatenate([array.ravel() for array in arrays])
         return float(ratios[0]) if np.all(ratios == ratios[0]) else None
 
     def scaled(self, factors: Sequence[Array]) -> AffineNorm:
-        """The norm with other factors."""
+        """Return the norm with other factors."""
         by = self.by(factors)
         return replace(self.affine, constant=self.affine.constant * by, slope=self.affine.slope * by[..., None])
 
     def by(self, factors: Sequence[Array]) -> Array:
-        """What every row is multiplied by for other factors, shape (k, 1 or d)."""
+        """Return the multiplier of every row for other factors, shape (k, 1 or d)."""
         parts = zip(factors, self.given, self.at, strict=True)
         return np.concatenate([np.repeat(new / old, rows, axis=0) for new, old, (_, _, rows) in parts])
 
     def value(self, factors: Sequence[Array], columns: Array) -> float:
-        """The norm."""
+        """Return the norm with other factors."""
         ratio = self.ratio(factors)
         return self.scaled(factors).value(columns) if ratio is None else ratio * self.affine.value(columns)
 
     def pruned(self, low: Array, high: Array) -> Piece:
-        """Of a largest length with one factor: without rows that are not the longest for any columns between two."""
-        own, reach = self.affine, 0.5 * (high - low)
-        size = lengths(own.rows(low + reach))
-        moved = np.sqrt(np.square(own.slope).sum(axis=1)) @ reach
-        kept = size + moved >= (size - moved).max()
-        affine = replace(own, constant=own.constant[kept], slope=own.slope[kept], grid=plain(int(kept.sum())))
+        """Return the piece of a largest length without rows that are longest for no columns between two."""
+        affine_rows, reach = self.affine, 0.5 * (high - low)
+        size = lengths(affine_rows.rows(low + reach))
+        moved = np.sqrt(np.square(affine_rows.slope).sum(axis=1)) @ reach
+        longest = size + moved >= (size - moved).max()
+        affine = replace(
+            affine_rows,
+            constant=affine_rows.constant[longest],
+            slope=affine_rows.slope[longest],
+            grid=plain(int(longest.sum())),
+        )
         return replace(self, affine=affine, at=tuple((k, place, affine.grid.steps) for k, place, _ in self.at))
 
 
 def plain(rows: int) -> Grid:
-    """Of rows that each have the same weight."""
+    """Return the grid of equally weighted rows."""
     return Grid(np.full(rows, 1.0 / max(rows, 1)), rows)

@@ -37,7 +37,7 @@ class Together:
     constant
         Prices times limits, taken off.
     size
-        What it is a difference of.
+        Size of the terms of that difference, by which a rounding is judged.
     excludes
         Whether no terms are in it: where it is more than nothing no design is allowed.
     """
@@ -58,7 +58,7 @@ class SizePrograms:
     limits
         The most that others may be.
     ask
-        Who proposes dual rows.
+        Function that proposes dual rows.
     """
 
     def __init__(
@@ -67,30 +67,30 @@ class SizePrograms:
         self._model, self._terms, self._limits, self._ask = model, tuple(terms), tuple(limits), ask
 
     def learned(self, lower: Array, upper: Array, reach: Reach, exactly: bool = False) -> Together | None:
-        """What the dual rows of a box's program say; None where they say nothing."""
+        """Return the dual rows of a box's program; None where they bound nothing."""
         program = self.program(lower, upper, reach)
-        x, found = self._ask(program, exactly)
+        x, multipliers = self._ask(program, exactly)
         if x is None and not exactly:
             # that a few rows of a mean cannot be met says nothing of all of them
-            x, found = self._ask(program, True)
+            x, multipliers = self._ask(program, True)
         if x is not None:
-            return self._together(program, best_bound(program, x, found).multipliers) if program.terms else None
+            return self._together(program, best_bound(program, x, multipliers).multipliers) if program.terms else None
         stripped = replace(program, terms=())
-        return self._together(stripped, minorant(stripped, spread(stripped, found)).multipliers)
+        return self._together(stripped, minorant(stripped, spread(stripped, multipliers)).multipliers)
 
     def program(self, lower: Array, upper: Array, reach: Reach) -> AffineProblem:
-        """The masses of a box as decisions of their own beside the unbalances, factors where they are least."""
+        """Return the program of a box: its masses as decisions beside the unbalances, factors where they are least."""
         half = 0.5 * (reach.high - reach.low)
         moving = [int(k) for k in np.flatnonzero(half > 0.0)]
         masses = [Decision(f"mass {k}", "kg", Interval(-half[k], half[k]), 0.0, ()) for k in moving]
-        kept = [*moving, *range(MASSES, MASSES + len(self._model.start))]
+        columns = [*moving, *range(MASSES, MASSES + len(self._model.start))]
 
         def norm(number: Number) -> AffineNorm:
             rows = self._rows(number, self._engine(number, lower, upper), reach)
-            constant, slope = (np.concatenate([getattr(own, part) for own in rows]) for part in ("constant", "slope"))
+            constant, slope = (np.concatenate([getattr(row, part) for row in rows]) for part in ("constant", "slope"))
             grid = rows[0].grid if len(rows) == 1 else Grid(np.full(len(constant), 1.0 / len(constant)), len(constant))
             constant = constant + slope[..., :MASSES] @ reach.middle[0]
-            return AffineNorm(rows[0].norm, constant, slope[..., kept], grid)
+            return AffineNorm(rows[0].norm, constant, slope[..., columns], grid)
 
         terms = tuple((weight, norm(number)) for weight, number in self._terms)
         limits = tuple((most, norm(number)) for most, number in self._limits)
@@ -102,42 +102,42 @@ class SizePrograms:
         for bundle in number.pieces:
             factors = self._model.factors(bundle.piece, number.measure, engine)
             lengths = bundle.lengths.scaled(factors) if factors else bundle.lengths
-            rows.append(lengths.at(reach.middle[1]))
+            rows.append(lengths.at_length(reach.middle[1]))
         return rows
 
     def _engine(self, number: Number, lower: Array, upper: Array) -> Engine:
-        own = np.any(number.ways)
-        return self._model.engine(corner(number.ways, lower, upper)) if own else self._model.problem.engine
+        moves = np.any(number.ways)
+        return self._model.engine(corner(number.ways, lower, upper)) if moves else self._model.problem.engine
 
     def _together(self, program: AffineProblem, rows: Multipliers) -> Together:
-        """Dual rows of a box's program, at the factors of the start."""
-        asked = [(number, weight * z) for (weight, number), z in zip(self._terms, rows.terms, strict=False)]
+        """Return the dual rows of a box's program, at the factors of the start."""
+        weighted = [(number, weight * z) for (weight, number), z in zip(self._terms, rows.terms, strict=False)]
         prices, constant, size = replace(rows, terms=()).shadow_prices(program), 0.0, 0.0
         limits = zip(self._limits, program.limits, rows.limits, prices, strict=True)
         for (most, number), (_, norm), z, price in limits:
             if price > 0.0:
-                asked.append((number, z))
+                weighted.append((number, z))
                 constant += price * most
                 size += price * (most + norm.value(np.zeros(program.size)))
         parts = []
-        for number, z in asked:
+        for number, z in weighted:
             cuts = np.cumsum([bundle.lengths.constant.shape[1] for bundle in number.pieces])[:-1]
-            own = zip(number.pieces, np.split(z, cuts), strict=True)
-            parts.append((number, tuple(Grouped.of(bundle.lengths, rows) for bundle, rows in own)))
+            bundles = zip(number.pieces, np.split(z, cuts), strict=True)
+            parts.append((number, tuple(Grouped.from_rows(bundle.lengths, rows) for bundle, rows in bundles)))
         return Together(tuple(parts), constant, size, not rows.terms)
 
     def least(self, known: Together, lower: Array, upper: Array, reach: Reach) -> float:
-        """What dual rows say of a box; infinite where they exclude it."""
+        """Return the bound of a box from dual rows; infinite where they exclude it."""
         if not known.parts:
             return 0.0
         total, rest, terms = np.zeros((1, 1)), np.zeros(1), np.ones((1, 1))
         for number, groups in known.parts:
             engine = self._engine(number, lower, upper)
-            for own in groups:
-                found, most = own.weighed(self._model.factors(own.lengths.piece, number.measure, engine))
-                total = total + found
-                rest = rest + own.price * most * own.lengths.rest
-                terms = own.lengths.terms(*reach.rod)
+            for group in groups:
+                function, most = group.weighed(self._model.factors(group.lengths.piece, number.measure, engine))
+                total = total + function
+                rest = rest + group.price * most * group.lengths.rest
+                terms = group.lengths.terms(*reach.rod)
         total[:, 0] -= known.constant
         value = float(least_of(total[None], terms, rest, reach)[0])
         if known.excludes:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -43,10 +44,10 @@ class SizeProgram(LocalProgram):
     model: SizeModel
 
     @classmethod
-    def of_sizes(cls, model: SizeModel) -> SizeProgram:
+    def from_model(cls, model: SizeModel) -> SizeProgram:
         """Over the bounds of all that is open."""
-        own = LocalProgram.of(model.problem)
-        return cls(own.problem, own.lower, own.upper, model)
+        program = LocalProgram.of(model.problem)
+        return cls(program.problem, program.lower, program.upper, model)
 
     @cached_property
     def sized(self) -> Mask:
@@ -55,8 +56,8 @@ class SizeProgram(LocalProgram):
 
     def numbers(self, shares: Array) -> Array:
         """The objective, then the relative room inside each limit, and inside each sector."""
-        own, problem = self.columns(shares), self.problem
-        x, u = own[self.sized], own[~self.sized]
+        columns, problem = self.columns(shares), self.problem
+        x, u = columns[self.sized], columns[~self.sized]
         value = sum(term.weight * self.model.value(term.measure, x, u) for term in problem.objective)
         rooms = [limit.room(self.model.value(limit.measure, x, u))[0] - INSIDE for limit in problem.limits]
         return np.array([value, *rooms, *self.edges(shares)])
@@ -70,10 +71,10 @@ class SizeProgram(LocalProgram):
         problem, named = self.problem, self.model.sizes
         if not self.model.domains:
             return self.shares(sizes)
-        given = [float(x) for x in sizes]
-        held = replace(problem, engine=problem.design(given, named), decisions=problem.unbalances)
-        where: dict[str, Value] = dict(zip((d.name for d in named), given, strict=True))
-        return self.shares(rebalance(problem, held, where).design.values)
+        start_sizes = [float(x) for x in sizes]
+        fixed = replace(problem, engine=problem.design(start_sizes, named), decisions=problem.unbalances)
+        where: dict[str, Value] = dict(zip((d.name for d in named), start_sizes, strict=True))
+        return self.shares(rebalance(problem, fixed, where).design.values)
 
 
 def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
@@ -92,9 +93,11 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
     started = time.perf_counter()
     initial, model = evaluate(problem), SizeModel(problem)
     check_acts(model)
-    program = SizeProgram.of_sizes(model)
+    program = SizeProgram.from_model(model)
     best = _proposed(program)
-    boxes = _boxes(model)
+    boxes: SizeBoxes | None = None
+    with suppress(ValueError):
+        boxes = SizeBoxes(model, ask_cones)
 
     def bounded(value: float, room: float, design: Design) -> Divided:
         usual = MOST_WITH_ROD if model.moves_rod else MOST_PROGRAMS if model.domains else MOST_BOXES
@@ -107,22 +110,29 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
         place = program.columns(program.shares(design.values))[program.sized]
         return divided_sizes(boxes, value, room, most, known_of(design, place) if value < math.inf else None)
 
-    found = proven(program, best, bounded)
-    if boxes is not None and found.excludes_all:
-        return none_within(problem, initial, _conflict(problem, boxes), {"solve": time.perf_counter() - started})
-    told = _why(problem) if boxes is None else f"local programs; lower bound on {found.divided.boxes} boxes of sizes"
-    proof = shown(program, found.design, found.bound, _reach(boxes), told)
-    return concluded(found.design, initial, proof, {"solve": time.perf_counter() - started})
+    outcome = proven(program, best, bounded)
+    if boxes is not None and outcome.excludes_all:
+        conflict = smallest_conflict(
+            problem.limits, lambda limits: divided_sizes(boxes.keeping(limits), math.inf, 0.0, 64).bound == math.inf
+        )
+        return none_within(problem, initial, conflict, {"solve": time.perf_counter() - started})
+    if boxes is not None:
+        words = f"local programs; lower bound on {outcome.divided.boxes} boxes of sizes"
+    else:
+        rod = "; nothing bounds what the length of the rod makes of a load"
+        words = f"local programs{rod if model.moves_rod else ''}"
+    reach = Reach.ASIDE if boxes is None else Reach.WHOLE if boxes.is_whole else Reach.NEAR
+    proof = shown(program, outcome.design, outcome.bound, reach, words)
+    return concluded(outcome.design, initial, proof, {"solve": time.perf_counter() - started})
 
 
 def _proposed(program: SizeProgram) -> Array:
-    """The best design of local programs, its unbalances the best with its sizes."""
     problem = program.problem
-    given = program.shares(problem.start)
-    starts = [given, np.ones(len(given)), *looks(problem)]
+    first = program.shares(problem.start)
+    starts = [first, np.ones(len(first)), *looks(problem)]
     if program.model.domains:
         sizes = [program.columns(start)[program.sized] for start in starts[:2]]
-        starts = [*(program.balanced(each) for each in sizes), *starts]
+        starts = [*(program.balanced(one) for one in sizes), *starts]
     best = searched(program, starts, min(problem.search.starts, STARTS))
     return min(best, program.balanced(program.columns(best)[program.sized]), key=program.rank)
 
@@ -135,40 +145,18 @@ def ask_cones(program: AffineProblem, exactly: bool = False) -> tuple[Array | No
         terms=tuple((weight, _thinned(norm, steps)) for weight, norm in program.terms),
         limits=tuple((most, _thinned(norm, steps)) for most, norm in program.limits),
     )
-    found = solve_cones(fewer)
-    return found.x, found.multipliers
+    solution = solve_cones(fewer)
+    return solution.x, solution.multipliers
 
 
-def _thinned(norm: AffineNorm, least: int) -> AffineNorm:
-    """Every so many rows of a mean over equal steps, no fewer than are asked for; all of those of others."""
+def _thinned(norm: AffineNorm, steps: int) -> AffineNorm:
     grid = norm.grid
-    thin = max((n for n in range(1, grid.steps // least + 1) if grid.steps % n == 0), default=1)
+    thin = max((n for n in range(1, grid.steps // steps + 1) if grid.steps % n == 0), default=1)
     if not norm.norm.averages or grid.bends or thin == 1:
         return norm
     weights = thin * grid.weights[::thin]
     return replace(
         norm, constant=norm.constant[::thin], slope=norm.slope[::thin], grid=Grid(weights, grid.steps // thin)
-    )
-
-
-def _boxes(model: SizeModel) -> SizeBoxes | None:
-    """Boxes that bound what is asked; None where nothing bounds it."""
-    try:
-        return SizeBoxes(model, ask_cones)
-    except ValueError:
-        return None
-
-
-def _reach(boxes: SizeBoxes | None) -> Reach:
-    if boxes is None:
-        return Reach.ASIDE
-    return Reach.WHOLE if boxes.is_whole else Reach.NEAR
-
-
-def _conflict(problem: Problem, boxes: SizeBoxes) -> tuple[str, ...]:
-    """Limits that no sizes keep together, as far as boxes tell."""
-    return smallest_conflict(
-        problem.limits, lambda kept: divided_sizes(boxes.keeping(kept), math.inf, 0.0, 64).bound == math.inf
     )
 
 
@@ -180,9 +168,3 @@ def check_acts(model: SizeModel) -> None:
         ends = [np.where(np.arange(len(middle)) == k, edge, middle) for edge in (model.lower, model.upper)]
         if all(model.value(measure, ends[0]) == model.value(measure, ends[1]) for measure in measures):
             raise ModelError(f"{decision.name} is open, and nothing that is asked depends on it; fix it, or limit it")
-
-
-def _why(problem: Problem) -> str:
-    has_rod = any(decision.name == "engine.rod_length" for decision in problem.decisions)
-    why = "local programs; nothing bounds what the length of the rod makes of a load"
-    return why if has_rod else "local programs"

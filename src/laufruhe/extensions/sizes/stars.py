@@ -42,5 +42,5 @@ def solve_star_sizes(problem: Problem) -> Result:
     stars = even_stars(phasing)
     if not stars:
         return no_star(problem, why_none_fires(phasing)[0])
-    found = solve_each_order(problem, phasing, stars, solve_sizes)
-    return replace(found, timing={**found.timing, "phasing": time.perf_counter() - started})
+    result = solve_each_order(problem, phasing, stars, solve_sizes)
+    return replace(result, timing={**result.timing, "phasing": time.perf_counter() - started})

@@ -107,10 +107,10 @@ def _shared(
     by_rod = by_rod.reshape(len(shares), len(engine.slider_cranks))
     total = crank_forces(engine, point, fidelity).each(partial(np.einsum, "kc,ncd->nkd", by_rod))
     for rotor in engine.rotors:
-        own = np.array([share(rotor.x) for share in shares])
-        if rotor.shaft == CRANKSHAFT and rotor.unbalance and own.any():
+        factors = np.array([share(rotor.x) for share in shares])
+        if rotor.shaft == CRANKSHAFT and rotor.unbalance and factors.any():
             load = rotor_loads((rotor,), point.speed, engine.cycle)
-            total = total + load.each(lambda wrench: wrench[:, :3]).each(partial(np.einsum, "k,nd->nkd", own))
+            total = total + load.each(lambda wrench: wrench[:, :3]).each(partial(np.einsum, "k,nd->nkd", factors))
     return total
 
 
@@ -121,8 +121,8 @@ def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, places: 
     for part in engine.slider_cranks:
         behind = np.array([float(part.x > x) for x in places])
         if behind.any():
-            own = crank_torque(replace(engine, slider_cranks=(part,)), point, fidelity)
-            total = total + own.each(partial(np.einsum, "k,n->nk", behind))
+            torque = crank_torque(replace(engine, slider_cranks=(part,)), point, fidelity)
+            total = total + torque.each(partial(np.einsum, "k,n->nk", behind))
     return total
 
 
@@ -176,13 +176,13 @@ def big_end_factors(engine: Engine, _: OperatingPoint) -> Array:
 def web_factors(engine: Engine, _: OperatingPoint) -> Array:
     """Return the web stress per newton on its side, bending plus pressure at its edge, (2 cylinders,) (Z4)."""
     webs = _part(engine, "webs", Webs)
-    found = []
+    factors = []
     for part in engine.slider_cranks:
         middle = 0.5 * (_pin_size(part)[1] + webs.thickness)
         for bearing in _span(engine, part):
             lever = max(abs(bearing.x - part.x) - middle, 0.0)
-            found.append(lever / webs.modulus + 1.0 / webs.area)
-    return np.array(found)
+            factors.append(lever / webs.modulus + 1.0 / webs.area)
+    return np.array(factors)
 
 
 def journal_factors(engine: Engine, _: OperatingPoint) -> Array:
@@ -252,13 +252,13 @@ def journal_speeds(engine: Engine, point: OperatingPoint) -> Array:
 def throw_clearance(engine: Engine) -> float:
     """Return the least space that pin, webs and half journals leave between two main bearings [m] (Z11)."""
     thickness = _part(engine, "webs", Webs).thickness
-    found = []
+    rooms = []
     for part in engine.slider_cranks:
         bearings = _span(engine, part)
         for bearing in bearings:
             room = abs(bearing.x - part.x) - 0.5 * (_pin_size(part)[1] + _journal(bearing)[1])
-            found.append(room - thickness)
-    return min(found)
+            rooms.append(room - thickness)
+    return min(rooms)
 
 
 def gear_mass(engine: Engine) -> float:
@@ -287,10 +287,10 @@ def _of_pins(engine: Engine, factor: Callable[[PistonPin], float]) -> Array:
 
 
 def _part(engine: Engine, name: str, kind: type[T]) -> T:
-    found = gear_of(engine).part(name)
-    if not isinstance(found, kind):
+    one = gear_of(engine).part(name)
+    if not isinstance(one, kind):
         raise TypeError(f"{name} is no {kind.__name__}")
-    return found
+    return one
 
 
 def _pin_size(part: SliderCrank) -> tuple[float, float]:

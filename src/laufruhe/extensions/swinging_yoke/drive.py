@@ -17,7 +17,7 @@ from laufruhe.machine.slider_crank import SliderCrank
 
 @dataclass(frozen=True, kw_only=True)
 class Yoke(Mechanism):
-    """What all of an engine share; `own` are the fields of `SwingingYoke` beside those of a slider-crank."""
+    """Numbers that all yokes of an engine share; `own` are fields of `SwingingYoke` that a slider-crank has not."""
 
     own: Mapping[str, float]
 
@@ -40,9 +40,9 @@ class SwingingYokeDrive(DriveKind):
     )
 
     def radius(self, sizes: Sizes) -> float:
-        """e sin of half the angle that the slow stroke is over half a turn."""
-        own = sizes.own
-        pivot, ratio, length = own["pivot_distance"], own["return_ratio"], own["lever_length"]
+        """Return the crank radius, e sin of half the angle that the slow stroke is over half a turn [m]."""
+        numbers = sizes.own
+        pivot, ratio, length = numbers["pivot_distance"], numbers["return_ratio"], numbers["lever_length"]
         if pivot is None:
             raise KeyedError("pivot_distance", "is missing; add the distance between crank and pivot")
         if (ratio is None) == (length is None):
@@ -60,20 +60,21 @@ class SwingingYokeDrive(DriveKind):
         return float(pivot * share)
 
     def mechanism(self, plain: Mechanism, sizes: Sizes) -> Mechanism:
-        """With the lever, its weight, and the ram's path."""
-        own, pivot = sizes.own, sizes.own["pivot_distance"]
+        """Return the mechanism with the lever, its weight, and the ram's path."""
+        numbers, pivot = sizes.own, sizes.own["pivot_distance"]
         length = 0.5 * sizes.stroke * pivot / plain.crank_radius
-        if own["lever_weight"] and own["lever_weight_radius"] is None:
+        if numbers["lever_weight"] and numbers["lever_weight_radius"] is None:
             raise KeyedError("lever_weight_radius", "is missing beside lever_weight; add its distance from the pivot")
-        told: dict[str, Any] = {
+        of_lever: dict[str, Any] = {
             "pivot": pivot, "lever_length": length, "ram_height": plain.offset,
-            "lever_weight": own["lever_weight"] or 0.0, "lever_weight_radius": own["lever_weight_radius"] or 0.0,
+            "lever_weight": numbers["lever_weight"] or 0.0,
+            "lever_weight_radius": numbers["lever_weight_radius"] or 0.0,
         }  # fmt: skip
-        if own["lever"] is not None:
+        if numbers["lever"] is not None:
             names = {"mass": "lever_mass", "centre_of_gravity": "lever_centre", "inertia": "lever_inertia"}
-            told |= {name: own["lever"][key] for key, name in names.items()}
+            of_lever |= {name: numbers["lever"][key] for key, name in names.items()}
         shared = {part.name: getattr(plain, part.name) for part in fields(plain)}
-        return Yoke(**shared | {"offset": 0.0}, own=told)
+        return Yoke(**shared | {"offset": 0.0}, own=of_lever)
 
 
 SWINGING_YOKE = SwingingYokeDrive()

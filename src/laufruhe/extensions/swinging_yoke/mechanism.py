@@ -31,9 +31,9 @@ class SwingingYoke(SliderCrank):
     pivot
         Distance e of the pivot from the crank axis [m].
     lever_length
-        From the pivot to the end that drives the ram, R [m].
+        Length from the pivot to the end that drives the ram, R [m].
     ram_height
-        Of the ram's path above where the lever's end touches at mid-stroke [m].
+        Height of the ram's path above where the lever's end touches at mid-stroke [m].
     lever_mass, lever_centre, lever_inertia
         [kg], centre of gravity from the pivot towards the end [m], inertia about it [kg m2].
     lever_weight, lever_weight_radius
@@ -68,12 +68,12 @@ class SwingingYoke(SliderCrank):
 
     @property
     def path(self) -> Hashable:
-        """What the ram's path depends on, besides the angle of the crank."""
+        """Key of what the ram's path depends on, besides the angle of the crank."""
         return "swinging yoke", self.crank_radius, self.pivot, self.lever_length
 
     @cached_property
     def dead_centres(self) -> tuple[float, float]:
-        """Where crank and lever are square (K15)."""
+        """Angles at which crank and lever are square (K15)."""
         lean = math.asin(self.crank_radius / self.pivot)
         return -lean, math.pi + lean
 
@@ -90,11 +90,11 @@ class SwingingYoke(SliderCrank):
 
     @property
     def counterweight_mass(self) -> float | None:
-        """Behind the pivot."""
+        """Mass behind the pivot."""
         return self.lever_weight if self.lever_weight_radius > 0.0 else None
 
     def lever(self, lib: Any, alpha: Any) -> tuple[Any, tuple[Any, Any]]:
-        """Its direction as a unit number, and first and second derivative of its angle (K14)."""
+        """Return the lever's direction as a unit number, and first and second derivative of its angle (K14)."""
         r, e = 0.0 * alpha + self.crank_radius, 0.0 * alpha + self.pivot
         cosine, sine = lib.cos(alpha), lib.sin(alpha)
         # (r^2 + e^2 + 2 e r sin alpha), which is small where the pin comes near the pivot
@@ -104,23 +104,23 @@ class SwingingYoke(SliderCrank):
         return direction, (rate, r * e * cosine * (e - r) * (e + r) / (square * square))
 
     def travel(self, lib: Any, alpha: Any) -> Any:
-        """Way of the ram towards the crank from alpha = 0 [m]."""
+        """Return the way of the ram towards the crank from alpha = 0 [m]."""
         start, _ = self.lever(lib, 0.0 * alpha)
         return self.lever_length * (start.real - self.lever(lib, alpha)[0].real)
 
     def velocity(self, lib: Any, alpha: Any) -> Any:
-        """Velocity of the ram away from the crank, by the angle of its crank [m] (K16)."""
+        """Return the velocity of the ram away from the crank, by the angle of its crank [m] (K16)."""
         direction, (rate, _) = self.lever(lib, alpha)
         return -self.lever_length * rate * direction.imag
 
     def motion(self, lib: Any, alpha: Any) -> Motion:
-        """Ram, lever and its weight."""
+        """Return the motion of ram, lever and its weight."""
         direction, (rate, swing) = self.lever(lib, alpha)
         turned, bent = 1j * rate * direction, (1j * swing - rate * rate) * direction
 
         def on_lever(distance: float) -> tuple[Any, Any, Any]:
-            own = 0.0 * alpha + distance
-            return own * direction - 1j * self.pivot, own * turned, own * bent
+            arm = 0.0 * alpha + distance
+            return arm * direction - 1j * self.pivot, arm * turned, arm * bent
 
         length = 0.0 * alpha + self.lever_length
         height = self.lever_length - self.pivot + self.ram_height
@@ -135,7 +135,7 @@ class SwingingYoke(SliderCrank):
         )
 
     def outlines(self, alpha: float) -> tuple[Outline, ...]:
-        """Ram, lever, and its weight as a block of steel 150 mm thick."""
+        """Return ram, lever, and its weight as a block of steel 150 mm thick."""
         direction, pivot = complex(self.lever(np, np.float64(alpha))[0]), -1j * self.pivot
         ram = complex(self.motion(np, np.float64(alpha)).points[0][1][0])
         wide, side = 0.06 * self.stroke, math.sqrt(self.lever_weight / _WEIGHT)
@@ -151,7 +151,7 @@ class SwingingYoke(SliderCrank):
         return tuple(bodies)
 
     def scaled(self, length: float, mass: float) -> Self:
-        """The same mechanism in another size."""
+        """Return the same mechanism in another size."""
         return replace(
             super().scaled(length, mass),
             pivot=self.pivot * length,
@@ -166,5 +166,4 @@ class SwingingYoke(SliderCrank):
 
 
 def _box(half_length: float, half_width: float) -> Any:
-    """Corners of a rectangle about zero."""
     return np.array([1, 1, -1, -1]) * half_length + 1j * np.array([1, -1, -1, 1]) * half_width

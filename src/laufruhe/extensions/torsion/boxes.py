@@ -51,7 +51,7 @@ class _Lines:
     torques
         Shape (orders, discs and rings).
     mean
-        Of order zero, shape (discs,).
+        Torque of order zero, shape (discs,).
     middle, sides
         Dynamic stiffness in the middle of the bounds, and what one of each coordinate adds, shapes (orders, n, n) and
         (coordinates, orders, n, n).
@@ -81,20 +81,20 @@ class _OfInertia:
         self._engine, self._fidelity = evaluation.engine, evaluation.fidelity
 
     def least(self, chains: Sequence[Torsion]) -> float:
-        """On a box, of the chains of its lower corner, centre and upper corner."""
+        """Return the least value on a box, from the chains of its lower corner, centre and upper corner."""
         inertia = turning_inertia(self._engine.with_extra(chains[0 if self._rises else -1]), self._fidelity)
         return 0.0 if inertia is None else self._number(Flywheel(inertia))
 
 
 class TwistBoxes:
-    """Bounds of boxes of what is open of the crankshaft.
+    """Bounds of the objective on boxes of open numbers of the crankshaft (V13).
 
     Parameters
     ----------
     problem
-        With nothing but numbers of the crankshaft open.
+        Problem with nothing but numbers of the crankshaft open.
     evaluation
-        Of the design as given.
+        Evaluation of the design as given.
     """
 
     what = "boxes of discs and shafts"
@@ -120,25 +120,25 @@ class TwistBoxes:
 
     @property
     def is_sampled_fully(self) -> bool:
-        """Whether sums of squares over orders are those over samples, as what is bounded supposes."""
+        """Return whether sums of squares over orders are those over samples, as the bounds suppose."""
         highest = max((lines.highest for lines in self._lines), default=0)
         return highest <= self._samples // 2
 
     @property
     def has_terms(self) -> bool:
-        """Whether anything minimised is bounded."""
+        """Return whether any minimised measure has a bound."""
         return bool(self._terms or self._turning)
 
     @property
     def knows_all(self) -> bool:
-        """Whether all that is minimised is bounded from near by."""
+        """Return whether every minimised measure has a bound that closes with small boxes."""
         return all(_is_square(term.measure) or _turns(term.measure) for term in self.problem.objective)
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
+        """Return the least objective on every box, infinite where no design is allowed; and the side worth halving."""
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            found = [self._bound(low, high) for low, high in zip(lower, upper, strict=True)]
-        return np.array([value for value, _ in found]), np.array([side for _, side in found], dtype=np.intp)
+            bounds = [self._bound(low, high) for low, high in zip(lower, upper, strict=True)]
+        return np.array([value for value, _ in bounds]), np.array([side for _, side in bounds], dtype=np.intp)
 
     def _bound(self, lower: Array, upper: Array) -> tuple[float, int]:
         all_of = np.maximum(self.coordinates.upper - self.coordinates.lower, 1e-300)
@@ -150,83 +150,89 @@ class TwistBoxes:
         if any(of.least(chains) > most * (1.0 + SLACK) for most, of in self._uneven):
             return math.inf, int(np.argmax(wide))
         twists = [self._expanded(lines, chains[1], centre, half) for lines in self._lines]
-        if any(_least([(1.0, self._under(q, chains, twists))]) > most * (1.0 + SLACK) for most, q in self._limits):
+        if any(_root_bound([(1.0, self._under(q, chains, twists))]) > most * (1.0 + SLACK) for most, q in self._limits):
             return math.inf, int(np.argmax(wide))
         if any(self._overheats(limit, chains, twists) for limit in self._heat):
             return math.inf, int(np.argmax(wide))
         terms = [(weight, self._under(measure, chains, twists)) for weight, measure in self._terms]
-        least, pull = _least(terms), np.nan_to_num(sum((w * under.bends[0] for w, under in terms), np.zeros(len(wide))))
+        bound, pull = (
+            _root_bound(terms),
+            np.nan_to_num(sum((w * under.bends[0] for w, under in terms), np.zeros(len(wide)))),
+        )
         pull = pull / max(float(pull.max(initial=0.0)), 1e-300)
         turning = sum(weight * of.least(chains) for weight, of in self._turning)
         if not self._terms:
             # each goes one way with every inertia, and nothing else moves it
             pull = wide
-        return self._constant + turning + least, int(np.argmax(pull + _SAME * wide))
+        return self._constant + turning + bound, int(np.argmax(pull + _SAME * wide))
 
     def _lines_at(self, loads: PointLoads) -> _Lines:
-        """Orders that count anywhere in the bounds, by a look at their middle and corners."""
-        own, speed = self.coordinates, loads.point.speed
+        """Return the orders that count anywhere in the bounds, judged at their middle and corners."""
+        coordinates, speed = self.coordinates, loads.point.speed
         torques = throw_torques(self.problem.engine, loads.point, loads.fidelity)
-        middle = 0.5 * (own.lower + own.upper)
-        corners = itertools.islice(itertools.product(*zip(own.lower, own.upper, strict=True)), MOST_CORNERS)
-        kept = np.zeros(len(torques.orders), dtype=bool)
+        middle = 0.5 * (coordinates.lower + coordinates.upper)
+        corners = itertools.islice(
+            itertools.product(*zip(coordinates.lower, coordinates.upper, strict=True)), MOST_CORNERS
+        )
+        counted = np.zeros(len(torques.orders), dtype=bool)
         for x in (middle, *map(np.array, corners)):
             try:
-                flexible = receptances(own.chain(x), torques.orders, speed)
+                flexible = receptances(coordinates.chain(x), torques.orders, speed)
             except ModelError:
                 # on a resonance all orders count
-                kept[:] = True
+                counted[:] = True
                 continue
             size = (np.abs(np.einsum("hsd,hd->hs", flexible, torques.coefficients)) ** 2).sum(axis=1)
-            kept |= size > LEAST_SHARE * size.sum()
-        kept[0] = False
+            counted |= size > LEAST_SHARE * size.sum()
+        counted[0] = False
         # an order with two samples a wave is read anywhere between nothing and its peak
-        kept[2 * np.arange(len(kept)) >= self._samples] = False
-        orders = torques.orders[kept]
-        chain = own.chain(middle)
+        counted[2 * np.arange(len(counted)) >= self._samples] = False
+        orders = torques.orders[counted]
+        chain = coordinates.chain(middle)
         drives = np.zeros((len(orders), len(chain.discs) + len(chain.absorbers)), dtype=complex)
-        drives[:, : len(chain.discs)] = torques.coefficients[kept]
+        drives[:, : len(chain.discs)] = torques.coefficients[counted]
         at = dynamic_stiffness(chain, orders, speed)
         sides = []
         for k in range(len(middle)):
             # affine, so that the whole width tells the slope without a rounding
-            ends = [np.where(np.arange(len(middle)) == k, end, middle) for end in (own.lower, own.upper)]
-            low, high = (dynamic_stiffness(own.chain(x), orders, speed) for x in ends)
-            sides.append((high - low) / (own.upper[k] - own.lower[k]))
+            ends = [
+                np.where(np.arange(len(middle)) == k, end, middle) for end in (coordinates.lower, coordinates.upper)
+            ]
+            low, high = (dynamic_stiffness(coordinates.chain(x), orders, speed) for x in ends)
+            sides.append((high - low) / (coordinates.upper[k] - coordinates.lower[k]))
         highest = len(torques.coefficients) - 1
-        apart = _apart(len(chain.sections), at.shape[-1])
+        twisted = _twist_of(len(chain.sections), at.shape[-1])
         along = directions_of([
-            [*side.real, *side.imag, of[:, None] * apart] for side, of in zip(sides, own.owners, strict=True)
+            [*side.real, *side.imag, of[:, None] * twisted] for side, of in zip(sides, coordinates.owners, strict=True)
         ])  # fmt: skip
         inside = along.inside(np.moveaxis(np.array(sides), 0, 1))
         return _Lines(loads, highest, orders, drives, torques.coefficients[0].real, at, np.array(sides), along, inside)
 
     def _expanded(self, lines: _Lines, chain: Torsion, centre: Array, half: Array) -> Expansion:
-        """Angles of discs and rings times the roots of their inertia."""
         root = np.sqrt(inertias(chain))
         scale = np.outer(root, root)
         middle = 0.5 * (self.coordinates.lower + self.coordinates.upper)
         dynamic = lines.middle + np.tensordot(centre - middle, lines.sides, axes=(0, 0))
         inverse = inverses(dynamic / scale)
-        still = np.einsum("lab,lb->la", inverse, lines.torques / root)
+        angles = np.einsum("lab,lb->la", inverse, lines.torques / root)
         along = replace(lines.along, columns=lines.along.columns / root[:, None])
-        return series(centre[None], half[None], inverse[None], along, lines.inside, still[None])
+        return series(centre[None], half[None], inverse[None], along, lines.inside, angles[None])
 
     def _under(self, measure: Measure, chains: Sequence[Torsion], twists: Sequence[Expansion]) -> Under:
-        """A linear function under a root mean square over orders, sections and operating points."""
+        """Return a linear function under a root mean square over orders, sections and operating points."""
         names = [section.name for section in chains[1].sections]
         places = measure.load.places(self.problem.engine)
         chosen = np.array([names.index(places[k]) for k in measure.places(places)], dtype=np.intp)
         shares = measure.shares([lines.loads.point for lines in self._lines]) / len(chosen)
-        found, weights = list[Answer](), list[Array]()
+        answers, weights = list[Answer](), list[Array]()
         for share, lines, twist in zip(shares, self._lines, twists, strict=True):
-            found.append(self._alternating(measure, chains, lines, twist, chosen))
+            answers.append(self._alternating(measure, chains, lines, twist, chosen))
             weights.append(np.where(measure.counted(lines.orders), 0.5 * share, 0.0))
             if bool(measure.counted(np.zeros(1))[0]):
-                found.append(self._mean(measure, chains, lines, chosen))
+                answers.append(self._mean(measure, chains, lines, chosen))
                 weights.append(np.array([share]))
         parts = (
-            np.concatenate([getattr(each, part) for each in found], axis=1)
+            np.concatenate([getattr(answer, part) for answer in answers], axis=1)
             for part in ("value", "slopes", "rest", "bends")
         )
         return root_under(Answer(*parts), np.concatenate(weights))
@@ -234,26 +240,25 @@ class TwistBoxes:
     def _alternating(
         self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, twist: Expansion, chosen: Indices
     ) -> Answer:
-        """What a measure makes of the twist of the chosen sections in every order."""
+        """Return the signal of the chosen sections in every order but zero, over a box."""
         root, factors = np.sqrt(inertias(chains[1])), FACTORS[measure.channel]
-        twisted = _apart(len(chains[1].sections), len(root))
-        apart = twisted / root
+        twisted = _twist_of(len(chains[1].sections), len(root))
+        scaled = twisted / root
         low, here, high = (factors(chain, lines.orders, lines.loads.point.speed)[:, chosen, None] for chain in chains)
         # each factor is of its own stiffness, and bends one way: so much the secant may be off
         turn, bend = 0.5 * (high - low), np.abs(here - 0.5 * (high + low))[..., 0]
         owners = self.coordinates.owners[:, chosen, None]
         # in coordinates of the discs: a section turns along what its stiffness moves
         slopes = owners * turn[:, None] * twisted[chosen]
-        found = mapped(twist, (here * apart[chosen])[None], lines.along.along(slopes)[None])
+        answer = mapped(twist, (here * scaled[chosen])[None], lines.along.along(slopes)[None])
         if not bend.any():
-            return found
-        moved = np.broadcast_to(apart[chosen], (1, len(lines.orders), len(chosen), len(root)))
+            return answer
+        moved = np.broadcast_to(scaled[chosen], (1, len(lines.orders), len(chosen), len(root)))
         alone = mapped(twist, moved)
         most = np.abs(alone.value) + np.abs(alone.slopes).sum(axis=2) + alone.rest[..., None]
-        return replace(found, rest=found.rest + np.linalg.norm(np.where(bend > 0.0, bend * most, 0.0), axis=-1))
+        return replace(answer, rest=answer.rest + np.linalg.norm(np.where(bend > 0.0, bend * most, 0.0), axis=-1))
 
     def _mean(self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, chosen: Indices) -> Answer:
-        """The same of order zero, each section of its own stiffness alone."""
         zero, speed, factors = np.zeros(1), lines.loads.point.speed, FACTORS[measure.channel]
         low, here, high = (
             ((receptances(chain, zero, speed)[0] @ lines.mean) * factors(chain, zero, speed)[0])[chosen]
@@ -264,7 +269,7 @@ class TwistBoxes:
         return Answer(here[None, None], slopes[None, None], rest, np.zeros((1, 1, len(slopes))))
 
     def _overheats(self, limit: Limit, chains: Sequence[Torsion], twists: Sequence[Expansion]) -> bool:
-        """Tell if an absorber gives off too much all over a box: what it loses of a swing is least at low ends."""
+        """Return whether an absorber gives off too much all over a box: its loss for a swing is least at low ends."""
         root = np.sqrt(inertias(chains[1]))
         for lines, twist in zip(self._lines, twists, strict=True):
             point = lines.loads.point
@@ -273,13 +278,13 @@ class TwistBoxes:
                 row = np.zeros(len(root))
                 row[len(chains[0].discs) + k], row[chains[0].index(absorber.on)] = 1.0, -1.0
                 swing = mapped(twist, np.broadcast_to(row / root, (1, len(rate), 1, len(root))))
-                lost = absorber.stiffness * absorber.loss_factor * rate + absorber.damping_at(point.speed) * rate**2
-                if _least([(1.0, root_under(swing, 0.5 * lost))]) ** 2 > limit.maximum * (1.0 + SLACK):
+                lost = 0.5 * absorber.losses(rate, point.speed)
+                if _root_bound([(1.0, root_under(swing, lost))]) ** 2 > limit.maximum * (1.0 + SLACK):
                     return True
         return False
 
     def _breaks(self, limit: Limit, resonance: Resonance, lower: Array, upper: Array) -> bool:
-        """Tell if modes break a limit all over a box: they rise with stiffness and fall with inertia (V15)."""
+        """Return whether modes break a limit all over a box: they rise with stiffness and fall with inertia (V15)."""
         ends = self.coordinates.ends(lower, upper, resonance)
         if ends is None:
             return False
@@ -292,8 +297,7 @@ class TwistBoxes:
         return bool(np.any(broken))
 
 
-def _apart(sections: int, angles: int) -> Array:
-    """Twist of sections of the angles of discs and rings."""
+def _twist_of(sections: int, angles: int) -> Array:
     return np.asarray(np.eye(sections, angles) - np.eye(sections, angles, 1))
 
 
@@ -305,8 +309,7 @@ def _is_square(measure: Measure) -> bool:
     return measure.channel in FACTORS and measure.norm.is_euclidean
 
 
-def _least(terms: Sequence[tuple[float, Under]]) -> float:
-    """Of a sum of root mean squares on a box; nothing where what is left out is not known."""
+def _root_bound(terms: Sequence[tuple[float, Under]]) -> float:
     slopes = sum((weight * under.slopes[0] for weight, under in terms), np.zeros(1))
-    found = sum(weight * float(under.value[0] - under.rest[0]) for weight, under in terms) - float(np.abs(slopes).sum())
-    return max(found, 0.0) if math.isfinite(found) else 0.0
+    bound = sum(weight * float(under.value[0] - under.rest[0]) for weight, under in terms) - float(np.abs(slopes).sum())
+    return max(bound, 0.0) if math.isfinite(bound) else 0.0

@@ -36,13 +36,13 @@ def _of_shafts(
     name: str, unit: str, signal: Callable[[Engine, OperatingPoint, Fidelity], Spectrum],
     title: str = "", places: Callable[[Engine], Sequence[str]] = _names_of_sections, needs: Need = CHAIN,
 ) -> LoadChannel:  # fmt: skip
-    found = of_what_moves(
+    of_sections = of_what_moves(
         name, lambda moving, at: signal(moving, at.point, at.fidelity).each(lambda values: values[:, :, None])
     )
-    keys = (*ON_BLOCK, "sections")
     return LoadChannel(
-        name, unit, keys, needs, signal=found, places=places, feels_unbalances=False, title=title, place="section"
-    )
+        name, unit, (*ON_BLOCK, "sections"), needs, signal=of_sections, places=places, feels_unbalances=False,
+        title=title, place="section",
+    )  # fmt: skip
 
 
 def _points(measure: MeasureQuery, evaluation: EvaluatedDesign) -> list[PointLoads]:
@@ -50,32 +50,27 @@ def _points(measure: MeasureQuery, evaluation: EvaluatedDesign) -> list[PointLoa
 
 
 def _at_speeds(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[physics.Resonance]:
-    """List the speeds that count: a pendulum has another spring at each."""
     speeds = dict.fromkeys(at.point.speed for at in _points(measure, evaluation))
     return [physics.AtSpeed(speed) for speed in speeds]
 
 
 def _in_orders(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[physics.Resonance]:
-    """List the orders that count: a pendulum has another inertia in each."""
     orders = measure.orders or physics.main_orders(evaluation.engine, HIGHEST)
     return [physics.InOrder(order) for order in orders if order > 0.0]
 
 
 def _of_modes(name: str, unit: str, keys: tuple[str, ...], resonances: Resonances) -> NumberChannel:
-    """Return the channel of numbers that natural modes have."""
-
     def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         chain = physics.chain_of(evaluation.engine)
-        return [float(x) for own in resonances(measure, evaluation) for x in own.numbers(chain)]
+        return [float(x) for resonance in resonances(measure, evaluation) for x in resonance.numbers(chain)]
 
     sides = ("min", "max", "outside")
     return NumberChannel(name, unit, keys, CHAIN, sides, minimised=False, values=values, of_loads=False)
 
 
 def _heat(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
-    """Return the most that any absorber has to give off at any point that counts."""
-    found = [physics.absorber_heat(evaluation.engine, at.point, at.fidelity) for at in _points(measure, evaluation)]
-    return (max((float(heat) for each in found for heat in each), default=0.0),)
+    heats = [physics.absorber_heat(evaluation.engine, at.point, at.fidelity) for at in _points(measure, evaluation)]
+    return (max((float(heat) for absorbers in heats for heat in absorbers), default=0.0),)
 
 
 SHAFT_TWIST = _of_shafts("shaft twist", "rad", physics.twist)

@@ -13,7 +13,7 @@ from laufruhe.problem.problem import Problem
 
 
 class TwistCoordinates:
-    """Inertia, stiffness and damping as they are decided; of a diameter the stiffness that it makes.
+    """Coordinates of decisions: inertia, stiffness and damping themselves, and the stiffness that a diameter makes.
 
     Attributes
     ----------
@@ -27,42 +27,41 @@ class TwistCoordinates:
         self.problem, self._chain = problem, chain_of(problem.engine)
         # of every decision names of parts of the crankshaft, and of the number of each
         self._keys: list[tuple[tuple[str, str], ...]] = [decision.keys(TORSION) for decision in problem.decisions]
-        self.lower = self.of(np.array([decision.lower for decision in problem.decisions]))
-        self.upper = self.of(np.array([decision.upper for decision in problem.decisions]))
+        self.lower = self.from_decisions(np.array([decision.lower for decision in problem.decisions]))
+        self.upper = self.from_decisions(np.array([decision.upper for decision in problem.decisions]))
         self.owners = np.array(
             [[float(any(part == s.name for part, _ in keys)) for s in self._chain.sections] for keys in self._keys]
         )  # fmt: skip
 
     @cached_property
     def is_exact(self) -> bool:
-        """Whether stress bends one way with every stiffness: viscous damping of a shaft of open diameter spoils it."""
+        """Return whether stress bends one way with every stiffness; viscous damping of an open diameter spoils it."""
         return all(section.damping == 0.0 for _, section in self._round)
 
     @property
     def _round(self) -> list[tuple[int, Section]]:
-        """Coordinates of diameters, and one of the sections that has each."""
         named = {section.name: section for section in self._chain.sections}
         return [(k, named[part]) for k, ((part, number), *_) in enumerate(self._keys) if number == "diameter"]
 
-    def of(self, values: Array) -> Array:
-        """Of decisions."""
-        found = np.array(values, dtype=float)
+    def from_decisions(self, values: Array) -> Array:
+        """Return the coordinates of decisions, shape (n,)."""
+        coordinates = np.array(values, dtype=float)
         for k, section in self._round:
-            found[k] = section.moved(section.stiffness, float(values[k])).stiffness
-        return found
+            coordinates[k] = section.moved(section.stiffness, float(values[k])).stiffness
+        return coordinates
 
     def decisions(self, coordinates: Array) -> Array:
-        """That these coordinates are of."""
-        found = np.array(coordinates, dtype=float)
+        """Return the decisions at coordinates, shape (n,)."""
+        values = np.array(coordinates, dtype=float)
         for k, section in self._round:
             diameter = section.diameter or 0.0
             solid = section.stiffness / (diameter**4 - section.bore**4)
-            found[k] = (found[k] / solid + section.bore**4) ** 0.25
+            values[k] = (values[k] / solid + section.bore**4) ** 0.25
         low, high = (np.array([getattr(d, end) for d in self.problem.decisions]) for end in ("lower", "upper"))
-        return np.asarray(np.clip(found, low, high))
+        return np.asarray(np.clip(values, low, high))
 
     def chain(self, coordinates: Array) -> Torsion:
-        """Of a point."""
+        """Return the chain at coordinates."""
         return chain_of(self.problem.design(self.decisions(coordinates).tolist()))
 
     def ends(self, lower: Array, upper: Array, resonance: Resonance) -> tuple[Torsion, Torsion] | None:

@@ -44,13 +44,13 @@ class Critical:
     Attributes
     ----------
     speed
-        Of the crank [rad/s].
+        Crank speed [rad/s].
     mode
         Among those that the order meets, 1 is the lowest.
     vector_sum
-        Of this order and mode (V6).
+        Vector sum of this order and mode (V6).
     is_main
-        Whether no firing order changes that.
+        True if no firing order changes that.
     torque
         Largest amplitude of this order in any section at that speed [N m]; None where nothing damps it.
     """
@@ -79,9 +79,9 @@ class TorsionFacts:
     Attributes
     ----------
     modes
-        At the highest operating point, for the sake of pendulums.
+        Modes at the highest operating point, which the springs of pendulums need.
     orders, met, sums
-        All up to the highest that counts, the modes that each meets, and their vector sums.
+        Orders up to the highest that counts, the modes that each meets, and their vector sums.
     main
         Main orders among them.
     criticals
@@ -97,39 +97,38 @@ class TorsionFacts:
 
 
 def is_twisted(result: Result) -> bool:
-    """Whether the crankshaft of this result has discs and shafts."""
+    """Return whether the crankshaft of this result has discs and shafts."""
     return has_torsion(result.problem.engine, result.problem.fidelity)
 
 
 def speed_range(result: Result) -> tuple[float, float]:
-    """Speeds looked at [rad/s]: those asked for, or from under to over the operating points."""
-    asked = chain_of(result.final.engine).speeds
+    """Return the speeds looked at [rad/s]: those of the file, or from under to over the operating points."""
+    limits = chain_of(result.final.engine).speeds
     speeds = [point.speed for point in result.problem.points]
-    return asked or (_SLOWEST * min(speeds), _FASTEST * max(speeds))
+    return limits or (_SLOWEST * min(speeds), _FASTEST * max(speeds))
 
 
 @lru_cache(maxsize=8)
 def facts_of(design: Evaluation, low: float, high: float) -> TorsionFacts:
-    """Modes, vector sums and the critical speeds between two [rad/s]."""
+    """Return modes, vector sums and the critical speeds between two [rad/s]."""
     engine, chain = design.engine, chain_of(design.engine)
     fastest = max((loads.point for loads in design.loads), key=lambda point: point.speed)
     modes, turns = natural_modes(chain, fastest.speed), engine.cycle.turns
     orders = tuple(k / turns for k in range(1, int(HIGHEST * turns) + 1))
     met = tuple(critical_modes(chain, order) for order in orders)
-    sums = tuple(vector_sums(engine, [order], own)[0] for order, own in zip(orders, met, strict=True))
-    main, found = main_orders(engine, HIGHEST), []
-    for order, own, weights in zip(orders, met, sums, strict=True):
-        for m, (frequency, weight) in enumerate(zip(own.frequencies, weights, strict=True)):
+    sums = tuple(vector_sums(engine, [order], modes_at)[0] for order, modes_at in zip(orders, met, strict=True))
+    main, criticals = main_orders(engine, HIGHEST), []
+    for order, modes_at, weights in zip(orders, met, sums, strict=True):
+        for m, (frequency, weight) in enumerate(zip(modes_at.frequencies, weights, strict=True)):
             speed = critical_speed(float(frequency), order)
             if low <= speed <= high:
                 torque = _torque_there(design, replace(fastest, speed=speed), order)
-                found.append(Critical(speed, order, m + 1, float(weight), order in main, torque))
-    found.sort(key=lambda each: -np.inf if each.torque is None else -each.torque)
-    return TorsionFacts(modes, orders, met, sums, main, tuple(found))
+                criticals.append(Critical(speed, order, m + 1, float(weight), order in main, torque))
+    criticals.sort(key=lambda each: -np.inf if each.torque is None else -each.torque)
+    return TorsionFacts(modes, orders, met, sums, main, tuple(criticals))
 
 
 def _torque_there(design: Evaluation, point: OperatingPoint, order: float) -> float | None:
-    """Amplitude of an order in the section that it loads most."""
     chain, torques = chain_of(design.engine), throw_torques(design.engine, point, design.fidelity)
     try:
         flexible = receptances(chain, np.array([order]), point.speed)[0]
@@ -140,57 +139,57 @@ def _torque_there(design: Evaluation, point: OperatingPoint, order: float) -> fl
 
 
 def speeds_between(design: Evaluation, low: float, high: float) -> Array:
-    """Even steps, and the critical speeds among them, where peaks stand."""
-    critical = [each.speed for each in facts_of(design, low, high).criticals]
+    """Return even steps of speed, with the critical speeds, where peaks stand."""
+    critical = [one.speed for one in facts_of(design, low, high).criticals]
     return np.unique([*np.linspace(low, high, SPEEDS), *critical])
 
 
 def torque_over_speed(design: Evaluation, speeds: Array) -> Array:
-    """Half of the peak to peak torque in every section, shape (speeds, sections), of the point with most load."""
+    """Return half the peak to peak torque in every section at the point with most load, shape (speeds, sections)."""
     points = [loads.point for loads in design.loads]
     means = [throw_torques(design.engine, point, design.fidelity).coefficients[0].real.sum() for point in points]
     point = points[int(np.argmax(means))]
-    found = np.full((len(speeds), len(chain_of(design.engine).sections)), np.inf)
+    torques = np.full((len(speeds), len(chain_of(design.engine).sections)), np.inf)
     for k, speed in enumerate(speeds):
         try:
             torque = shaft_torque(design.engine, replace(point, speed=float(speed)), design.fidelity)
         except ModelError:
             continue
-        found[k] = 0.5 * np.ptp(torque.sample(design.samples), axis=0)
-    return found
+        torques[k] = 0.5 * np.ptp(torque.sample(design.samples), axis=0)
+    return torques
 
 
 def barred_ranges(result: Result, design: Evaluation) -> tuple[Barred, ...]:
-    """Speeds at which the design would break a limit of its twist, each end found by halving."""
+    """Return the speeds at which the design breaks a limit of its twist, each end found by halving."""
     return _barred(design, result.problem.limits, *speed_range(result))
 
 
 @lru_cache(maxsize=8)
 def _barred(design: Evaluation, limits: tuple[Limit, ...], low: float, high: float) -> tuple[Barred, ...]:
-    found = []
+    barred = []
     for limit in limits:
         if limit.measure.channel in FACTORS:
             ranges = _ranges(_exceeds(design, limit), speeds_between(design, low, high))
-            found += [Barred(limit.name, *ends) for ends in ranges]
-    return tuple(found)
+            barred += [Barred(limit.name, *ends) for ends in ranges]
+    return tuple(barred)
 
 
 def _exceeds(design: Evaluation, limit: Limit) -> Callable[[float], bool]:
-    """Whether the limit is broken at a speed, under the load of any point that counts."""
-    counted = [each for each in design.loads if limit.measure.counts_point(each.point)]
+    """Return a function that says if the limit is broken at a speed, under the load of any point that counts."""
+    counted = [load for load in design.loads if limit.measure.counts_point(load.point)]
     # points that differ in their speed alone are one
-    loads = {each.point.gas: each for each in counted}.values()
+    loads = {load.point.gas: load for load in counted}.values()
 
     def at(speed: float) -> bool:
-        for each in loads:
-            point = replace(each.point, speed=speed)
+        for load in loads:
+            point = replace(load.point, speed=speed)
             try:
-                moved = PointLoads(point, each.wrench, None, None, design.engine, design.fidelity)
+                moved = PointLoads(point, load.wrench, None, None, design.engine, design.fidelity)
                 signals = [limit.measure.load.signal(moved)]
             except ModelError:
                 return True
-            own = replace(limit.measure, points=None)
-            if load_rows(own, [point], signals, design.engine, design.samples).value > limit.maximum:
+            measure = replace(limit.measure, points=None)
+            if load_rows(measure, [point], signals, design.engine, design.samples).value > limit.maximum:
                 return True
         return False
 
@@ -199,7 +198,7 @@ def _exceeds(design: Evaluation, limit: Limit) -> Callable[[float], bool]:
 
 def _ranges(is_barred: Callable[[float], bool], speeds: Array) -> list[tuple[float, float]]:
     state = [is_barred(float(speed)) for speed in speeds]
-    found: list[tuple[float, float]] = []
+    ranges: list[tuple[float, float]] = []
     start = float(speeds[0]) if state[0] else None
     for k in range(1, len(speeds)):
         if state[k] != state[k - 1]:
@@ -207,12 +206,11 @@ def _ranges(is_barred: Callable[[float], bool], speeds: Array) -> list[tuple[flo
             if start is None:
                 start = edge
             else:
-                found.append((start, edge))
+                ranges.append((start, edge))
                 start = None
-    return [*found, (start, float(speeds[-1]))] if start is not None else found
+    return [*ranges, (start, float(speeds[-1]))] if start is not None else ranges
 
 
 def _edge(is_barred: Callable[[float], bool], low: float, high: float, after: bool) -> float:
-    """Where it changes between two speeds: the end that is barred, so that none is left out."""
     low, high = parted(lambda speed: is_barred(speed) != after, low, high, _HALVINGS)
     return low if after else high

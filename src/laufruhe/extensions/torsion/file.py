@@ -45,7 +45,7 @@ class PieceTable(Table):
 
 
 class SectionTable(Table):
-    """What any shaft between two discs has."""
+    """Shaft between two discs."""
 
     pieces: list[PieceTable] = f.optional("Round pieces, one behind another, in place of the stiffness.", [])
     diameter: f.PositiveLength | None = f.optional(
@@ -63,7 +63,7 @@ class ShaftTable(SectionTable):
 
 
 class CrankTable(SectionTable):
-    """From throw to throw."""
+    """Shafts from throw to throw."""
 
     stiffness: TorsionalStiffnesses | None = None
 
@@ -117,14 +117,13 @@ class _Opened:
 
     def number(self, value: float | Open, key: str, unit: str, name: str, parts: Sequence[str]) -> float:
         """The number that some parts have, or start from."""
-        given = Open.from_value(value)
+        number = Open.from_value(value)
         drives = (NumberDrive(TORSION, (part, key)) for part in parts)
-        self.decisions += given.decisions(f"torsion.{name}.{key}", unit, *drives)
-        return given.start
+        self.decisions += number.decisions(f"torsion.{name}.{key}", unit, *drives)
+        return number.start
 
 
 def _read(table: TorsionTable, problem: Problem, given: Given) -> Problem:
-    """Return the problem with the chain, and with what of it is open."""
     chain, decisions = _chain(table, problem.engine.slider_cranks, given.throws)
     _check_inertia(chain, decisions, problem, "fidelity.crank_inertia" if given.file.flywheel is None else "flywheel")
     return replace(problem, engine=problem.engine.with_extra(chain), decisions=(*problem.decisions, *decisions))
@@ -142,20 +141,20 @@ def _chain(
         rule = f"has {len(table.discs)} discs, and at most {MOST_DISCS} may be given beside the throws"
         raise Refused("torsion.discs", None, rule, "join those that turn together")
     throws = [throw for throw in throws if throw.shaft == CRANKSHAFT]
-    opened, own = _Opened(), _throw_discs(table, parts, throws)
+    opened, discs_of_throws = _Opened(), _throw_discs(table, parts, throws)
     ends = {end: [(k, disc) for k, disc in enumerate(table.discs) if disc.end == end] for end in ("front", "rear")}
     front, rear = (
         [Disc(one.name, opened.number(one.inertia, "inertia", "kg m^2", one.name, [one.name]), one.damping)
          for _, one in ends[end]]
         for end in ("front", "rear")
     )  # fmt: skip
-    discs = (*front, *own, *rear)
+    discs = (*front, *discs_of_throws, *rear)
     names = [disc.name for disc in discs]
     links = [f"{a} - {b}" for a, b in itertools.pairwise(names)]
-    beside = [*links[: len(front)], *links[len(links) - len(rear) :]]
+    joined = [*links[: len(front)], *links[len(links) - len(rear) :]]
     shafts = [
         _section(disc.shaft, table, f"torsion.discs[{k + 1}].shaft", disc.shaft.stiffness, disc.name, [link], opened)[0]
-        for (k, disc), link in zip((*ends["front"], *ends["rear"]), beside, strict=True)
+        for (k, disc), link in zip((*ends["front"], *ends["rear"]), joined, strict=True)
     ]
     crank = _crank_sections(table, links[len(front) : len(links) - len(rear)], opened)
     sections = (*shafts[: len(front)], *crank, *shafts[len(front) :])
@@ -177,13 +176,13 @@ def _throw_discs(table: TorsionTable, parts: Sequence[SliderCrank], throws: Sequ
     turning = [sum(abs(throw.unbalance) for throw in throws if throw.x == x) for x in places]
     inertias = _for_each(table.throw_inertia, len(places), "torsion.throw_inertia", "throws")
     dampings = _for_each(table.cylinder_damping, len(places), "torsion.cylinder_damping", "throws")
-    found = []
-    for n, (own, unbalance) in enumerate(zip(at, turning, strict=True)):
-        radius = max((parts[k].crank_radius for k in own), default=0.0)
-        total = inertias[n] + unbalance * radius + sum(reduced_inertia(parts[k]) for k in own)
+    discs = []
+    for n, (names, unbalance) in enumerate(zip(at, turning, strict=True)):
+        radius = max((parts[k].crank_radius for k in names), default=0.0)
+        total = inertias[n] + unbalance * radius + sum(reduced_inertia(parts[k]) for k in names)
         with blamed_on("torsion.throw_inertia"):
-            found.append(Disc(f"throw {n + 1}", total, dampings[n], tuple(parts[k].name for k in own)))
-    return found
+            discs.append(Disc(f"throw {n + 1}", total, dampings[n], tuple(parts[k].name for k in names)))
+    return discs
 
 
 def _crank_sections(table: TorsionTable, links: Sequence[str], opened: _Opened) -> list[Section]:
@@ -197,22 +196,22 @@ def _crank_sections(table: TorsionTable, links: Sequence[str], opened: _Opened) 
     if crank.stiffness is None or len(crank.stiffness) == 1:
         value = None if crank.stiffness is None else crank.stiffness[0]
         return _section(crank, table, where, value, "crank", links, opened)
-    each = _for_each(crank.stiffness, len(links), f"{where}.stiffness", "shafts between throws")
+    stiffnesses = _for_each(crank.stiffness, len(links), f"{where}.stiffness", "shafts between throws")
     return [
         _section(crank, table, where, stiffness, link, [link], opened)[0]
-        for stiffness, link in zip(each, links, strict=True)
+        for stiffness, link in zip(stiffnesses, links, strict=True)
     ]
 
 
 def _section(
-    shaft: SectionTable, table: TorsionTable, where: str, given: float | Open | None, name: str,
+    shaft: SectionTable, table: TorsionTable, where: str, stiffness_given: float | Open | None, name: str,
     links: Sequence[str], opened: _Opened,
 ) -> list[Section]:  # fmt: skip
     """Shafts that are alike, by the names of what they join."""
     one_of(shaft, where, "stiffness", "pieces")
     diameter, bore, length = shaft.diameter, shaft.bore, None
-    if given is not None:
-        stiffness = opened.number(given, "stiffness", "N m/rad", name, links)
+    if stiffness_given is not None:
+        stiffness = opened.number(stiffness_given, "stiffness", "N m/rad", name, links)
     else:
         pieces = [_piece(piece, f"{where}.pieces[{k + 1}]", len(shaft.pieces)) for k, piece in enumerate(shaft.pieces)]
         stiffness = stiffness_of(pieces, table.shear_modulus)
@@ -231,13 +230,12 @@ def _section(
 
 
 def _piece(piece: PieceTable, where: str, count: int) -> tuple[float, float, float]:
-    """Length, diameter and bore; an open diameter is that of a shaft of one piece."""
-    given = Open.from_value(piece.diameter)
-    if given.is_open and count > 1:
+    diameter = Open.from_value(piece.diameter)
+    if diameter.is_open and count > 1:
         raise Refused(f"{where}.diameter", None, "is open, and its shaft has other pieces", "fix it, or give one piece")
-    if piece.bore >= given.lower:
+    if piece.bore >= diameter.lower:
         raise Refused(f"{where}.bore", units.shown(piece.bore, "m"), "is as wide as its shaft", "give it a wall")
-    return piece.length, given.start, piece.bore
+    return piece.length, diameter.start, piece.bore
 
 
 def _absorber(table: AbsorberTable, names: Sequence[str], where: str, opened: _Opened) -> Absorber:
@@ -245,8 +243,8 @@ def _absorber(table: AbsorberTable, names: Sequence[str], where: str, opened: _O
         raise Refused(f"{where}.on", table.on, "is no disc", nearest(table.on, list(names)))
     if table.order is not None and table.stiffness is not None:
         raise Refused(f"{where}.order", None, "is of a pendulum, and its stiffness is that of rubber", "keep one")
-    held = Open.from_value(table.stiffness).lower or Open.from_value(table.damping).lower or table.order
-    if not held:
+    holds = Open.from_value(table.stiffness).lower or Open.from_value(table.damping).lower or table.order
+    if not holds:
         rule = "leaves its ring to nothing where it is zero"
         raise Refused(f"{where}.damping", None, rule, "give stiffness, damping or order, with bounds above zero")
     inertia, stiffness, damping = (
@@ -276,23 +274,24 @@ def _check_inertia(chain: Torsion, decisions: Sequence[Decision], problem: Probl
     if wheel is None:
         return
     discs = {(disc.name, "inertia") for disc in chain.discs}
-    for own in (*problem.decisions, *decisions):
-        if own.kind is Kind.FLYWHEEL:
+    for decision in (*problem.decisions, *decisions):
+        if decision.kind is Kind.FLYWHEEL:
             rule = "is open, and the discs of [torsion] tell the inertia of all that turns"
-            raise Refused(own.name, None, rule, "leave [flywheel] out, and open a disc")
-        if any(key in discs for key in own.keys(TORSION)):
-            raise Refused(where, None, f"gives an inertia that follows from {own.name}, which is open", "leave it out")
-    told, least = wheel.inertia, chain.turning_inertia(problem.engine.slider_cranks)
-    most = least + sum(absorber.inertia for absorber in chain.absorbers)
-    if not least * (1.0 - _ROUNDED) <= told <= most * (1.0 + _ROUNDED):
-        of_discs = units.shown(least, "kg m^2")
+            raise Refused(decision.name, None, rule, "leave [flywheel] out, and open a disc")
+        if any(key in discs for key in decision.keys(TORSION)):
+            raise Refused(
+                where, None, f"gives an inertia that follows from {decision.name}, which is open", "leave it out"
+            )
+    inertia, without_rings = wheel.inertia, chain.turning_inertia(problem.engine.slider_cranks)
+    most = without_rings + sum(absorber.inertia for absorber in chain.absorbers)
+    if not without_rings * (1.0 - _ROUNDED) <= inertia <= most * (1.0 + _ROUNDED):
+        of_discs = units.shown(without_rings, "kg m^2")
         rule = f"differs from the {of_discs} that the discs of [torsion] have without pistons and rods"
         remedy = "leave [flywheel] out, and it follows from them" if where == "flywheel" else "let them agree"
-        raise Refused(where, units.shown(told, "kg m^2"), rule, remedy)
+        raise Refused(where, units.shown(inertia, "kg m^2"), rule, remedy)
 
 
 def _numbers(table: Mapping[str, Any]) -> Iterator[tuple[str, Place]]:
-    """Yield absorbers and discs, and under the name of a disc or of the crank its shaft and the first piece of that."""
     for kind in ("absorbers", "discs"):
         for k, one in enumerate(table.get(kind, ())):
             label, place = f"torsion.{one.get('name')}", ("torsion", kind, k)

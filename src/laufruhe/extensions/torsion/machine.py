@@ -12,6 +12,7 @@ from typing import Any, ClassVar, Self
 from laufruhe.errors import ModelError
 from laufruhe.machine import SliderCrank
 from laufruhe.machine.extra import Extra
+from laufruhe.numerics.arrays import Array
 from laufruhe.physics.torque import reduced_inertia
 from laufruhe.problem.decision import Kind
 
@@ -61,9 +62,9 @@ class Section:
     loss_factor
         Hysteretic: its stiffness is k (1 + i eta).
     diameter, bore
-        Of its weakest place [m]; needed for a stress only.
+        Size of its weakest place [m]; needed for a stress only.
     length
-        Of a shaft that is one round piece, whose stiffness follows from its diameter [m]; else None.
+        Length of one round piece, whose stiffness follows from its diameter [m]; else None.
     shear_modulus
         [Pa].
     """
@@ -86,7 +87,7 @@ class Section:
             raise ModelError(f"shaft '{self.name}' has a bore of {self.bore:g} m in a diameter of {self.diameter:g} m")
 
     def moved(self, stiffness: float, diameter: float | None) -> Section:
-        """With another stiffness, or another diameter of its one piece and the stiffness of that."""
+        """Return the section with another stiffness, or another diameter of its one piece and its stiffness."""
         if diameter is None or diameter == self.diameter or self.length is None:
             return replace(self, stiffness=stiffness)
         stiffness = stiffness_of([(self.length, diameter, self.bore)], self.shear_modulus)
@@ -102,7 +103,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Absorber:
-    """A ring that hangs on a disc: what it takes up, the shaft is spared.
+    """Ring that hangs on a disc, and takes up swings that the shaft is spared.
 
     Attributes
     ----------
@@ -111,13 +112,13 @@ class Absorber:
     inertia
         Of the ring, or of a pendulum's mass about the crank axis [kg m2].
     stiffness, loss_factor
-        Of its rubber [N m/rad].
+        Stiffness [N m/rad] and loss of its rubber.
     damping
         Viscous, between disc and ring [N m s/rad].
     order
-        That a pendulum is tuned to: the pull of its rotation is a spring J (n w)^2 (V11).
+        Order that a pendulum is tuned to: the pull of its rotation is a spring J (n w)^2 (V11).
     damping_ratio
-        Of a pendulum, of its critical damping.
+        Share of its critical damping that a pendulum has.
     """
 
     name: str
@@ -138,12 +139,16 @@ class Absorber:
             raise ModelError(f"nothing holds the ring of absorber '{self.name}'; give stiffness, damping or order")
 
     def stiffness_at(self, speed: float) -> float:
-        """Of rubber and of the pull of rotation [N m/rad]."""
+        """Return the stiffness of rubber and of the pull of rotation [N m/rad]."""
         return self.stiffness + self.inertia * (self.order * speed) ** 2
 
     def damping_at(self, speed: float) -> float:
-        """Viscous [N m s/rad]."""
+        """Return the viscous damping [N m s/rad]."""
         return self.damping + 2.0 * self.damping_ratio * self.order * speed * self.inertia
+
+    def losses(self, rates: Array, speed: float) -> Array:
+        """Return twice the power lost for swings of unit amplitude at angular rates, shape (rates,) [W] (V12)."""
+        return self.stiffness * self.loss_factor * rates + self.damping_at(speed) * rates**2
 
 
 @dataclass(frozen=True)
@@ -153,9 +158,9 @@ class Torsion(Extra):
     Attributes
     ----------
     discs
-        From the front (C3).
+        Discs from the front (C3).
     sections
-        From each disc to the next, one fewer.
+        Shafts from each disc to the next, one fewer.
     absorbers
         On any of the discs.
     output
@@ -182,7 +187,7 @@ class Torsion(Extra):
             self.index(absorber.on)
 
     def index(self, name: str) -> int:
-        """Of a disc in the chain."""
+        """Return the index of a disc in the chain."""
         for k, disc in enumerate(self.discs):
             if disc.name == name:
                 return k
@@ -195,33 +200,35 @@ class Torsion(Extra):
 
     @property
     def numbers(self) -> dict[tuple[str, str], Any]:
-        """What decisions may move, by the name of a disc, section or absorber and that of its attribute."""
-        found: dict[tuple[str, str], Any] = {(disc.name, "inertia"): disc.inertia for disc in self.discs}
+        """Numbers that decisions may move, by the name of a disc, section or absorber and that of its attribute."""
+        numbers: dict[tuple[str, str], Any] = {(disc.name, "inertia"): disc.inertia for disc in self.discs}
         for part in self.sections:
-            found |= {(part.name, "stiffness"): part.stiffness, (part.name, "diameter"): part.diameter}
+            numbers |= {(part.name, "stiffness"): part.stiffness, (part.name, "diameter"): part.diameter}
         for absorber in self.absorbers:
-            found |= {(absorber.name, key): getattr(absorber, key) for key in ("inertia", "stiffness", "damping")}
-        return found
+            numbers |= {(absorber.name, key): getattr(absorber, key) for key in ("inertia", "stiffness", "damping")}
+        return numbers
 
     def moved(
         self, changes: Mapping[tuple[str, str], float], before: Sequence[SliderCrank], after: Sequence[SliderCrank]
     ) -> Self:
         """Return the chain with changes of its numbers, and other pistons and rods in place of those of its discs."""
-        found = self
+        chain = self
         if changes:
-            own = {key: value + changes[key] if key in changes else value for key, value in self.numbers.items()}
+            numbers = {key: value + changes[key] if key in changes else value for key, value in self.numbers.items()}
             absorbed = ("inertia", "stiffness", "damping")
-            found = replace(
+            chain = replace(
                 self,
-                discs=tuple(replace(d, inertia=own[d.name, "inertia"]) for d in self.discs),
-                sections=tuple(s.moved(own[s.name, "stiffness"], own[s.name, "diameter"]) for s in self.sections),
-                absorbers=tuple(replace(a, **{key: own[a.name, key] for key in absorbed}) for a in self.absorbers),
+                discs=tuple(replace(d, inertia=numbers[d.name, "inertia"]) for d in self.discs),
+                sections=tuple(
+                    s.moved(numbers[s.name, "stiffness"], numbers[s.name, "diameter"]) for s in self.sections
+                ),
+                absorbers=tuple(replace(a, **{key: numbers[a.name, key] for key in absorbed}) for a in self.absorbers),
             )
         if after != before:
             more = {a.name: reduced_inertia(b) - reduced_inertia(a) for a, b in zip(before, after, strict=True)}
-            discs = (replace(d, inertia=d.inertia + sum(more[name] for name in d.cylinders)) for d in found.discs)
-            found = replace(found, discs=tuple(discs))
-        return found
+            discs = (replace(d, inertia=d.inertia + sum(more[name] for name in d.cylinders)) for d in chain.discs)
+            chain = replace(chain, discs=tuple(discs))
+        return chain
 
     def turning_inertia(self, parts: Sequence[SliderCrank], /) -> float:
         """Return the inertia of all discs without pistons and rods [kg m2] (V14); rings of absorbers slip."""

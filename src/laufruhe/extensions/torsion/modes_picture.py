@@ -27,7 +27,7 @@ applies = is_twisted
 
 @styled()
 def figure(result: Result) -> Figure:
-    """To the left how far each disc swings, to the right critical speeds, dots as large as their vector sums."""
+    """Draw the swing of each disc to the left, and to the right critical speeds with dots as large as their torque."""
     low, high = speed_range(result)
     facts = facts_of(result.final, low, high)
     drawn = page(1, 2, (3.9, 3.6), gap=0.85)
@@ -54,14 +54,16 @@ def _shapes(axes: Axes, facts: TorsionFacts, names: list[str]) -> None:
         axes.plot(places, facts.modes.shapes[:, m], "o-", color=COLOURS[m], linewidth=1.6, markersize=4.0)
     axes.set(ylim=(-1.1, 1.1), ylabel="swing, the largest of a mode is 1")
     every = -(-len(names) // MOST_NAMES)
-    shown = [fit_line(name, 1.1) if k % every == 0 else "" for k, name in enumerate(names)]
-    axes.set_xticks(list(places), shown, rotation=60, ha="right", rotation_mode="anchor")
+    labels = [fit_line(name, 1.1) if k % every == 0 else "" for k, name in enumerate(names)]
+    axes.set_xticks(list(places), labels, rotation=60, ha="right", rotation_mode="anchor")
 
 
 def _speeds(axes: Axes, result: Result, facts: TorsionFacts, high: float) -> None:
-    shown = [float(f) for f in facts.modes.frequencies[:MOST_MODES]]
+    frequencies = [float(f) for f in facts.modes.frequencies[:MOST_MODES]]
     bands = [limit.outside for limit in limits_on(result, TORSIONAL_FREQUENCIES) if limit.outside is not None]
-    reach = 1.12 * max([shown[0], *(f for f in shown if f <= max(facts.orders) * high / math.tau), *sum(bands, ())])
+    reach = 1.12 * max(
+        [frequencies[0], *(f for f in frequencies if f <= max(facts.orders) * high / math.tau), *sum(bands, ())]
+    )
     for band in bands:
         axes.axhspan(*band, color=LIMIT, alpha=0.13, linewidth=0)
     for order in facts.orders:
@@ -70,14 +72,14 @@ def _speeds(axes: Axes, result: Result, facts: TorsionFacts, high: float) -> Non
         axes.plot([0.0, high * RPM], [0.0, order * high / math.tau], **look, zorder=1)
     named = [order for order in facts.orders if order in facts.main or (order == int(order) and order <= 6)]
     _orders(axes, named, high, reach)
-    largest = max(float(own.max(initial=0.0)) for own in facts.sums) or 1.0
-    for m, frequency in enumerate(shown):
+    largest = max(float(one.max(initial=0.0)) for one in facts.sums) or 1.0
+    for m, frequency in enumerate(frequencies):
         axes.axhline(frequency, color=COLOURS[m], linewidth=1.3)
     for order, met, sums in zip(facts.orders, facts.met, facts.sums, strict=True):
-        for colour, frequency, each in zip(COLOURS, met.frequencies.tolist(), sums.tolist(), strict=False):
+        for colour, frequency, weights in zip(COLOURS, met.frequencies.tolist(), sums.tolist(), strict=False):
             speed = math.tau * frequency / order
             if speed <= high:
-                size = LARGEST * math.sqrt(each / largest)
+                size = LARGEST * math.sqrt(weights / largest)
                 axes.plot(speed * RPM, frequency, "o", color=colour, markersize=size, zorder=5, alpha=0.85)
     axes.set(xlim=(0.0, high * RPM), ylim=(0.0, reach), xlabel="crank speed [rpm]", ylabel="frequency [Hz]")
     # over the names of orders

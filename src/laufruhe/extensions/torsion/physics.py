@@ -129,10 +129,10 @@ def critical_modes(chain: Torsion, order: float) -> TorsionalModes:
     return InOrder(order).modes(chain)
 
 
-def _modes(chain: Torsion, inertia: Array, held: Sequence[float]) -> TorsionalModes:
+def _modes(chain: Torsion, inertia: Array, fixed: Sequence[float]) -> TorsionalModes:
     """Solve K q = (2 pi f)^2 J q for the twists of all links, of which some have no stiffness (V4)."""
     ends = [(k, k + 1) for k in range(len(chain.sections))] + [(chain.index(a.on), k) for k, a in _rings(chain)]
-    stiff = np.array([*(section.stiffness for section in chain.sections), *held])
+    stiff = np.array([*(section.stiffness for section in chain.sections), *fixed])
     twists = np.zeros((len(ends) + 1, len(inertia)))
     for row, (a, b) in zip(twists, ends, strict=False):
         row[a], row[b] = 1.0, -1.0
@@ -143,8 +143,8 @@ def _modes(chain: Torsion, inertia: Array, held: Sequence[float]) -> TorsionalMo
     # a link without stiffness twists until it carries no torque
     loose = np.linalg.solve(mass[np.ix_(~stands, ~stands)], mass[np.ix_(~stands, stands)])
     root = np.sqrt(stiff[stands])
-    own = mass[np.ix_(stands, stands)] - mass[np.ix_(stands, ~stands)] @ loose
-    inverse, shapes = np.linalg.eigh(own / np.outer(root, root))
+    reduced = mass[np.ix_(stands, stands)] - mass[np.ix_(stands, ~stands)] @ loose
+    inverse, shapes = np.linalg.eigh(reduced / np.outer(root, root))
     # an inertia that is negative in its order has no frequency
     real = inverse > _NONE * np.abs(inverse).max()
     shapes = shapes[:, real][:, ::-1] / root[:, None]
@@ -185,26 +185,26 @@ def critical_speed(frequency: float, order: float) -> float:
 
 
 def chain_of(engine: Engine) -> Torsion:
-    """The chain of an engine that has one.
+    """Return the chain of an engine that has one.
 
     Raises
     ------
     ModelError
         If it has none.
     """
-    found = engine.extra(Torsion)
-    if found is None:
+    chain = engine.extra(Torsion)
+    if chain is None:
         raise ModelError("twist of the crankshaft needs its discs and shafts; add [torsion]")
-    return found
+    return chain
 
 
 def has_torsion(engine: Engine, fidelity: Fidelity = EXACT) -> bool:
-    """Whether the twist of the crankshaft is modelled: of one crankshaft whose speed is taken as even."""
+    """Return whether the twist of the crankshaft is modelled: it has a chain, and an even speed."""
     return engine.extra(Torsion) is not None and not fidelity.is_uneven
 
 
 def throw_torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
-    """Torque of gas, pistons and rods on every disc, shape (n, discs) [N m] (T1).
+    """Return the torque of gas, pistons and rods on every disc, shape (n, discs) [N m] (T1).
 
     Raises
     ------
@@ -228,20 +228,22 @@ def _throw_torques(
     point: OperatingPoint,
     fidelity: Fidelity,
 ) -> Spectrum:
-    """On discs that so many cylinders drive: whatever else is open of a chain moves none of it."""
+    """Return the torque on discs that these cylinders drive, whatever else of a chain is open."""
     series = [
         (k, part, cylinder_torque(cycle, part, point, fidelity))
         for k, names in enumerate(driven) for part in parts if part.name in names
     ]  # fmt: skip
-    total = np.zeros((max((len(own) for *_, own in series), default=1), len(driven)), dtype=complex)
-    for k, part, own in series:
-        total[: len(own), k] += own * phasors([-as_turn(part.firing_angle) / cycle.turns], np.arange(len(own)))[:, 0]
+    total = np.zeros((max((len(torque) for *_, torque in series), default=1), len(driven)), dtype=complex)
+    for k, part, torque in series:
+        total[: len(torque), k] += (
+            torque * phasors([-as_turn(part.firing_angle) / cycle.turns], np.arange(len(torque)))[:, 0]
+        )
     total.setflags(write=False)
     return Spectrum(cycle.base_order, total)
 
 
 def receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
-    """Twist of every section for one N m on every disc, shape (orders, sections, discs) [rad/(N m)] (V5).
+    """Return the twist of every section for one N m on every disc, shape (orders, sections, discs) [rad/(N m)] (V5).
 
     Of order zero the load takes the torque at its disc, and what stands between them twists.
 
@@ -252,35 +254,35 @@ def receptances(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
     """
     count, sections = len(chain.discs), np.arange(len(chain.sections))
     out = np.zeros((len(orders), len(sections), count), dtype=complex)
-    still = orders == 0.0
+    is_mean = orders == 0.0
     # what drives in front of a section goes through it unless the load takes it there
     through = np.arange(count)[None, :] <= sections[:, None]
     taken = (chain.driven <= sections)[:, None]
     stiff = np.array([section.stiffness for section in chain.sections])
-    out[still] = (through * 1.0 - taken) / stiff[:, None]
-    if np.all(still):
+    out[is_mean] = (through * 1.0 - taken) / stiff[:, None]
+    if np.all(is_mean):
         return out
     size = count + len(chain.absorbers)
-    drives = np.tile(np.eye(size, dtype=complex), (int(np.sum(~still)), 1, 1))
-    angles = _solved(chain, orders[~still], speed, drives)[:, :count, :count]
-    out[~still] = angles[:, :-1] - angles[:, 1:]
+    drives = np.tile(np.eye(size, dtype=complex), (int(np.sum(~is_mean)), 1, 1))
+    angles = _solved(chain, orders[~is_mean], speed, drives)[:, :count, :count]
+    out[~is_mean] = angles[:, :-1] - angles[:, 1:]
     return out
 
 
 def section_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
-    """What a section makes of its twist, k (1 + i eta) + i h w c, shape (orders, sections) [N m/rad] (V8)."""
+    """Return torque over twist, k (1 + i eta) + i h w c, shape (orders, sections) [N m/rad] (V8)."""
     stiff = np.array([s.stiffness * complex(1.0, s.loss_factor) for s in chain.sections])
     damping = np.array([s.damping for s in chain.sections])
-    found = stiff + 1j * speed * orders[:, None] * damping
-    return np.asarray(np.where(orders[:, None] == 0.0, found.real, found))
+    stiffness = stiff + 1j * speed * orders[:, None] * damping
+    return np.asarray(np.where(orders[:, None] == 0.0, stiffness.real, stiffness))
 
 
 def twist(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
     """Angle of each section's front end before its rear end, shape (n, sections) [rad] (V5); its mean under way."""
     torques, chain = throw_torques(engine, point, fidelity), chain_of(engine)
     angles = _angles(chain, torques, point.speed)[:, : len(chain.discs)]
-    still = receptances(chain, torques.orders[:1], point.speed)[0] @ torques.coefficients[0]
-    return Spectrum(torques.base, np.concatenate([still[None], angles[:, :-1] - angles[:, 1:]]))
+    mean = receptances(chain, torques.orders[:1], point.speed)[0] @ torques.coefficients[0]
+    return Spectrum(torques.base, np.concatenate([mean[None], angles[:, :-1] - angles[:, 1:]]))
 
 
 def shaft_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
@@ -291,80 +293,76 @@ def shaft_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXA
 def shaft_stress(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Spectrum:
     """Shear stress of every section that has a diameter, shape (n, those sections) [Pa] (V8; textbook 2.9)."""
     chain = chain_of(engine)
-    own = [k for k, section in enumerate(chain.sections) if section.diameter is not None]
-    whole = times(twist(engine, point, fidelity), stress_factors, chain, point.speed)
-    return whole.each(lambda values: values[:, own])
+    sized = [k for k, section in enumerate(chain.sections) if section.diameter is not None]
+    stress = times(twist(engine, point, fidelity), stress_factors, chain, point.speed)
+    return stress.each(lambda values: values[:, sized])
 
 
 def times(twisted: Spectrum, factors: Factors, chain: Torsion, speed: float) -> Spectrum:
-    """A twist times what each section makes of it in each order."""
+    """Return a twist times the factor of each section in each order."""
     return Spectrum(twisted.base, twisted.coefficients * factors(chain, twisted.orders, speed))
 
 
 def unit_factors(chain: Torsion, orders: Array, _: float) -> ComplexArray:
-    """One for every order and section: the twist itself."""
+    """Return one for every order and section: the factor of the twist itself."""
     return np.ones((len(orders), len(chain.sections)), dtype=complex)
 
 
 def stress_factors(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
-    """What a section makes of its twist, over its section modulus; zero of a section without a diameter (V8)."""
-    own = np.array([0.0 if section.diameter is None else 1.0 / section.modulus for section in chain.sections])
-    return np.asarray(section_stiffness(chain, orders, speed) * own)
+    """Return stress over twist, shape (orders, sections); zero for a section without a diameter (V8)."""
+    moduli = np.array([0.0 if section.diameter is None else 1.0 / section.modulus for section in chain.sections])
+    return np.asarray(section_stiffness(chain, orders, speed) * moduli)
 
 
 def absorber_heat(engine: Engine, point: OperatingPoint, fidelity: Fidelity = EXACT) -> Array:
-    """Power that each absorber turns to heat, shape (absorbers,) [W] (V12)."""
+    """Return the power that each absorber turns to heat, shape (absorbers,) [W] (V12)."""
     chain, torques = chain_of(engine), throw_torques(engine, point, fidelity)
     orders, count = torques.orders[1:], len(chain.discs)
     angles = _angles(chain, torques, point.speed)
     heat = []
     for k, absorber in enumerate(chain.absorbers):
         swing = np.abs(angles[:, count + k] - angles[:, chain.index(absorber.on)]) ** 2
-        rate = orders * point.speed
-        lost = absorber.stiffness * absorber.loss_factor * rate + absorber.damping_at(point.speed) * rate**2
-        heat.append(0.5 * float(np.sum(lost * swing)))
+        heat.append(0.5 * float(np.sum(absorber.losses(orders * point.speed, point.speed) * swing)))
     return np.array(heat)
 
 
 def dynamic_stiffness(chain: Torsion, orders: Array, speed: float) -> ComplexArray:
-    """K + i H + i h w C - (h w)^2 J in every order, affine in inertia, stiffness and damping (V5)."""
+    """Return K + i H + i h w C - (h w)^2 J in every order, affine in inertia, stiffness and damping (V5)."""
     rate = (orders * speed)[:, None, None]
-    found = _stiffness(chain, speed) + 1j * rate * _damping(chain, speed) - rate**2 * np.diag(inertias(chain))
-    return np.asarray(found)
+    dynamic = _stiffness(chain, speed) + 1j * rate * _damping(chain, speed) - rate**2 * np.diag(inertias(chain))
+    return np.asarray(dynamic)
 
 
 def _angles(chain: Torsion, torques: Spectrum, speed: float) -> ComplexArray:
-    """Angles of discs and rings in every order but zero, shape (orders, discs and rings) (V5)."""
     drives = np.zeros((len(torques.coefficients) - 1, len(chain.discs) + len(chain.absorbers), 1), dtype=complex)
     drives[:, : len(chain.discs), 0] = torques.coefficients[1:]
     return _solved(chain, torques.orders[1:], speed, drives)[:, :, 0]
 
 
 def _solved(chain: Torsion, orders: Array, speed: float, drives: ComplexArray) -> ComplexArray:
-    """Angles under torques of every order but zero on discs and rings, shapes (orders, discs and rings, columns)."""
+    """Return angles under torques of every order but zero, shapes (orders, discs and rings, columns)."""
     dynamic = dynamic_stiffness(chain, orders, speed)
     try:
-        found = np.linalg.solve(dynamic, drives)
+        angles = np.linalg.solve(dynamic, drives)
     except np.linalg.LinAlgError:
-        found = np.full_like(drives, np.inf)
+        angles = np.full_like(drives, np.inf)
     # what answers with that much more than its stiffness allows has nothing but rounding to damp it
-    size = np.abs(found).max(axis=(1, 2)) * np.abs(dynamic).max(axis=(1, 2))
+    size = np.abs(angles).max(axis=(1, 2)) * np.abs(dynamic).max(axis=(1, 2))
     undamped = np.flatnonzero(~(size * _SINGULAR <= np.abs(drives).max(axis=(1, 2))))
     if len(undamped):
         raise ModelError(
             f"order {orders[undamped[0]]:g} meets a natural frequency of the crankshaft at "
             f"{speed * 30.0 / math.pi:.5g} rpm, and nothing damps it; give damping, or another speed"
         )
-    return np.asarray(found)
+    return np.asarray(angles)
 
 
 def inertias(chain: Torsion) -> Array:
-    """Of discs and rings [kg m2]."""
+    """Return the inertias of discs and rings [kg m2]."""
     return np.array([disc.inertia for disc in chain.discs] + [absorber.inertia for absorber in chain.absorbers])
 
 
 def _stiffness(chain: Torsion, speed: float) -> ComplexArray:
-    """K + i H of discs and rings (V3, V11)."""
     links = [(k, k + 1, s.stiffness * complex(1.0, s.loss_factor)) for k, s in enumerate(chain.sections)]
     for k, a in _rings(chain):
         links.append((chain.index(a.on), k, a.stiffness_at(speed) + 1j * a.stiffness * a.loss_factor))
@@ -372,7 +370,6 @@ def _stiffness(chain: Torsion, speed: float) -> ComplexArray:
 
 
 def _damping(chain: Torsion, speed: float) -> Array:
-    """C of discs and rings (V3, V10)."""
     links = [(k, k + 1, complex(s.damping)) for k, s in enumerate(chain.sections)]
     links += [(chain.index(a.on), k, complex(a.damping_at(speed))) for k, a in _rings(chain)]
     against_block = [disc.damping for disc in chain.discs] + [0.0] * len(chain.absorbers)
@@ -380,7 +377,6 @@ def _damping(chain: Torsion, speed: float) -> Array:
 
 
 def _rings(chain: Torsion) -> list[tuple[int, Absorber]]:
-    """List absorbers with the index of each ring behind the discs."""
     return list(enumerate(chain.absorbers, len(chain.discs)))
 
 

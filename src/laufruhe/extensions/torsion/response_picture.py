@@ -28,12 +28,12 @@ def figure(result: Result) -> Figure:
     drawn = page(1, 1, (7.6, 3.6))
     (axes,) = drawn.panels
     series = series_of(result)
-    found = [torque_over_speed(one.design, speeds) for one in series]
-    for each in found[-1].T:
-        axes.plot(speeds * RPM, each, color=FAINT, linewidth=0.6, alpha=0.7, zorder=1.5)
+    torques = [torque_over_speed(one.design, speeds) for one in series]
+    for curve in torques[-1].T:
+        axes.plot(speeds * RPM, curve, color=FAINT, linewidth=0.6, alpha=0.7, zorder=1.5)
     legend: list[Artist] = []
     names = [section.name for section in chain_of(result.final.engine).sections]
-    for one, torque in zip(series, found, strict=True):
+    for one, torque in zip(series, torques, strict=True):
         largest = torque.max(axis=1)
         axes.plot(speeds * RPM, largest, color=one.colour, linewidth=1.8)
         k = int(np.argmax(np.where(np.isfinite(largest), largest, 0.0)))
@@ -41,11 +41,11 @@ def figure(result: Result) -> Figure:
         legend.append(one.entry(f"{worst}, {names[int(np.argmax(torque[k]))]}"))
     legend.append(entry("each section", color=FAINT, linewidth=0.6))
     bars = barred_ranges(result, result.final)
-    for each in bars:
-        axes.axvspan(each.lowest * RPM, each.highest * RPM, color=LIMIT, alpha=0.13, linewidth=0)
+    for curve in bars:
+        axes.axvspan(curve.lowest * RPM, curve.highest * RPM, color=LIMIT, alpha=0.13, linewidth=0)
     legend += [Patch(facecolor=LIMIT, alpha=0.13, label="barred by a limit")] if bars else []
-    whole = np.concatenate([torque.max(axis=1) for torque in found])
-    finite = whole[np.isfinite(whole)]
+    envelope = np.concatenate([torque.max(axis=1) for torque in torques])
+    finite = envelope[np.isfinite(envelope)]
     top = min(float(finite.max(initial=1.0)), MOST * float(np.median(finite)) if len(finite) else 1.0)
     axes.set(xlim=(low * RPM, high * RPM), ylim=(0.0, 1.1 * top), xlabel="crank speed [rpm]",
              ylabel="alternating torque [N m]")  # fmt: skip

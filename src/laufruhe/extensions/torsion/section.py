@@ -30,7 +30,6 @@ MOST_MODES, MOST_CRITICALS = 4, 8
 
 
 def _tables(result: Result) -> list[Table]:
-    """Modes, the critical speeds that twist it most, before and after, and barred ranges."""
     reach = speed_range(result)
     before, after = facts_of(result.initial, *reach), facts_of(result.final, *reach)
     criticals = [_criticals(before, "as given"), *([_criticals(after, "as decided")] if is_changed(result) else [])]
@@ -39,10 +38,10 @@ def _tables(result: Result) -> list[Table]:
 
 def _modes(result: Result, facts: TorsionFacts) -> Table:
     names = [disc.name for disc in chain_of(result.final.engine).discs]
-    shown = range(min(MOST_MODES, len(facts.modes.frequencies)))
+    modes = range(min(MOST_MODES, len(facts.modes.frequencies)))
     swings = [[f"{swing:+.3f}" for swing in shape] for shape in facts.modes.shapes.T]
-    rows = tuple((f"{m + 1}", number(float(facts.modes.frequencies[m])), *swings[m]) for m in shown)
-    rest = len(facts.modes.frequencies) - len(shown)
+    rows = tuple((f"{m + 1}", number(float(facts.modes.frequencies[m])), *swings[m]) for m in modes)
+    rest = len(facts.modes.frequencies) - len(modes)
     more = f" {counted(rest, 'higher mode')} in result.json." if rest else ""
     note = f"Undamped. Angle of every disc, the largest of each mode one.{more}"
     return Table(
@@ -52,9 +51,9 @@ def _modes(result: Result, facts: TorsionFacts) -> Table:
 
 def _criticals(facts: TorsionFacts, which: str) -> Table:
     rows = tuple(
-        (number(each.speed * RPM), f"{each.order:g}" + (" main" if each.is_main else ""), f"{each.mode}",
-         number(each.vector_sum, 3, 1.0), DASH if each.torque is None else number(each.torque))
-        for each in facts.criticals[:MOST_CRITICALS]
+        (number(one.speed * RPM), f"{one.order:g}" + (" main" if one.is_main else ""), f"{one.mode}",
+         number(one.vector_sum, 3, 1.0), DASH if one.torque is None else number(one.torque))
+        for one in facts.criticals[:MOST_CRITICALS]
     )  # fmt: skip
     main = ", ".join(f"{order:g}" for order in facts.main)
     note = (
@@ -69,8 +68,8 @@ def _criticals(facts: TorsionFacts, which: str) -> Table:
 
 def _barred(result: Result) -> Table:
     rows = tuple(
-        (each.limit, f"{number(each.lowest * RPM)} to {number(each.highest * RPM)}")
-        for each in barred_ranges(result, result.final)
+        (barred.limit, f"{number(barred.lowest * RPM)} to {number(barred.highest * RPM)}")
+        for barred in barred_ranges(result, result.final)
     )
     low, high = (number(speed * RPM) for speed in speed_range(result))
     note = f"Between {low} and {high} rpm, with the load of the operating points: where the limit would be exceeded."
@@ -93,19 +92,18 @@ def _record(result: Result) -> Mapping[str, Any]:
         "main_orders": list(facts.main),
         "speeds": list(reach),
         "critical_speeds": [
-            {"speed": each.speed, "order": each.order, "mode": each.mode, "vector_sum": each.vector_sum,
-             "main": each.is_main, "torque": each.torque}
-            for each in facts.criticals
+            {"speed": critical.speed, "order": critical.order, "mode": critical.mode, "vector_sum": critical.vector_sum,
+             "main": critical.is_main, "torque": critical.torque}
+            for critical in facts.criticals
         ],
-        "barred": [asdict(each) for each in barred_ranges(result, design)],
+        "barred": [asdict(critical) for critical in barred_ranges(result, design)],
         "absorbers": [
-            {"name": each.name, "heat": [float(at[k]) for at in heat]} for k, each in enumerate(chain.absorbers)
+            {"name": critical.name, "heat": [float(at[k]) for at in heat]} for k, critical in enumerate(chain.absorbers)
         ],
     }  # fmt: skip
 
 
 def _twist_response(result: Result) -> Table:
-    """Return half of the peak to peak torque in every section of the crankshaft, over its speed."""
     speeds = speeds_between(result.final, *speed_range(result))
     head, columns = ["speed [rpm]"], [RPM * speeds]
     for name, design in result.designs.items():
@@ -130,12 +128,11 @@ def _twist_modes(result: Result) -> Table:
 
 
 def _critical_speeds(result: Result) -> Table:
-    """Return all speeds at which orders meet natural modes of the crankshaft."""
     rows = [
-        [name, RPM * each.speed, each.order, each.mode, each.vector_sum, each.is_main,
-         math.nan if each.torque is None else each.torque]
+        [name, RPM * critical.speed, critical.order, critical.mode, critical.vector_sum, critical.is_main,
+         math.nan if critical.torque is None else critical.torque]
         for name, design in result.designs.items()
-        for each in facts_of(design, *speed_range(result)).criticals
+        for critical in facts_of(design, *speed_range(result)).criticals
     ]  # fmt: skip
     return Table(["design", "speed [rpm]", "order", "mode", "vector sum", "main order", "torque [N m]"], rows)
 

@@ -36,30 +36,27 @@ def solve_torsion(problem: Problem) -> Result:
     program = LocalProgram.of(problem)
     best = searched(program, [program.shares(problem.start), *looks(problem)], problem.search.starts)
     boxes = TwistBoxes(problem, initial)
-    most = _most_boxes(problem) if boxes.coordinates.is_exact and boxes.is_sampled_fully else 0
+    known = boxes.coordinates.is_exact and boxes.is_sampled_fully
+    most = problem.search.boxes_or(MOST_BOXES if len(problem.decisions) <= MOST_OPEN else 0) if known else 0
 
     def bounded(value: float, room: float, design: Design) -> Divided:
         if not most or (value < math.inf and not boxes.has_terms):
             return Divided(0.0, 0)
-        own = boxes.coordinates
-        place = own.of(np.array([float(x.real) for x in design.values]))
+        coordinates = boxes.coordinates
+        place = coordinates.from_decisions(np.array([float(x.real) for x in design.values]))
         known = known_of(design, place) if value < math.inf else None
-        divided = divide(boxes, own.lower, own.upper, value, room, most, known)
-        return replace(divided, places=tuple(own.decisions(x) for x in divided.places))
+        divided = divide(boxes, coordinates.lower, coordinates.upper, value, room, most, known)
+        return replace(divided, places=tuple(coordinates.decisions(x) for x in divided.places))
 
-    found = proven(program, best, bounded)
-    if found.excludes_all:
+    outcome = proven(program, best, bounded)
+    if outcome.excludes_all:
         names = tuple(limit.name for limit in problem.limits)
         return none_within(problem, initial, names, {"solve": time.perf_counter() - started})
-    method = f"local programs; lower bound on {found.divided.boxes} boxes of discs and shafts"
-    is_near = boxes.coordinates.is_exact and boxes.knows_all and found.design.excess <= KEPT
-    bound = found.bound if boxes.coordinates.is_exact else 0.0
-    proof = shown(program, found.design, bound, Reach.NEAR if is_near else Reach.ASIDE, method)
-    return concluded(found.design, initial, proof, {"solve": time.perf_counter() - started})
-
-
-def _most_boxes(problem: Problem) -> int:
-    return problem.search.boxes_or(MOST_BOXES if len(problem.decisions) <= MOST_OPEN else 0)
+    method = f"local programs; lower bound on {outcome.divided.boxes} boxes of discs and shafts"
+    is_near = boxes.coordinates.is_exact and boxes.knows_all and outcome.design.excess <= KEPT
+    bound = outcome.bound if boxes.coordinates.is_exact else 0.0
+    proof = shown(program, outcome.design, bound, Reach.NEAR if is_near else Reach.ASIDE, method)
+    return concluded(outcome.design, initial, proof, {"solve": time.perf_counter() - started})
 
 
 METHOD = Method(
