@@ -75,7 +75,7 @@ def test_quicker_return_shakes_more(solved: Result) -> None:
 
 
 def test_lever_weight_is_named_where_it_cannot_be_decided() -> None:
-    tables = dict(laufruhe.files.reader.given(PROBLEM)[0])
+    tables = dict(laufruhe.files.reader.tables_and_path(PROBLEM)[0])
     tables["fidelity"] = {"crank_inertia": "40 kg m^2"}
     with pytest.raises(laufruhe.LaufruheError, match="turns evenly"):
         laufruhe.solve(tables)
