@@ -23,7 +23,7 @@ from laufruhe.physics.static_cases import case_wrench, settled, stops_of
 from laufruhe.problem.channels import counted_cases, mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.mounts.box_cases import held_loads
+from laufruhe.prove.mounts.box_cases import static_loads
 from laufruhe.prove.mounts.box_numbers import UNDER
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.solvers import solve
@@ -172,7 +172,7 @@ def test_joined_and_hydraulic_mounts_with_stops_are_bounded_too(name: str, asked
         shares = generator.random((4, len(low)))
         drawn = [problem.design((low + s * (high - low)).tolist()) for s in (*shares, *np.round(shares))]
         least = min(remounted(still, engine).value(measure) for engine in drawn)
-        ratios.append(float(held_loads(model, measure, low[None], high[None]).least[0]) / least)
+        ratios.append(float(static_loads(model, measure, low[None], high[None]).least[0]) / least)
     assert max(ratios) <= 1.0 + 1e-9
     assert np.median(ratios) > 0.95
 

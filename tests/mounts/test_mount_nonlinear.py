@@ -26,7 +26,7 @@ from laufruhe.solvers.conclusion import judged
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.mounts.bounds import divided_by
 from laufruhe.solvers.mounts.nonlinear import mounts_bound, solve_joint, solve_mounts
-from laufruhe.solvers.mounts.search import Found, MountSearch
+from laufruhe.solvers.mounts.search import MountSearch, SearchResult
 from laufruhe.solvers.mounts.starts import start_points
 from laufruhe.solvers.result import Status
 from laufruhe.solvers.smooth.local_optimum import Ending, LocalOptimum
@@ -181,10 +181,10 @@ class ScriptedSearch:
 
     def __init__(self, problem, stiffness):
         self.problem = problem
-        self.best = self.chosen = Found(judged(problem, stiffness), None)
+        self.best = self.chosen = SearchResult(judged(problem, stiffness), None)
 
     def again(self, places):
-        found = Found(judged(self.problem, places[0][0]), None)
+        found = SearchResult(judged(self.problem, places[0][0]), None)
         is_better = found.rank < self.best.rank
         if is_better:
             self.best = self.chosen = found
@@ -403,7 +403,7 @@ def test_limits_with_room_at_every_start_are_no_rows(tmp_path):
     sides = {"wide": 2.1, "near": 1.9, "broken": 0.5}
     limits = tuple(replace(held, name=name, maximum=share * most) for name, share in sides.items())
     search = MountSearch(replace(problem, limits=limits), evaluate(problem))
-    assert [each.name for each in search._left_out] == ["wide"]
+    assert [each.name for each in search._ignored] == ["wide"]
     assert set(search.joint.program.constraint_names) == {"near", "broken"}
 
 
@@ -425,7 +425,7 @@ def test_a_search_is_refined_from_its_best_end(ends, chosen, tmp_path, monkeypat
         begun.extend(starts)
         return ()
 
-    monkeypatch.setattr(search, "_ends", ended)
+    monkeypatch.setattr(search, "_solve", ended)
     search.refined()
     assert [search.joint.split(start)[0] for start in begun] == [pytest.approx(places[chosen])]
 

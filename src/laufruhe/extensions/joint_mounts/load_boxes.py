@@ -201,7 +201,7 @@ class LoadBoxes:
     def _bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         box = self._box(lower, upper)
         near = self._nearest(box)
-        lines = BoxLines.of(np.zeros((len(lower), box.count)))
+        lines = BoxLines.zero(np.zeros((len(lower), box.count)))
         pull, size = np.zeros_like(lower), np.zeros(len(lower))
         for weight, measure in self._terms:
             found = self._under(box, measure, near, False)
@@ -210,7 +210,7 @@ class LoadBoxes:
         pull = pull / np.where(size > 0.0, size, 1.0)[:, None]
         for maximum, measure in self._limits:
             found = self._under(box, measure, near, True)
-            lines.hold(found, self._left_out.get(measure, 0.0), maximum)
+            lines.add_limit(found, self._left_out.get(measure, 0.0), maximum)
             pull = pull + LIMITS * box.pull(found) / (maximum or 1.0)
         broken = self._breaks(lower, upper)
         whole = np.maximum(self.upper - self.lower, 1e-300)

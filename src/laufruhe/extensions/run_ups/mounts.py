@@ -19,7 +19,7 @@ from laufruhe.prove.certificate import Reach
 from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, none_within
 from laufruhe.solvers.mounts.bounds import conflict_of, divided_by
-from laufruhe.solvers.mounts.search import NEAR, Found, MountSearch
+from laufruhe.solvers.mounts.search import NEAR, MountSearch, SearchResult
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, ends_in_words
@@ -61,8 +61,8 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
 
 
 def _concluded(
-    problem: Problem, search: MountSearch, best: Found, initial: Evaluation, relaxed: Result | None, divided: Divided,
-    timing: dict[str, float],
+    problem: Problem, search: MountSearch, best: SearchResult, initial: Evaluation, relaxed: Result | None,
+    divided: Divided, timing: dict[str, float],
 ) -> Result:  # fmt: skip
     """Return the result of the best design, with the better of both bounds."""
     certificate = None if relaxed is None else relaxed.certificate
@@ -90,7 +90,7 @@ def _method(optima: Sequence[LocalOptimum], scale: float, relaxed_bound: float, 
     return f"{ends}, with run-ups integrated{bound}"
 
 
-def _none(problem: Problem, search: MountSearch, best: Found | None, result: Result) -> Result:
+def _none(problem: Problem, search: MountSearch, best: SearchResult | None, result: Result) -> Result:
     names, miss = "the limits", ""
     if best is not None:
         names = " and ".join(f"'{name}'" for name in broken_limits(problem.limits, best.design.evaluation))

@@ -1,1 +1,1 @@
-"""What no mounts in a box of stiffness do better than."""
+"""Lower bounds of designs on open mounts by boxes of stiffness."""

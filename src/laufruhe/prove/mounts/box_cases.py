@@ -1,8 +1,8 @@
-"""Travel and force under loads that are held, over boxes of stiffness, bump stops included (E37, E55, E60).
+"""Lower bounds of travel and force under static load cases over boxes of stiffness, with bump stops (E37, E55, E60).
 
-With the stops that are met at the centre of a box as springs, motion is linear in the load, and its series is that of
-E37. Other motions differ by what stops add, or do not, on the way from the centre on: each no more than it comes past
-its gap. Travels stay within any bounds that are wider than what these make of themselves.
+With the stops in contact at the centre of a box as springs, motion is linear in the load, and E37 is its series. Other
+motions differ by the force of stops that open or close in the box, each at most in proportion to its overshoot. Bounds
+of travel hold if they contain the bounds that they imply.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from laufruhe.prove.mounts.box_response import BoxModel, Lines, is_travel
 from laufruhe.prove.mounts.box_series import Expansion, mapped, series
 
 STEPS, HALVINGS = 30, 12
-# how often bounds of travels are widened, by how much more than they have to be, and by how much more each time
+# iterations of bounds of travel, factor beyond the implied bound, and growth of a step
 ROUNDS, WIDER, FASTER = 16, 1.0 + 1e-6, 1.4
-# share of a gap that a balance is exact to, and how many times what a travel differs by are next to a gap
+# accuracy of an equilibrium as a share of a gap, and spans of travel within which a stop may close
 EXACT, NEXT = 1e-9, 2.0
 STILL = Lines(*(np.zeros(1, dtype=np.intp),) * 2, *(np.zeros(1),) * 2, np.zeros((1, 6), dtype=np.complex128))
 _AS_LOADS: Mapping[Channel, Channel] = {
@@ -32,42 +32,40 @@ _AS_LOADS: Mapping[Channel, Channel] = {
 }
 
 
-def held_loads(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Under:
-    """A linear function under the largest travel or force under load cases, for every box (E60)."""
+def static_loads(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Under:
+    """Return a linear lower bound of the largest travel or force under load cases on every box (E60)."""
     mounting, best = model.mounting(model.lower), nothing_under(lower)
-    found = stops_of(mounting)
-    some = found.stiffness > 0.0
-    # in coordinates in which the mass is one
-    stops = Stops(found.rows[some] @ model.root.T, found.gaps[some], found.stiffness[some], found.directions[:, some])
-    for case in counted_cases(asked, model.problem.engine):
+    every = stops_of(mounting)
+    used = every.stiffness > 0.0
+    # in coordinates with unit mass
+    stops = Stops(every.rows[used] @ model.root.T, every.gaps[used], every.stiffness[used], every.directions[:, used])
+    for case in counted_cases(measure, model.problem.engine):
         load = model.root @ case_wrench(mounting.block, case)
         with np.errstate(invalid="ignore", over="ignore"):
-            best = best.or_else(_of_case(model, asked, stops, load, lower, upper))
+            best = best.or_else(_bound_case(model, measure, stops, load, lower, upper))
     return best
 
 
-def _of_case(model: BoxModel, asked: Measure, stops: Stops, load: Array, lower: Array, upper: Array) -> Under:
-    """Under one load case."""
+def _bound_case(model: BoxModel, measure: Measure, stops: Stops, load: Array, lower: Array, upper: Array) -> Under:
     centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
     matrices, soft = model.stiffness(centres), model.stiffness(lower)
-    held = np.linalg.eigvalsh(soft)[:, 0] > 0.0
-    matrices, soft = (np.where(held[:, None, None], each, np.eye(6)) for each in (matrices, soft))
-    middle = _balanced(matrices, stops, load)
-    travel = middle @ stops.rows.T
+    stable = np.linalg.eigvalsh(soft)[:, 0] > 0.0
+    matrices, soft = (np.where(stable[:, None, None], each, np.eye(6)) for each in (matrices, soft))
+    travel = _equilibrium(matrices, stops, load) @ stops.rows.T
     signs, best = np.sign(stops.beyond(travel)), nothing_under(lower)
     for _ in range(2):
-        found, reach = _with_stops(model, asked, stops, load, (centres, halves, matrices, soft, travel), signs)
-        best = best.or_else(found.where(held))
-        # a stop that is just not met may be taken as a spring as well
+        bound, reach = _with_stops(model, measure, stops, load, (centres, halves, matrices, soft, travel), signs)
+        best = best.or_else(bound.where(stable))
+        # a stop close to contact may count as a spring too
         signs = np.where(np.abs(travel) + NEXT * np.nan_to_num(reach) > stops.gaps, np.sign(travel), signs)
     return best
 
 
 def _with_stops(
-    model: BoxModel, asked: Measure, stops: Stops, load: Array, boxes: tuple[Array, ...], signs: Array
+    model: BoxModel, measure: Measure, stops: Stops, load: Array, boxes: tuple[Array, ...], signs: Array
 ) -> tuple[Under, Array]:
-    """With some stops as springs, by the signs of their travel; and what travels differ by all over a box at first."""
-    centres, halves, matrices, soft, met = boxes
+    """Return the bound with stops of nonzero sign as springs, and the span of travels without other stops."""
+    centres, halves, matrices, soft, travel = boxes
     on = signs != 0.0
     pushed = load + np.einsum("bk,ki->bi", signs * stops.stiffness * stops.gaps, stops.rows)
     inverse = np.linalg.inv(np.asarray(matrices + stops.added(on), dtype=np.float64))
@@ -76,45 +74,45 @@ def _with_stops(
         np.einsum("bij,bj->bi", inverse, pushed)[:, None],
     )  # fmt: skip
     corner = np.asarray(np.linalg.cholesky(np.asarray(soft + stops.added(on), dtype=np.float64)))
-    off_by, first = _strayed(stops, at, corner, signs, met)
-    rows, factors = counted_rows(model.problem, asked)
-    maps, turned = model.maps(STILL, at, _AS_LOADS[asked.channel], rows)
+    excess, span = _stop_errors(stops, at, corner, signs, travel)
+    rows, factors = counted_rows(model.problem, measure)
+    maps, turned = model.maps(STILL, at, _AS_LOADS[measure.channel], rows)
     value = maps.real * factors[:, None]
     by_side = None if turned is None else turned.real * factors[:, None]
-    ends = stops.directions[rows] * factors[:, None] * (not is_travel(_AS_LOADS[asked.channel]))
+    ends = stops.directions[rows] * factors[:, None] * (not is_travel(_AS_LOADS[measure.channel]))
     value = value + np.einsum("rk,bk,ki->bri", ends, on * stops.stiffness, stops.rows)[:, None]
     answer = mapped(at, value, by_side)
     points = answer.value[:, 0] - (signs * stops.stiffness * stops.gaps) @ ends.T
-    points, bends = (part.reshape(*part.shape[:-1], -1, 3) for part in (points, answer.slopes[:, 0]))
+    points, slopes = (part.reshape(*part.shape[:-1], -1, 3) for part in (points, answer.slopes[:, 0]))
     size = np.linalg.norm(points, axis=-1)
     along = points / np.where(size > 0.0, size, 1.0)[..., None]
-    bent = np.einsum("bnpa,bpa->bpn", bends, along)
-    # what stops that may be on either side of their gap may add
+    slope = np.einsum("bnpa,bpa->bpn", slopes, along)
+    # error by stops that may be open or closed
     reach = _along(corner, value[:, 0])
     if by_side is not None:
         reach = reach + sum(_along(corner, side) for side in model.sides.apart(by_side[:, 0]))
-    stray = reach * np.sum(off_by * _along(corner, stops.rows), axis=1, keepdims=True) + off_by @ np.abs(ends).T
-    lost = answer.rest[:, 0, None] + np.linalg.norm(stray.reshape(*size.shape, 3), axis=-1)
-    # next to a free mode an expansion does not end
-    least = np.where(np.isfinite(lost), size - np.abs(bent).sum(axis=-1) - lost, -np.inf)
-    own, best = np.arange(len(size)), np.argmax(least, axis=1)
-    found = Under(size[own, best], bent[own, best], lost[own, best], answer.bends[:, 0])
-    return found.where(np.isfinite(least[own, best])), first
+    error = reach * np.sum(excess * _along(corner, stops.rows), axis=1, keepdims=True) + excess @ np.abs(ends).T
+    rest = answer.rest[:, 0, None] + np.linalg.norm(error.reshape(*size.shape, 3), axis=-1)
+    # the series diverges close to a free mode
+    least = np.where(np.isfinite(rest), size - np.abs(slope).sum(axis=-1) - rest, -np.inf)
+    box, best = np.arange(len(size)), np.argmax(least, axis=1)
+    bound = Under(size[box, best], slope[box, best], rest[box, best], answer.bends[:, 0])
+    return bound.where(np.isfinite(least[box, best])), span
 
 
-def _balanced(matrices: Array, stops: Stops, load: Array) -> Array:
-    """Motion at designs, shape (boxes, 6); nothing depends on how near it comes."""
+def _equilibrium(matrices: Array, stops: Stops, load: Array) -> Array:
+    """Return approximate static motions, shape (boxes, 6); bounds hold for any accuracy."""
 
     def energy(y: Array) -> Array:
-        own = 0.5 * np.einsum("bi,bij,bj->b", y, matrices, y) - y @ load
-        return np.asarray(own + 0.5 * stops.beyond(y @ stops.rows.T) ** 2 @ stops.stiffness)
+        elastic = 0.5 * np.einsum("bi,bij,bj->b", y, matrices, y) - y @ load
+        return np.asarray(elastic + 0.5 * stops.beyond(y @ stops.rows.T) ** 2 @ stops.stiffness)
 
     y: Array = np.asarray(np.linalg.solve(matrices, load[:, None])[..., 0], dtype=np.float64)
     for _ in range(STEPS):
         over = stops.beyond(y @ stops.rows.T)
-        pull = load - np.einsum("bij,bj->bi", matrices, y) - (over * stops.stiffness) @ stops.rows
+        residual = load - np.einsum("bij,bj->bi", matrices, y) - (over * stops.stiffness) @ stops.rows
         whole = matrices + stops.added(over != 0.0)
-        step: Array = np.asarray(np.linalg.solve(whole, pull[..., None])[..., 0], dtype=np.float64)
+        step: Array = np.asarray(np.linalg.solve(whole, residual[..., None])[..., 0], dtype=np.float64)
         here, share = energy(y), np.ones(len(y))
         for _ in range(HALVINGS):
             share = np.where(energy(y + share[:, None] * step) <= here, share, 0.5 * share)
@@ -124,27 +122,27 @@ def _balanced(matrices: Array, stops: Stops, load: Array) -> Array:
     return np.asarray(y)
 
 
-def _strayed(stops: Stops, at: Expansion, corner: Array, signs: Array, met: Array) -> tuple[Array, Array]:
-    """What the force of stops may differ from that of springs or of nothing, (boxes, k), infinite if not known; E60."""
-    told = mapped(at, np.broadcast_to(stops.rows, (len(signs), 1, *stops.rows.shape)))
-    travel = np.asarray(told.value[:, 0].real)
-    first = np.abs(told.slopes[:, 0]).sum(axis=1) + told.rest[:, 0, None]
-    # how far springs are past their gaps, and the others within
-    apart = np.where(signs != 0.0, signs * travel - stops.gaps, stops.gaps - np.abs(travel))
+def _stop_errors(stops: Stops, at: Expansion, corner: Array, signs: Array, met: Array) -> tuple[Array, Array]:
+    """Return errors of stop forces, infinite if unknown, and the span of travels, shape (boxes, stops) each (E60)."""
+    response = mapped(at, np.broadcast_to(stops.rows, (len(signs), 1, *stops.rows.shape)))
+    travel = np.asarray(response.value[:, 0].real)
+    span = np.abs(response.slopes[:, 0]).sum(axis=1) + response.rest[:, 0, None]
+    # distance of springs beyond their gaps, and of open stops within
+    distance = np.where(signs != 0.0, signs * travel - stops.gaps, stops.gaps - np.abs(travel))
     along = _along(corner, stops.rows)
-    wide = np.maximum(first, np.abs(met - travel) + EXACT * stops.gaps)
+    wide = np.maximum(span, np.abs(met - travel) + EXACT * stops.gaps)
     ends = np.zeros(wide.shape, dtype=bool)
     for n in range(ROUNDS):
-        past = stops.stiffness * np.maximum(wide - apart, 0.0)
-        wider = (first + along * np.sum(past * along, axis=1, keepdims=True)) * WIDER
+        force = stops.stiffness * np.maximum(wide - distance, 0.0)
+        wider = (span + along * np.sum(force * along, axis=1, keepdims=True)) * WIDER
         ends = wider <= wide
         wide = np.where(ends, wide, wide + FASTER**n * (wider - wide))
     known = np.all(np.isfinite(wide) & ends, axis=1)
-    past = stops.stiffness * np.maximum(wide - apart, 0.0)
-    return np.where(known[:, None], past, np.inf), first
+    force = stops.stiffness * np.maximum(wide - distance, 0.0)
+    return np.where(known[:, None], force, np.inf), span
 
 
 def _along(root: Array, vectors: Array) -> Array:
-    """Length of L^-1 v of vectors, (k, 6) or (boxes, k, 6), to (boxes, k)."""
+    """Return lengths of L^-1 v of vectors, (k, 6) or (boxes, k, 6), to (boxes, k)."""
     whole = np.broadcast_to(vectors, (len(root), *vectors.shape[-2:]))
     return np.asarray(np.linalg.norm(np.linalg.solve(root, whole.swapaxes(1, 2)), axis=1))

@@ -1,4 +1,4 @@
-"""Numbers of a block on its mounts over boxes of stiffness: what they are not under, and not over (E39)."""
+"""Bounds of sag, natural frequencies and other mount numbers over boxes of stiffness (E39)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from laufruhe.physics.mount_numbers import total_stiffness
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel
 from laufruhe.problem.measure import Limit, Measure
-from laufruhe.prove.mounts.box_cases import held_loads
+from laufruhe.prove.mounts.box_cases import static_loads
 from laufruhe.prove.mounts.box_norms import Under
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.prove.mounts.box_shares import most_shares, shortfall
@@ -22,40 +22,40 @@ from laufruhe.prove.mounts.ranges import SLACK
 
 
 def sag(model: BoxModel, x: Array) -> Array:
-    """At many designs, shape (boxes,); infinite where a mode is free (E9)."""
+    """Return the static sag of many designs [m], shape (boxes,); infinite with a free mode (E9)."""
     weight = weight_wrench(model.mounting(model.lower).block)
     matrices, pull = model.stiffness(x), model.root @ weight
-    held = np.linalg.eigvalsh(matrices)[:, 0] > 0.0
-    settled = np.linalg.solve(np.where(held[:, None, None], matrices, np.eye(6)), pull)
-    return np.where(held, settled @ pull / -weight[2], math.inf)
+    stable = np.linalg.eigvalsh(matrices)[:, 0] > 0.0
+    y = np.linalg.solve(np.where(stable[:, None, None], matrices, np.eye(6)), pull)
+    return np.where(stable, y @ pull / -weight[2], math.inf)
 
 
 def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> Under:
-    """Convex in x, so that its tangent at the middle is under it where no mode of the softest corner is free (E9)."""
+    """Return the tangent of the convex sag at the middle, for boxes whose softest corner has no free mode (E9)."""
     weight, halves = weight_wrench(model.mounting(model.lower).block), 0.5 * (upper - lower)
     matrices, pull = model.stiffness(0.5 * (lower + upper)), model.root @ weight
-    held = np.linalg.eigvalsh(model.stiffness(lower))[:, 0] > 0.0
-    y = np.linalg.solve(np.where(held[:, None, None], matrices, np.eye(6)), pull)
+    stable = np.linalg.eigvalsh(model.stiffness(lower))[:, 0] > 0.0
+    y = np.linalg.solve(np.where(stable[:, None, None], matrices, np.eye(6)), pull)
     slopes = halves * np.einsum("bi,nij,bj->bn", y, model.stiffness_slopes, y) / weight[2]
-    return Under(y @ pull / -weight[2], slopes, np.zeros(len(lower)), np.abs(slopes)).where(held)
+    return Under(y @ pull / -weight[2], slopes, np.zeros(len(lower)), np.abs(slopes)).where(stable)
 
 
 def axis_residual(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
-    """Least over boxes, shape (boxes,): convex in x, so that its tangent at the middle is under it (E19, E46)."""
+    """Bound the convex torque-roll residual by its tangent at the middle, shape (boxes,) (E19, E46)."""
     assert asked.channel.of_axis is not None
     axis = asked.channel.of_axis(model.mounting(model.lower).block, asked.frequency)
-    found = np.zeros(len(lower))
+    bounds = np.zeros(len(lower))
     slopes = axis.left @ model.stiffness_slopes @ axis.right
     for k, matrix in enumerate(model.stiffness(0.5 * (lower + upper))):
         rows = axis.rows(matrix)
-        y, taken = axis.under(rows / (float(np.linalg.norm(rows)) or 1.0))
-        least = float(y @ axis.answer(matrix)) - taken - np.abs(slopes @ y) @ (0.5 * (upper[k] - lower[k]))
-        found[k] = max(float(least), 0.0)
-    return found
+        y, constant = axis.under(rows / (float(np.linalg.norm(rows)) or 1.0))
+        least = float(y @ axis.answer(matrix)) - constant - np.abs(slopes @ y) @ (0.5 * (upper[k] - lower[k]))
+        bounds[k] = max(float(least), 0.0)
+    return bounds
 
 
 def stiffness_in_all(model: BoxModel, x: Array) -> Array:
-    """Sum over mounts and axes at many designs, shape (boxes,) [N/m]."""
+    """Return the total stiffness of many designs [N/m], shape (boxes,)."""
     decisions = model.problem.mount_decisions
     gains = np.array([sum(drive.gain for drive in decision.mount_drives) for decision in decisions])
     lowest = model.problem.design([float(v) for v in model.lower], decisions)
@@ -63,7 +63,7 @@ def stiffness_in_all(model: BoxModel, x: Array) -> Array:
 
 
 def _frequencies(model: BoxModel, x: Array) -> Array:
-    """Natural frequencies at designs, shape (boxes, 6) [Hz]."""
+    """Return natural frequencies of many designs [Hz], shape (boxes, 6)."""
     return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(model.stiffness(x)), 0.0)) / math.tau)
 
 
@@ -76,27 +76,29 @@ RANGES: Mapping[Channel, Ranges] = {
     channels.TORQUE_ROLL: lambda *at: (axis_residual(*at), math.inf),
     channels.RAW_TORQUE_ROLL: lambda *at: (axis_residual(*at), math.inf),
     channels.DECOUPLING: lambda *at: (-math.inf, most_shares(*at).min(axis=0)),
-    channels.STATIC_TRAVEL: lambda *at: (held_loads(*at).least, math.inf),
-    channels.STATIC_FORCE: lambda *at: (held_loads(*at).least, math.inf),
+    channels.STATIC_TRAVEL: lambda *at: (static_loads(*at).least, math.inf),
+    channels.STATIC_FORCE: lambda *at: (static_loads(*at).least, math.inf),
     channels.DECOUPLING_SHORTFALL: lambda *at: (shortfall(*at), math.inf),
     channels.FREQUENCIES: lambda model, _, lower, upper: (
         _frequencies(model, lower)[:, -1], _frequencies(model, upper)[:, 0]
     ),
 }  # fmt: skip
-"""Of a number of the mounts on boxes, what it is not under and what it is not over: more stiffness lowers sag
-and raises every frequency (E39). Of several numbers the last is not under the one, the first not over the other."""
+"""Lower and upper bounds of mount numbers on boxes: more stiffness lowers sag and raises every frequency (E39).
+
+Of several numbers the lower bound is that of the largest, and the upper bound that of the least.
+"""
 UNDER: Mapping[Channel, Callable[[BoxModel, Measure, Array, Array], Under]] = {
     channels.SAG: sag_under,
-    channels.STATIC_TRAVEL: held_loads,
-    channels.STATIC_FORCE: held_loads,
+    channels.STATIC_TRAVEL: static_loads,
+    channels.STATIC_FORCE: static_loads,
 }
-"""Linear functions nowhere over a number of the mounts, whose limits so have prices on a box (E38)."""
+"""Linear lower bounds of mount numbers, which give limits a multiplier on a box (E38)."""
 SAID = frozenset({channels.STATIC_TRAVEL, channels.STATIC_FORCE})
-"""Of those, numbers whose range says no more than the linear function."""
+"""Channels whose range is no better than the linear bound."""
 
 
 def breaks(model: BoxModel, limit: Limit, lower: Array, upper: Array) -> Mask:
-    """Whether a limit is broken all over a box (E39)."""
+    """Return whether a limit is violated all over a box, shape (boxes,) (E39)."""
     least, most = RANGES[limit.measure.channel](model, limit.measure, lower, upper)
     out = np.zeros(len(lower), dtype=bool) | (least > limit.maximum * (1.0 + SLACK))
     out |= most < limit.minimum * (1.0 - SLACK)

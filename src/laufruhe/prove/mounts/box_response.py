@@ -1,7 +1,7 @@
-"""Response of a block over a whole box of mount stiffnesses, with what the box can at most change (E37, E38, E41).
+"""Response of a block on mounts over boxes of stiffness (E37, E38, E41).
 
-In coordinates in which the mass is one the impedance D(x) = A + i B - W^2 is linear in the stiffnesses x, and so are
-the forces that motion makes in the mounts: over a box they are a series (`laufruhe.prove.mounts.box_series`).
+In coordinates with unit mass the impedance D(x) = A + i B - W^2 is linear in the stiffnesses x, and so are the forces
+that motion causes in the mounts. Over a box they are a series (`laufruhe.prove.mounts.box_series`).
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ NOTHING = 1e-13
 
 @dataclass(frozen=True, eq=False)
 class Lines:
-    """Orders of operating points that are answered together.
+    """Loaded orders of all operating points.
 
     Attributes
     ----------
     points, places
-        Operating point, and place in its spectrum, shape (n,).
+        Index of the operating point, and of the order in its spectrum, shape (lines,).
     orders, omegas
-        Shape (n,); omega [rad/s].
+        Orders, and angular frequencies [rad/s], shape (lines,).
     loads
-        r in coordinates in which the mass is one, shape (n, 6).
+        Wrenches r in coordinates with unit mass, shape (lines, 6).
     """
 
     points: Indices
@@ -49,26 +49,26 @@ class Lines:
     omegas: Array
     loads: ComplexArray
 
-    def kept(self, which: NDArray[np.bool_]) -> Lines:
-        """Some of them."""
+    def subset(self, which: NDArray[np.bool_]) -> Lines:
+        """Return some of the lines."""
         parts = (self.points[which], self.places[which], self.orders[which], self.omegas[which], self.loads[which])
         return Lines(*parts)
 
     def still(self) -> Lines:
-        """The same loads at rest: what the mounts carry if they give no way (E11)."""
+        """Return the same loads at zero frequency, for forces on rigid mounts (E11)."""
         return Lines(self.points, self.places, self.orders, np.zeros_like(self.omegas), self.loads)
 
 
 @dataclass(frozen=True, eq=False)
 class Matrices:
-    """Of a mounting, in coordinates in which the mass is one.
+    """Matrices of a mounting in coordinates with unit mass.
 
     Attributes
     ----------
     stiffness, loss, damping
-        A, and of B what does not grow with frequency and what does, shape (6, 6).
+        A, and the parts of B without and with frequency as a factor, shape (6, 6).
     springs, losses, dampers
-        From motion to what each does to the mounts, shape (3 mounts, 6).
+        Maps from motion to the forces of the mounts, shape (3 mounts, 6).
     """
 
     stiffness: Array
@@ -80,24 +80,26 @@ class Matrices:
 
 
 def is_travel(channel: Channel) -> bool:
-    """Whether the motion of mounts is asked for, else their forces."""
+    """Return whether a channel is the travel of mounts, not their forces."""
     return channel is channels.MOUNT_TRAVEL
 
 
 class BoxModel:
-    """Matrices of a problem whose open numbers are stiffnesses alone.
+    """Matrices of a problem with open stiffnesses alone.
 
     Parameters
     ----------
     problem
-        On elastic mounts, with all but stiffness given.
+        Problem on elastic mounts.
     evaluation
-        Of any design: its wrenches are those of all.
+        Evaluation of any design: all designs have its wrenches.
 
     Attributes
     ----------
     root
-        From motion in coordinates in which the mass is one, shape (6, 6): its transpose takes coordinates there.
+        Inverse square root of the mass matrix, shape (6, 6); it takes wrenches to coordinates with unit mass.
+    slopes
+        Derivatives of `Matrices` by every open number, shape (n, ...).
     """
 
     def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
@@ -125,21 +127,17 @@ class BoxModel:
         self.highest = float(np.linalg.eigvalsh(self._parts(self.mounting(self.upper)).stiffness)[-1])
 
     def mounting(self, x: Array) -> ElasticMounting:
-        """At these stiffnesses."""
+        """Return the mounting at stiffnesses [N/m], shape (n,)."""
         return mounting_in(self.problem.design([float(v) for v in x], self.problem.mount_decisions))
 
     def _parts(self, mounting: ElasticMounting) -> Matrices:
-        seen = mounting.motions @ self.root.T
-        totals = (self.root @ mounting.total(each) @ self.root.T for each in self._each(mounting))
-        maps = ((each @ seen).reshape(-1, 6) for each in self._each(mounting))
+        parts, motions = (mounting.springs, mounting.losses, mounting.dampers), mounting.motions @ self.root.T
+        totals = (self.root @ mounting.total(part) @ self.root.T for part in parts)
+        maps = ((part @ motions).reshape(-1, 6) for part in parts)
         return Matrices(*totals, *maps)
 
-    @staticmethod
-    def _each(mounting: ElasticMounting) -> tuple[Array, Array, Array]:
-        return mounting.springs, mounting.losses, mounting.dampers
-
     def lines(self, quantity: Measure | None = None) -> Lines:
-        """Every order with a load; of a quantity, those that it counts."""
+        """Return all loaded orders, or those that a quantity counts."""
         moved = self.root @ moved_wrench(NUMBERS, self.mounting(self.lower).block.centre_of_gravity)
         found: list[tuple[int, int, float, float, ComplexArray]] = []
         for p, loads in enumerate(self.evaluation.loads):
@@ -155,10 +153,10 @@ class BoxModel:
         if quantity is None:
             return lines
         keep = np.isin(lines.points, self.counted(quantity.points))
-        return lines.kept(keep & quantity.counted(lines.orders))
+        return lines.subset(keep & quantity.counted(lines.orders))
 
     def samples_fully(self, lines: Lines) -> bool:
-        """Whether each of these orders has more than two samples, over a period that is that of the loads."""
+        """Return whether every order has more than two samples in a period of the loads."""
         base = self.problem.engine.cycle.base_order
         steps = [loads.wrench.base / base for loads in self.evaluation.loads]
         if any(step.denominator != 1 for step in steps):
@@ -167,83 +165,86 @@ class BoxModel:
         return bool(2 * places.max(initial=0) < self.evaluation.samples)
 
     def counted(self, names: tuple[str, ...] | None) -> list[int]:
-        """Operating points of these names; all when None."""
+        """Return the indices of operating points by name; all for None."""
         return [k for k, point in enumerate(self.problem.points) if names is None or point.name in names]
 
     @property
     def stiffness_slopes(self) -> Array:
-        """A by every open number, shape (n, 6, 6)."""
+        """Derivatives of A by every open number, shape (n, 6, 6)."""
         return self.slopes["stiffness"]
 
     def stiffness(self, x: Array) -> Array:
-        """A at many designs, shape (boxes, n) to (boxes, 6, 6)."""
+        """Return A at many designs, shape (boxes, n) to (boxes, 6, 6)."""
         return self.at("stiffness", x)
 
     def added(self, omegas: Array) -> ComplexArray:
-        """What springs whose stiffness depends on frequency add to the impedance, (lines, 6, 6) (E50)."""
+        """Return the impedance of springs with frequency-dependent stiffness (E50), shape (lines, 6, 6)."""
         return self._dynamic.impedance(omegas, self.root.T)
 
     def added_forces(self, omegas: Array) -> ComplexArray:
-        """What they add to the forces of the mounts, (lines, 3 mounts, 6)."""
+        """Return the map from motion to forces of these springs, shape (lines, 3 mounts, 6)."""
         return self._dynamic.forces(omegas, self.root.T)
 
     def rise(self, omegas: Array) -> Array:
-        """By how much they lift the largest eigenvalue at most, (lines,)."""
+        """Return an upper bound of the rise of the largest eigenvalue by these springs, shape (lines,)."""
         if not self._dynamic:
             return np.zeros(len(omegas))
         return np.asarray(np.maximum(np.linalg.eigvalsh(self.added(omegas).real)[..., -1], 0.0))
 
     def at(self, name: str, x: Array) -> Array:
-        """A matrix of `Matrices` at many designs, shape (boxes, n) to (boxes, ...)."""
+        """Return a matrix of `Matrices` at many designs, shape (boxes, n) to (boxes, ...)."""
         base: Array = getattr(self._base, name)
         return np.asarray(base + np.einsum("bn,nij->bij", x - self.lower, self.slopes[name]))
 
     def expanded(self, lines: Lines, lower: Array, upper: Array) -> Expansion:
-        """Motion over boxes, shapes (boxes, n) (E37)."""
+        """Return the series of motion over boxes of stiffness, shape (boxes, n) (E37)."""
         centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
         stiffness, loss, damping = (self.at(name, centres)[:, None] for name in ("stiffness", "loss", "damping"))
-        impedance: ComplexArray = _together(lines, stiffness, loss, damping) + self.added(lines.omegas)
+        impedance: ComplexArray = _dynamic(lines, stiffness, loss, damping) + self.added(lines.omegas)
         impedance = impedance - lines.omegas[:, None, None] ** 2 * np.eye(6)
         inverse = inverses(np.asarray(impedance, dtype=np.complex128))
         motion = np.matmul(inverse, lines.loads[:, :, None])[..., 0]
-        return series(centres, halves, inverse, self.sides, _together(lines, *self._inside), motion)
+        return series(centres, halves, inverse, self.sides, _dynamic(lines, *self._inside), motion)
 
     def answer(self, lines: Lines, at: Expansion, channel: Channel, rows: Indices, factors: Array) -> Answer:
-        """Forces or travel, the rows of the mounts that count, with factors on them (E37)."""
+        """Return selected rows of forces or travel, times factors, as linear functions over boxes (E37)."""
         value, turned = self.maps(lines, at, channel, rows)
         return mapped(at, value * factors[:, None], None if turned is None else turned * factors[:, None])
 
     def maps(
         self, lines: Lines, at: Expansion, channel: Channel, rows: Indices
     ) -> tuple[ComplexArray, ComplexArray | None]:
-        """From motion to forces or travel at the centres, (boxes, lines, r, 6); what half a side adds, (..., r, m)."""
+        """Return maps from motion to forces or travel, (boxes, lines, r, 6), and their slopes, (..., r, m)."""
         if is_travel(channel):
             flat = self.travels[rows].astype(complex)
             return np.broadcast_to(flat, (len(at.centres), len(lines.omegas), *flat.shape)), None
         springs, losses, dampers = (
             self.at(name, at.centres)[:, None, rows] for name in ("springs", "losses", "dampers")
         )
-        value = _together(lines, springs, losses, dampers) + self.added_forces(lines.omegas)[:, rows]
-        by_side = _together(lines, *(each[rows] for each in self._along))
+        value = _dynamic(lines, springs, losses, dampers) + self.added_forces(lines.omegas)[:, rows]
+        by_side = _dynamic(lines, *(each[rows] for each in self._along))
         return value, by_side * at.halves[:, None, None, self.sides.own]
 
-    def felt_at_most(self, lines: Lines, channel: Channel) -> Array:
-        """What an order above all natural frequencies can do to all mounts anywhere in the bounds, (lines,) (E41)."""
+    def largest_response(self, lines: Lines, channel: Channel) -> Array:
+        """Return upper bounds of the response of all mounts within all bounds, shape (lines,) (E41).
+
+        Orders that are not above all natural frequencies have an infinite bound.
+        """
         room = lines.omegas**2 - self.highest - self.rise(lines.omegas)
         motion = np.linalg.norm(lines.loads, axis=1) / np.where(room > 0.0, room, 1.0)
         motion = np.where(room > 0.0, motion, np.inf)
         if is_travel(channel):
             return motion * float(np.linalg.norm(self.travels))
         stiffest = self.mounting(self.upper)
-        # of springs that are joined, each by itself: their sum may be less
-        apart = replace(stiffest, mounts=tuple(spring for _, spring in every_spring(stiffest.mounts)))
-        most, top = max(len(mount.springs) for mount in stiffest.mounts), self._parts(apart)
+        # springs that share a mount count one by one, since their sum may be smaller
+        separate = replace(stiffest, mounts=tuple(spring for _, spring in every_spring(stiffest.mounts)))
+        most, top = max(len(mount.springs) for mount in stiffest.mounts), self._parts(separate)
         still = math.sqrt(most) * float(np.linalg.norm(top.springs + 1j * top.losses))
         still = still + np.linalg.norm(self.added_forces(lines.omegas), axis=(1, 2))
         return np.asarray(motion * (still + lines.omegas * math.sqrt(most) * float(np.linalg.norm(top.dampers))))
 
 
-def _together(lines: Lines, springs: Array, losses: Array, dampers: Array) -> ComplexArray:
-    """Of every line, what does not move with frequency and what does, (..., i, j) to (..., lines, i, j)."""
+def _dynamic(lines: Lines, springs: Array, losses: Array, dampers: Array) -> ComplexArray:
+    """Return dynamic stiffnesses at the frequencies of lines, (..., i, j) to (..., lines, i, j)."""
     moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
     return np.asarray(springs + 1j * (moving * losses + omegas * dampers))

@@ -1,7 +1,7 @@
-"""Motion over a box of open numbers as a series in what each of them stiffens, and a bound of its rest (E37).
+"""Motion over a box of open numbers as a series in these numbers, with a bound of the remainder (E37).
 
-D is linear in numbers x. About the centre c of a box, x_j = c_j + s_j h_j with s_j from -1 to 1, number j stiffens D
-along its own directions, the columns B_j, by C_j:
+D is linear in the numbers x. About the centre c of a box, x_j = c_j + s_j h_j with s_j from -1 to 1, number j stiffens
+D along its directions, the columns of B_j, by C_j:
 
     D(x) = D(c) + sum_j s_j h_j B_j C_j B_j'
 
@@ -13,8 +13,8 @@ A force f = (V + sum_j s_j E_j B_j') y is, with P = E - V L,
 
     f = V y0 + P S z0 - P S G S z0 + P S (G S) (1 + G S)^-1 G S z0
 
-the last term of which is at most |P T^-1| g / (1 - g) |T G S z0| for any diagonal T > 0 and g = |T G T^-1| < 1, because
-T and S commute. Of the third term s_j^2 goes from 0 to 1: its half belongs to the value.
+with a last term of at most |P T^-1| g / (1 - g) |T G S z0| for any diagonal T > 0 and g = |T G T^-1| < 1, because
+T and S commute. In the third term s_j^2 runs from 0 to 1: half of it belongs to the value.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 
-# of the largest singular value, what is no direction
+# share of the largest singular value under which a direction counts as none
 NOTHING = 1e-12
-# times that a matrix is squared for its norm, which is over by no more than the sixteenth root of its rank
+# squarings for the norm of a matrix, which exceeds it by at most the sixteenth root of the rank
 SQUARED = 3
-# times that a series counts which need not end: nothing is known before it does
-UNENDED = 1e3
+# factor of branching scores of a series that may diverge
+DIVERGENT = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +42,11 @@ class Sides:
     Attributes
     ----------
     columns
-        B_j side by side, orthonormal for each number, shape (d, m).
+        All B_j side by side, orthonormal for each number, shape (d, m).
     own
-        The number of each column, rising, shape (m,).
+        Index of the number of each column, rising, shape (m,).
     count
-        Numbers.
+        Number of open numbers n.
     """
 
     columns: Array
@@ -54,44 +54,44 @@ class Sides:
     count: int
 
     def inside(self, slopes: Any) -> Any:
-        """C of matrices by each number, (..., n, d, d) to (..., m, m)."""
+        """Return C from slopes of D by each number, (..., n, d, d) to (..., m, m)."""
         same = self.own[:, None] == self.own
         return np.where(same, np.swapaxes(self.columns, 0, 1) @ self.along(slopes), 0.0)
 
     def along(self, slopes: Any) -> Any:
-        """E of maps by each number, (..., n, r, d) to (..., r, m)."""
+        """Return E from slopes of maps by each number, (..., n, r, d) to (..., r, m)."""
         return np.einsum("...mrd,dm->...rm", np.take(slopes, self.own, axis=-3), self.columns)
 
     def apart(self, turned: Any) -> list[Any]:
-        """The maps E_j B_j' of each number, (..., r, d), from E of all, (..., r, m)."""
+        """Return the maps E_j B_j' of each number, (..., r, d), from E, (..., r, m)."""
         return [turned[..., self.own == j] @ self.columns[:, self.own == j].T for j in range(self.count)]
 
     def summed(self, values: Any) -> Any:
-        """Of all columns of each number, (..., m) to (..., n)."""
+        """Sum over the columns of each number, (..., m) to (..., n)."""
         return values if len(self.own) == self.count else values @ (self.own[:, None] == np.arange(self.count))
 
 
 def directions_of(matrices: Sequence[Sequence[Array]]) -> Sides:
-    """Directions of numbers, of each of which some matrices are told, (any, d): what their rows span."""
-    found = []
-    for each in matrices:
-        rows = np.vstack([one / max(float(np.abs(one).max(initial=0.0)), 1e-300) for one in each])
+    """Return the directions of numbers: the row space of the matrices of each, shape (any, d)."""
+    bases = []
+    for slopes in matrices:
+        rows = np.vstack([slope / max(float(np.abs(slope).max(initial=0.0)), 1e-300) for slope in slopes])
         _, size, directions = np.linalg.svd(rows, full_matrices=False)
-        found.append(directions[size > NOTHING * size.max(initial=0.0)].T)
-    own = np.repeat(np.arange(len(found)), [each.shape[1] for each in found])
-    return Sides(np.hstack(found), own, len(found))
+        bases.append(directions[size > NOTHING * size.max(initial=0.0)].T)
+    numbers = np.repeat(np.arange(len(bases)), [basis.shape[1] for basis in bases])
+    return Sides(np.hstack(bases), numbers, len(bases))
 
 
 @dataclass(frozen=True, eq=False)
 class Expansion:
-    """Motion over boxes, shapes (boxes, lines, ...) where nothing else is said (E37).
+    """Series of motion over boxes, shapes (boxes, lines, ...) unless given otherwise (E37).
 
     Attributes
     ----------
     centres, halves
-        Of the boxes, shape (boxes, n).
+        Centres and half widths of the boxes, shape (boxes, n).
     sides
-        Along which numbers stiffen.
+        Directions of the open numbers.
     motion
         y0, (..., d).
     moved, gain, met
@@ -99,7 +99,7 @@ class Expansion:
     balance
         Diagonal of T, (..., m).
     rest
-        Bound of g / (1 - g) |T G S z0|, (...); infinite where the series need not end.
+        Bound of g / (1 - g) |T G S z0|, (...); infinite if the series may diverge.
     """
 
     centres: Array
@@ -114,7 +114,7 @@ class Expansion:
 
     @property
     def pull(self) -> Array:
-        """By how much each side of every box keeps the series from ending, (..., n)."""
+        """Branching scores: share of each side in the gain of the series, (..., n)."""
         even = self.gain * (self.balance[..., None] / self.balance[..., None, :])
         size = np.linalg.norm(even, axis=-2) + np.linalg.norm(even, axis=-1)
         return np.asarray(np.nan_to_num(self.sides.summed(size), nan=1.0, posinf=1.0))
@@ -122,16 +122,16 @@ class Expansion:
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """Forces or travel over boxes: value + slopes . s, and a bound of the rest (E37), shapes (boxes, lines, ...).
+    """Forces or travel over boxes: value + slopes . s and a remainder (E37), shapes (boxes, lines, ...).
 
     Attributes
     ----------
     value, slopes
-        (..., r) and (..., n, r).
+        Shapes (..., r) and (..., n, r).
     rest
-        (...).
+        Upper bound of the length of the remainder, (...).
     bends
-        What each side adds to the rest, (..., n).
+        Share of each side in the remainder, (..., n).
     """
 
     value: ComplexArray
@@ -141,7 +141,7 @@ class Answer:
 
     @property
     def most(self) -> Array:
-        """Bound lengths anywhere in a box from above, shape (...)."""
+        """Upper bound of the length anywhere in a box, shape (...)."""
         size = np.linalg.norm(self.value, axis=-1) + np.linalg.norm(self.slopes, axis=-1).sum(axis=-1)
         return np.asarray(size + self.rest)
 
@@ -149,12 +149,12 @@ class Answer:
 def series(
     centres: Array, halves: Array, inverse: Any, sides: Sides, inside: Any, motion: Any
 ) -> Expansion:  # fmt: skip
-    """Motion over boxes.
+    """Return the series of motion over boxes (E37).
 
     Parameters
     ----------
     centres, halves
-        Of the boxes, (boxes, n).
+        Centres and half widths of the boxes, (boxes, n).
     inverse, motion
         D(c)^-1 and y0, (boxes, lines, d, d) and (boxes, lines, d).
     sides, inside
@@ -170,16 +170,16 @@ def series(
 
 
 def balanced(gain: Any) -> tuple[Array, ComplexArray, Array]:
-    """T with which what goes through a channel is about what comes back, T G T^-1, and what its norm is not over."""
+    """Return T that balances rows and columns of the gain, T G T^-1, and an upper bound of its norm."""
     heights, widths = np.linalg.norm(gain, axis=-1), np.linalg.norm(gain, axis=-2)
-    met = (heights > 0.0) & (widths > 0.0)
-    balance = np.sqrt(np.where(met, widths, 1.0) / np.where(met, heights, 1.0))
+    loaded = (heights > 0.0) & (widths > 0.0)
+    balance = np.sqrt(np.where(loaded, widths, 1.0) / np.where(loaded, heights, 1.0))
     even = gain * (balance[..., None] / balance[..., None, :])
     return balance, even, norm_over(even)
 
 
 def rest_of(even: ComplexArray, most: Array, hit: Array) -> Array:
-    """Bound of g / (1 - g) |T G S z0| from |T z0|, (..., m) to (...); infinite where the series need not end."""
+    """Bound g / (1 - g) |T G S z0| by |T z0|, (..., m) to (...); infinite if the series may diverge."""
     second = np.minimum((np.linalg.norm(even, axis=-2) * hit).sum(axis=-1), most * np.linalg.norm(hit, axis=-1))
     share = np.where(most < 1.0, most / np.where(most < 1.0, 1.0 - most, 1.0), np.inf)
     rest = share * np.where(second > 0.0, second, 1.0)
@@ -187,14 +187,14 @@ def rest_of(even: ComplexArray, most: Array, hit: Array) -> Array:
 
 
 def mapped(at: Expansion, value: Any, turned: Any = None) -> Answer:
-    """What maps make of motion.
+    """Return forces or travel of a motion (E37).
 
     Parameters
     ----------
     value
         V, (boxes, lines, r, d).
     turned
-        E times half the width of the box of each number, (..., r, m); nothing where maps are the same all over.
+        E times half the width of the box of each number, (..., r, m); None for constant maps.
     """
     pulls = -np.matmul(value, at.moved)
     if turned is not None:
@@ -204,21 +204,21 @@ def mapped(at: Expansion, value: Any, turned: Any = None) -> Answer:
     first = np.swapaxes(summed(pulls * at.met[:, :, None]), -2, -1)
     pairs = pulls[..., None] * (at.gain * at.met[..., None, :])[:, :, None]
     second = -np.swapaxes(summed(np.swapaxes(summed(pairs), -2, -1)), -2, -1)
-    own = np.arange(at.sides.count)
-    squares, sizes = second[..., own, own], np.linalg.norm(0.5 * (second + np.swapaxes(second, -2, -1)), axis=2)
-    sizes[..., own, own] *= 0.5
-    # a map that sees nothing has no rest, however far the motion goes
+    k = np.arange(at.sides.count)
+    squares, sizes = second[..., k, k], np.linalg.norm(0.5 * (second + np.swapaxes(second, -2, -1)), axis=2)
+    sizes[..., k, k] *= 0.5
+    # a zero map has no remainder, even of a series that diverges
     size = norm_over(pulls / at.balance[:, :, None])
     beyond = np.where(size > 0.0, size * np.where(size > 0.0, at.rest, 0.0), 0.0)
     bends = sizes.sum(axis=-1)
     whole = np.linalg.norm(value, axis=(-2, -1)) * np.linalg.norm(at.motion, axis=-1)
-    told = np.where(np.isfinite(at.rest)[..., None], bends, UNENDED * whole[..., None] * at.pull)
+    scores = np.where(np.isfinite(at.rest)[..., None], bends, DIVERGENT * whole[..., None] * at.pull)
     middle = np.matmul(value, at.motion[..., None])[..., 0] + 0.5 * squares.sum(axis=-1)
-    return Answer(middle, first, bends.sum(axis=-1) + beyond, told)
+    return Answer(middle, first, bends.sum(axis=-1) + beyond, scores)
 
 
 def norm_over(matrices: Any) -> Array:
-    """At least the largest singular value, (..., r, m) to (...): trace (A* A)^k to the power 1 / 2k is over it."""
+    """Bound the largest singular value by (trace (A* A)^k)^(1 / 2k), (..., r, m) to (...)."""
     squares = np.matmul(np.swapaxes(np.conj(matrices), -2, -1), matrices)
     size = np.trace(squares, axis1=-2, axis2=-1).real
     squares = squares / np.where(size > 0.0, size, 1.0)[..., None, None]
@@ -228,10 +228,10 @@ def norm_over(matrices: Any) -> Array:
 
 
 def inverses(matrices: ComplexArray) -> ComplexArray:
-    """Inverses; infinite where there is none, which leaves a box without a bound."""
+    """Invert matrices; singular ones give infinite entries, so that their box has no bound."""
     try:
         return np.asarray(np.linalg.inv(matrices))
     except np.linalg.LinAlgError:
         singular = np.linalg.det(matrices) == 0.0
-        found = np.linalg.inv(np.where(singular[..., None, None], np.eye(matrices.shape[-1]), matrices))
-        return np.asarray(np.where(singular[..., None, None], np.inf, found))
+        regular = np.where(singular[..., None, None], np.eye(matrices.shape[-1]), matrices)
+        return np.asarray(np.where(singular[..., None, None], np.inf, np.linalg.inv(regular)))

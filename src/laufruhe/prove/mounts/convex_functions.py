@@ -1,7 +1,7 @@
-"""Convex functions of mount stiffness, and what they prove (E16-E19).
+"""Convex functions of mount stiffness, and bounds by their linear minorants (E16-E19).
 
-K is linear in the stiffnesses, and in coordinates in which the mass is one it is called A.
-Then, x the stiffnesses and any of y, V >= 0 with trace one, z with |z| <= 1 given,
+K is linear in the stiffnesses x, and called A in coordinates with unit mass. For any y, any V >= 0 with trace one, and
+any z with |z| <= 1,
 
     w' A^-1 w    >= 2 y' w - y' A(x) y          sag                                     (E16)
     lambda_max A >= <V, A(x)>                   highest natural frequency               (E17)
@@ -9,9 +9,8 @@ Then, x the stiffnesses and any of y, V >= 0 with trace one, z with |z| <= 1 giv
     |A t / W2 - t| >= z' (A(x) t / W2 - t)      torque-roll residual                    (E19)
     |K q - s M q|  >= z' K(x) q - max s z' M q  the same in raw coordinates, s open     (E46)
 
-with equality at the right y, V, z. Right sides are linear in x, so a weighted sum of them,
-limits included, is bounded over the box of x in closed form: a lower bound of the
-objective that holds whatever a solver says.
+with equality at the right y, V, z. Right sides are linear in x, so a weighted sum of them, limits included, has a
+minimum over the box of x in closed form: a lower bound of the objective, independent of the accuracy of a solver.
 """
 
 from __future__ import annotations
@@ -25,18 +24,18 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.physics.mount_numbers import AxisResidual
 
-FELT = 1e-6
-"""Share of the limits by which they have to miss each other to be a contradiction."""
+CONTRADICTION = 1e-6
+"""Relative violation from which limits contradict each other."""
 
 
 class ConvexFunction(Protocol):
     """A convex function of the stiffnesses."""
 
     def value(self, x: Array) -> float:
-        """At x."""
+        """Return the value at stiffnesses x, shape (n,)."""
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
-        """Constant and gradient of a linear function nowhere above this one, best at x."""
+        """Return constant and gradient of a linear function nowhere above this one, tight at x or by a dual."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,47 +46,47 @@ class Matrices:
     slopes: Array
 
     def at(self, x: Array) -> Array:
-        """A(x), shape (6, 6)."""
+        """Return A(x), shape (6, 6)."""
         return np.asarray(self.base + np.tensordot(x, self.slopes, axes=1))
 
     def between(self, left: Array, right: Array) -> tuple[float, Array]:
-        """Constant and gradient of left' A(x) right."""
+        """Return constant and gradient of left' A(x) right."""
         return float(left @ self.base @ right), np.asarray(np.einsum("i,nij,j->n", left, self.slopes, right))
 
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """constant + gradient . x."""
+    """Linear function constant + gradient . x."""
 
     constant: float
     gradient: Array
 
     def value(self, x: Array) -> float:
-        """At x."""
+        """Return the value at x."""
         return self.constant + float(self.gradient @ x)
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:  # noqa: ARG002
-        """Itself."""
+        """Return the function itself."""
         return self.constant, self.gradient
 
 
 @dataclass(frozen=True, eq=False)
 class Compliance:
-    """factor w' A(x)^-1 w (E16)."""
+    """Compliance factor w' A(x)^-1 w (E16)."""
 
     matrices: Matrices
     load: Array
     factor: float
 
     def value(self, x: Array) -> float:
-        """At x; infinite where a mode is free."""
+        """Return the value at x; infinite with a free mode."""
         matrix = self.matrices.at(x)
         if np.linalg.eigvalsh(matrix)[0] <= 0.0:
             return math.inf
         return self.factor * float(self.load @ np.linalg.solve(matrix, self.load))
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:  # noqa: ARG002
-        """The tangent at x, which lies under it everywhere (E16)."""
+        """Return the tangent at x (E16)."""
         y = np.asarray(np.linalg.solve(self.matrices.at(x), self.load), dtype=np.float64)
         constant, gradient = self.matrices.between(y, y)
         return self.factor * (2.0 * float(y @ self.load) - constant), -self.factor * gradient
@@ -95,22 +94,22 @@ class Compliance:
 
 @dataclass(frozen=True, eq=False)
 class Eigenvalue:
-    """sign x the largest of sign x the eigenvalues of A(x) (E17, E18): sign 1 the highest, -1 the lowest negated."""
+    """Largest eigenvalue of sign A(x) (E17, E18): the highest one for sign 1, the negated lowest one for sign -1."""
 
     matrices: Matrices
     sign: float
 
     def value(self, x: Array) -> float:
-        """At x."""
+        """Return the value at x."""
         return float(np.linalg.eigvalsh(self.sign * self.matrices.at(x))[-1])
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
-        """sign <V, A(x)> with V from the dual matrix, or from the eigenvector at x."""
+        """Return sign <V, A(x)> with V from the dual matrix, or from the eigenvector at x."""
         _, vectors = np.linalg.eigh(self.sign * self.matrices.at(x))
         weights, columns = np.eye(6)[-1], vectors
         if dual is not None:
-            found, columns = np.linalg.eigh(0.5 * (dual + dual.T))
-            clipped = np.maximum(found, 0.0)
+            values, columns = np.linalg.eigh(0.5 * (dual + dual.T))
+            clipped = np.maximum(values, 0.0)
             weights = clipped / clipped.sum() if clipped.sum() > 0.0 else weights
         pairs = [self.matrices.between(v, v) for v in columns.T]
         constant = sum(w * c for w, (c, _) in zip(weights, pairs, strict=True))
@@ -120,26 +119,26 @@ class Eigenvalue:
 
 @dataclass(frozen=True, eq=False)
 class Residual:
-    """What turning about the torque-roll axis lacks to be a mode (E19, E46)."""
+    """Torque-roll residual: distance of a turn about the torque-roll axis from a mode (E19, E46)."""
 
     matrices: Matrices
     axis: AxisResidual
 
     def value(self, x: Array) -> float:
-        """At x."""
+        """Return the value at x."""
         return float(np.linalg.norm(self.axis.rows(self.matrices.at(x))))
 
     def minorant(self, x: Array, dual: Array | None) -> tuple[float, Array]:
-        """The linear function of a z of length one at most: the dual vector's, or along the residual."""
+        """Return the linear function of the dual vector, or of the direction of the residual at x."""
         z = self.axis.rows(self.matrices.at(x)) if dual is None else dual
-        y, taken = self.axis.under(z / (float(np.linalg.norm(z)) or 1.0) if dual is None else z)
+        y, mass = self.axis.under(z / (float(np.linalg.norm(z)) or 1.0) if dual is None else z)
         constant, gradient = self.matrices.between(self.axis.left.T @ y, self.axis.right)
-        return constant - taken, gradient
+        return constant - mass, gradient
 
 
 @dataclass(frozen=True, eq=False)
 class ConvexLimit:
-    """function <= maximum, the limit of the problem that it comes from, and which side of it."""
+    """Limit function <= maximum, with the index and side of the limit of the problem."""
 
     function: ConvexFunction
     maximum: float
@@ -149,7 +148,7 @@ class ConvexLimit:
 
 @dataclass(frozen=True, eq=False)
 class ConvexProgram:
-    """Least weighted sum of convex functions in a box, some limited."""
+    """Minimise a weighted sum of convex functions in a box, under limits on such functions."""
 
     matrices: Matrices
     lower: Array
@@ -158,13 +157,13 @@ class ConvexProgram:
     limits: tuple[ConvexLimit, ...]
 
     def objective(self, x: Array) -> float:
-        """Weighted sum at x."""
+        """Return the weighted sum at x."""
         return sum(weight * term.value(x) for weight, term in self.terms)
 
 
 @dataclass(frozen=True, eq=False)
 class ConvexDuals:
-    """What a solver proposes: dual vectors of the terms, prices and dual arrays of the limits."""
+    """Proposal of a solver: dual vectors of terms, prices and dual arrays of limits."""
 
     terms: tuple[Array | None, ...]
     prices: tuple[float, ...]
@@ -172,13 +171,13 @@ class ConvexDuals:
 
     @classmethod
     def none(cls, program: ConvexProgram) -> ConvexDuals:
-        """Nothing proposed: the best linear functions at a design itself, and no price."""
+        """Return no proposal: minorants are tangents at the design, and prices are zero."""
         limits = len(program.limits)
         return cls((None,) * len(program.terms), (0.0,) * limits, (None,) * limits)
 
 
 def dual_bound(program: ConvexProgram, x: Array, duals: ConvexDuals) -> tuple[float, Array]:
-    """Least objective that these duals leave possible, and the gradient of the bound's function (E16-E19)."""
+    """Return the lower bound of the objective by duals, and the gradient of its linear function (E16-E19)."""
     constant, gradient = 0.0, np.zeros(len(x))
     for (weight, term), dual in zip(program.terms, duals.terms, strict=True):
         c, g = term.minorant(x, dual)
@@ -191,7 +190,7 @@ def dual_bound(program: ConvexProgram, x: Array, duals: ConvexDuals) -> tuple[fl
 
 
 def excludes(program: ConvexProgram, x: Array, duals: ConvexDuals) -> bool:
-    """Whether these duals of the limits show that no stiffness in the box keeps all of them."""
+    """Return whether duals of the limits prove that no stiffness in the box keeps all limits."""
     proof, _ = dual_bound(replace(program, terms=()), x, replace(duals, terms=()))
     whole = sum(price * abs(limit.maximum) for limit, price in zip(program.limits, duals.prices, strict=True))
-    return proof > FELT * whole
+    return proof > CONTRADICTION * whole

@@ -1,4 +1,4 @@
-"""Channels that bounds of open mounts name as their own; of all else they claim nothing."""
+"""Channels that bounds of open mounts support; bounds ignore all other terms and limits."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _AFFINE = frozenset({Kind.UNBALANCE, Kind.SHARE, Kind.PISTON})
 
 
 def named_part(problem: Problem) -> Problem:
-    """Return a problem without the terms and limits that bounds of mounts do not name.
+    """Return a problem without the terms and limits that bounds of mounts do not support.
 
-    Its bound holds for the whole: no term is under zero, and fewer limits allow more designs.
+    Its bound holds for the whole problem: no term is negative, and fewer limits allow more designs.
     """
     terms = tuple(term for term in problem.objective if is_named(term.measure, problem))
     limits = tuple(limit for limit in problem.limits if is_named(limit.measure, problem))
@@ -33,10 +33,10 @@ def is_named(measure: Measure, problem: Problem) -> bool:
     if measure.is_load and not (measure in problem.known_rows or _is_bounded(measure.norm)):
         return False
     for kind in {decision.kind for decision in problem.decisions}:
-        found = dependence(measure.channel, kind, problem)
-        affine = kind in _AFFINE and found is Dependence.AFFINE
-        own = measure.channel in NAMED and found is not Dependence.UNKNOWN
-        if not (found is Dependence.NONE or affine or own):
+        depends = dependence(measure.channel, kind, problem)
+        affine = kind in _AFFINE and depends is Dependence.AFFINE
+        has_formula = measure.channel in NAMED and depends is not Dependence.UNKNOWN
+        if not (depends is Dependence.NONE or affine or has_formula):
             return False
     return True
 

@@ -1,11 +1,11 @@
-"""Provers: whoever bounds designs on open mounts from below, all of them asked alike.
+"""Provers: methods that bound designs on open mounts from below, behind one interface.
 
-The core has boxes of stiffness (E38-E40); extensions add theirs.
+The core has boxes of stiffness (E38-E40). Extensions add theirs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache
@@ -20,33 +20,33 @@ from laufruhe.prove.mounts.subdivision import divided_bounds, divides
 from laufruhe.prove.witness import Known
 
 EARLY = 0.2
-"""Share of the boxes of stiffness that is tried before other provers go on."""
+"""Share of the boxes of stiffness before other provers have their turn."""
 LEAST_SECONDS = 0.5
-"""Time that the first bound has where time is over [s]."""
+"""Time of the first bound after the end of the time budget [s]."""
 
 
 @dataclass(eq=False)
 class Question:
-    """Ask provers if no design is more than `room` better than the best that is known.
+    """The question whether a design is more than `room` better than the incumbent.
 
     Attributes
     ----------
     problem
-        On elastic mounts, some of their numbers open.
+        Problem on elastic mounts with open numbers.
     value
-        Objective of the best design known [SI], infinite where none is; a prover that meets a better one lowers it.
+        Objective of the incumbent [SI], infinite without one; provers lower it when they find a better design.
     room
-        Difference that counts as none [SI].
+        Absolute gap tolerance [SI].
     near
-        Decisions of a design near which the best one is.
+        Values of the decisions of a good design.
     known
-        The best design by its numbers of the mounts, the witness of bounds.
+        Incumbent by its numbers of the mounts, to check bounds.
     of_many
-        The same is asked of many problems, so that a bound that is nearly as good and quick comes first.
+        Whether many problems are bounded, so that cheap bounds come first.
     moves
-        Throws that are open between bounds beside the mounts, and where they stand; None of a crank that is given.
+        Phasing and candidate of throws between bounds; None for a fixed crank.
     bound
-        Best bound so far [SI]; provers read it, `proven` raises it.
+        Best lower bound so far [SI], raised by `proven`.
     """
 
     problem: Problem
@@ -61,21 +61,21 @@ class Question:
 
 @dataclass(frozen=True)
 class Prover:
-    """A way to bound designs on open mounts from below.
+    """A method that bounds designs on open mounts from below.
 
     Attributes
     ----------
     name
-        Of what it divides, in words.
+        Name of its boxes.
     applies
-        Return whether it bounds anything of a problem.
+        Return whether the prover bounds a problem.
     bounds
-        Yield bounds that get better, each after more work; boxes are counted from the first one on. Places are numbers
-        of mounts, and columns of unbalances after them, from which a search may find a better design.
+        Yield increasing bounds, each after more work, with the number of all boxes so far. Places are start points for
+        a search: numbers of mounts, then columns of unbalances.
     before
-        Name of the prover that one of an extension stands before.
+        Name of the prover that this one precedes.
     of_moves
-        Whether it bounds designs whose throws are open beside the mounts, and no others.
+        Whether it bounds only designs with throws between bounds.
     """
 
     name: str
@@ -90,34 +90,34 @@ def _stiffness_bounds(question: Question) -> Iterator[Divided]:
 
 
 PROVERS = (Prover("boxes of stiffness", divides, _stiffness_bounds),)
-"""Those of the core."""
+"""Provers of the core."""
 
 
 @cache
 def provers() -> tuple[Prover, ...]:
-    """Return all provers in the order in which they are asked."""
-    found: tuple[Prover, ...] = in_order("provers", Prover, PROVERS)
-    return found
+    """Return all provers in their order."""
+    ordered: tuple[Prover, ...] = in_order("provers", Prover, PROVERS)
+    return ordered
 
 
 def proven(question: Question) -> Divided:
-    """Ask all provers that apply in rounds of growing work, until one closes the question or time is over."""
-    asked = [prover for prover in provers() if prover.of_moves is (question.moves is not None)]
-    answers = [prover.bounds(question) for prover in asked if prover.applies(question.problem)]
-    found: dict[Iterator[Divided], Divided] = {}
-    while answers:
-        for each in tuple(answers):
-            if found and (passed() or not question.bound < question.value - question.room):
-                return _together(question, found)
-            with at_least(LEAST_SECONDS) if not found else nullcontext():
-                answer = next(each, None)
-            if answer is None:
-                answers.remove(each)
-                continue
-            found[each], question.bound = answer, max(question.bound, answer.bound)
-    return _together(question, found)
+    """Run all provers that apply in rounds of growing work, until one closes the gap or time is over."""
+    eligible = [prover for prover in provers() if prover.of_moves is (question.moves is not None)]
+    running = [prover.bounds(question) for prover in eligible if prover.applies(question.problem)]
+    results: dict[Iterator[Divided], Divided] = {}
 
+    def is_over() -> bool:
+        return bool(results) and (passed() or not question.bound < question.value - question.room)
 
-def _together(question: Question, found: Mapping[Iterator[Divided], Divided]) -> Divided:
-    places = [each.places for each in found.values() if each.places]
-    return Divided(question.bound, sum(each.boxes for each in found.values()), places[-1] if places else ())
+    while running and not is_over():
+        for bounds in tuple(running):
+            if is_over():
+                break
+            with at_least(LEAST_SECONDS) if not results else nullcontext():
+                result = next(bounds, None)
+            if result is None:
+                running.remove(bounds)
+            else:
+                results[bounds], question.bound = result, max(question.bound, result.bound)
+    places = [result.places for result in results.values() if result.places]
+    return Divided(question.bound, sum(result.boxes for result in results.values()), places[-1] if places else ())

@@ -1,4 +1,4 @@
-"""What bounds and limits of a problem leave of its mounts: numbers of springs, and stiffness in all (E31, E43, E53)."""
+"""Ranges of spring numbers by bounds of decisions, and of the stiffness matrix by limits (E31, E43, E53)."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.problem import Problem
 
 SLACK = 1e-6
-"""Designs count as allowed when they break a limit by less."""
+"""Relative violation of a limit that counts as none."""
 
 
 def number_ranges(problem: Problem, lower: Array | None = None, upper: Array | None = None) -> tuple[Array, Array]:
-    """Least and largest values of the numbers of every spring, shape (springs, 14) each.
+    """Return lower and upper bounds of the numbers of every spring, shape (springs, 14) each.
 
     Parameters
     ----------
     lower, upper
-        Of the open numbers of the mounts; their bounds when left out.
+        Values of the open numbers of the mounts, shape (n,); their bounds by default.
     """
     low = np.array(problem.mount_numbers, dtype=float)
     high = low.copy()
@@ -44,9 +44,10 @@ Band: TypeAlias = tuple[float, float]
 
 
 def limited_stiffness(problem: Problem, root: Array) -> tuple[list[Array], list[Array], list[Band]]:
-    """L that A is not under, by least frequency and largest sag (E31), U that it is not over (E43), and bands (E53).
+    """Return matrices L <= A by least frequency and sag (E31), U >= A (E43), and excluded bands (E53).
 
-    Bands are of squares of angular frequencies, less what a limit may be broken by.
+    A is the stiffness in coordinates with unit mass, and `root` takes wrenches there, shape (6, 6). Bands are squares
+    of angular frequencies [rad^2/s^2], less the tolerance of limits.
     """
     floors, ceilings, bands = [], [], []
     weight = weight_wrench(mounting_in(problem.engine).block)

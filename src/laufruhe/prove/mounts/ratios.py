@@ -1,4 +1,4 @@
-"""Transmissibility over boxes: the least ratio of forces to those of mounts that give no way (E40)."""
+"""Lower bounds of transmissibility over boxes: ratio of forces to those on rigid mounts (E40)."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from laufruhe.prove.mounts.box_series import Answer
 
 HALVINGS = 45
 RATIOS = frozenset({channels.TRANSMISSIBILITY})
-"""Channels whose numbers are such a ratio."""
+"""Channels of such a ratio."""
 
 
 def is_ratio(measure: Measure) -> bool:
@@ -27,24 +27,24 @@ def is_ratio(measure: Measure) -> bool:
 
 
 def groups_of(quantity: Measure, points: Sequence[OperatingPoint], lines: Lines | Sampled) -> list[Mask]:
-    """Lines that make one ratio: of each operating point every order named, or all above zero together."""
+    """Return masks of the lines of each ratio: one per operating point and named order, or all orders above zero."""
     out = []
     for p in (p for p in np.unique(lines.points) if quantity.counts_point(points[p])):
-        own = (lines.points == p) & (lines.orders > 0.0)
+        moving = (lines.points == p) & (lines.orders > 0.0)
         orders: Sequence[float | None] = (None,) if quantity.orders is None else quantity.orders
-        out += [own if order is None else own & orders_equal(lines.orders, order) for order in orders]
+        out += [moving if order is None else moving & orders_equal(lines.orders, order) for order in orders]
     return [group for group in out if group.any()]
 
 
 def ratio_under(over: Answer, firm: Answer, groups: Sequence[Mask]) -> tuple[Array, Array]:
-    """Least of the largest ratio on every box, shape (boxes,), and the pull of sides.
+    """Return lower bounds of the largest ratio, shape (boxes,), and branching scores, shape (boxes, n).
 
     Parameters
     ----------
     over, firm
-        Forces of orders, and those at rest under the same loads.
+        Forces of orders, and static forces under the same loads.
     groups
-        Of orders that make one ratio.
+        Orders of each ratio, from `groups_of`.
     """
     best, pull = np.zeros(len(over.value)), np.zeros(over.bends[:, 0].shape)
     for group in groups:
@@ -60,7 +60,7 @@ def ratio_under(over: Answer, firm: Answer, groups: Sequence[Mask]) -> tuple[Arr
 
 
 def _least_ratio(top: Under, bottom: Under) -> Array:
-    """Largest t with top - t bottom >= 0 all over the box, top from below and bottom from above (E40)."""
+    """Return the largest t with top - t bottom >= 0 all over the box (E40)."""
     low = np.zeros(len(top.value))
     high = top.value / np.where(bottom.value > 0.0, bottom.value, 1.0)
     for _ in range(HALVINGS):

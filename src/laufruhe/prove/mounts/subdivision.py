@@ -1,8 +1,8 @@
-"""A lower bound of mount forces, travel and transmissibility by dividing the bounds of stiffness into boxes (E38-E40).
+"""Lower bounds of mount forces, travel and transmissibility by branch and bound over stiffnesses (E38-E40).
 
-On a box every quantity has a linear function under it that differs from it by the square of the box's size. Boxes
-whose least value is not under the design found, or on which a limit cannot be kept, are dropped, the others halved:
-the least value on what is left bounds the objective of every design allowed.
+On a box every quantity has a linear lower bound, with an error of second order in the size of the box. Boxes whose
+bound is not under the incumbent, or that violate a limit, are dropped, and the others are halved. The least bound of
+the remaining boxes is a lower bound of the objective of every feasible design.
 """
 
 from __future__ import annotations
@@ -34,22 +34,22 @@ from laufruhe.prove.mounts.ranges import SLACK
 from laufruhe.prove.mounts.ratios import groups_of, is_ratio, ratio_under
 from laufruhe.prove.witness import Known
 
-# open numbers that are divided without being asked for, and what all boxes may cost together
+# open numbers up to which boxes are the default, and work of all boxes together
 MOST_OPEN = 6
 WORK = 2e7
 MOST_BOXES = 60_000
-# numbers held at once
-HELD = 3e6
-# numbers of a motion in time that cost as much as one of an order
+# numbers in memory at a time
+MEMORY = 3e6
+# numbers of a simulation that cost as much as one number of an order
 SIMULATED_SHARE = 18
-# of the gap that counts as proven, what small orders may take of it
+# share of the gap tolerance for ignored small orders
 LEFT_OUT = 0.05
-# of the length of a side, what counts where nothing is told of it
+# branching score of the relative length of a side, against ties
 EVEN = 1e-12
 
 
 def divides(problem: Problem) -> bool:
-    """Whether stiffness alone is open, and more of it is never less of a mount's own."""
+    """Return whether only stiffnesses are open, and every spring is monotone in them."""
     stiffness = all(d.is_stiffness and all(drive.gain > 0.0 for drive in d.mount_drives) for d in problem.decisions)
     return bool(problem.decisions) and stiffness
 
@@ -57,31 +57,26 @@ def divides(problem: Problem) -> bool:
 def divided_bounds(
     problem: Problem, value: float, room: float, shares: Sequence[float], known: Known | None = None
 ) -> Iterator[Divided]:  # fmt: skip
-    """Yield bounds of boxes, each after a share of what is worth it, until none is `room` better than `value`.
+    """Yield bounds by boxes of stiffness, until no design is more than `room` better than `value`.
 
     Parameters
     ----------
     problem
-        That `divides`.
+        Problem that `divides`.
     value
-        Objective of the best design known; infinite where none is, and then the bound tells whether there is one.
+        Objective of the incumbent [SI]. Without one it is infinite, and an infinite bound proves infeasibility.
     room
-        Difference that counts as none [SI].
+        Absolute gap tolerance [SI].
     shares
-        Of the boxes that are worth it.
+        Shares of the box budget, one bound after each.
     known
-        The design, the witness of bounds.
+        Incumbent, to check bounds.
     """
     search = StiffnessBoxes(problem, LEFT_OUT * room, value - NEARLY * room if value < math.inf else math.inf)
     most = search.most_boxes
     if most and search.is_sampled_fully:
         counts = [math.ceil(share * most) for share in shares]
         yield from divided_on(search, search.model.lower, search.model.upper, value, room, counts, known)
-
-
-def worth_halving(pull: Array, lower: Array, upper: Array) -> NDArray[np.intp]:
-    """Of every box the side that pulls most; the longest where nothing is told."""
-    return np.asarray(np.argmax(np.nan_to_num(pull) + EVEN * (upper - lower) / upper.max(), axis=1))
 
 
 class SimulatedBoxes(Protocol):
@@ -94,34 +89,34 @@ class SimulatedBoxes(Protocol):
         """Work of one box, in numbers."""
 
     def under(self, measure: Measure, lower: Array, upper: Array, asked: Mask | None = None, /) -> Under:
-        """Return linear functions under a measure on boxes, shapes (boxes, open numbers), or on those asked for."""
+        """Return linear lower bounds of a measure on boxes, shape (boxes, open numbers), or on some of them."""
 
 
 def simulated_boxes(model: BoxModel) -> SimulatedBoxes | None:
-    """Return the bounds of the simulated measures of a problem; None where nothing bounds them."""
+    """Return the bounds of the simulated measures of a problem; None if they have none."""
     measures = simulated_measures(model.problem)
     if not measures:
         return None
-    found: SimulatedBoxes | None = call_by_name(f"{measures[0].channel.simulation}:boxes", model, measures)
-    return found
+    boxes: SimulatedBoxes | None = call_by_name(f"{measures[0].channel.simulation}:boxes", model, measures)
+    return boxes
 
 
 class StiffnessBoxes:
-    """Bounds of boxes.
+    """Lower bounds of objective and limits over boxes of stiffness.
 
     Attributes
     ----------
     constant
-        Of the objective: loads of the block and masses are the same on all mounts.
+        Part of the objective that is the same on all mounts: loads of the block and masses [SI].
     simulated
-        Bounds of simulated measures; None where nothing bounds them.
+        Bounds of simulated measures, or None.
 
     Parameters
     ----------
     left_out
-        What small orders may take of the objective.
+        Share of the objective for ignored small orders [SI].
     enough
-        Of a box whose bound comes to this no more is asked.
+        Bound from which a box needs no simulations; infinite without an incumbent.
     """
 
     what = "boxes of stiffness"
@@ -136,9 +131,13 @@ class StiffnessBoxes:
         rest = [term for term in problem.load_terms if not depends(term.measure.channel, kinds, problem)]
         self.constant = sum(term.weight * evaluation.value(term.measure) for term in rest)
         share = left_out / max(sum(term.weight for term in terms), 1e-300)
-        self._terms = [(term.weight, term.measure, *_felt(self.model, term.measure, share)) for term in terms]
+        self._terms = [(term.weight, term.measure, *_relevant_lines(self.model, term.measure, share)) for term in terms]
         self._limits = [
-            (limit.maximum * (1.0 + SLACK), limit.measure, *_felt(self.model, limit.measure, SLACK * limit.maximum))
+            (
+                limit.maximum * (1.0 + SLACK),
+                limit.measure,
+                *_relevant_lines(self.model, limit.measure, SLACK * limit.maximum),
+            )
             for limit in problem.limits
             if limit.measure.on_mounts
         ]
@@ -148,7 +147,7 @@ class StiffnessBoxes:
 
     @property
     def is_sampled_fully(self) -> bool:
-        """Whether sums of squares over orders are those over samples, as the rests suppose."""
+        """Whether sums of squares over orders equal those over samples, as remainders suppose."""
         return all(self.model.samples_fully(lines) for _, _, lines, _ in (*self._terms, *self._limits))
 
     @property
@@ -162,83 +161,90 @@ class StiffnessBoxes:
 
     @property
     def at_once(self) -> int:
-        """Boxes of one round."""
-        return int(np.clip(HELD / (3.0 * self._cost), 2, 64))
+        """Number of boxes in one round."""
+        return int(np.clip(MEMORY / (3.0 * self._cost), 2, 64))
 
     @property
     def most_boxes(self) -> int:
-        """As many as asked for, or as a few seconds allow."""
+        """Box budget: as requested, or for a few seconds."""
         few = len(self.problem.mount_decisions) <= MOST_OPEN
         return self.problem.search.boxes_or(int(min(WORK / self._cost, MOST_BOXES)) if few else 0)
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
+        """Return lower bounds of boxes, infinite without a feasible design, and the sides to halve.
+
+        Parameters
+        ----------
+        lower, upper
+            Stiffnesses [N/m], shape (boxes, n).
+        """
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             return self._bounds(lower, upper)
 
     def _bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        boxes, pull, size = BoxLines.of(lower), np.zeros_like(lower), np.full(len(lower), self.constant)
+        boxes, scores, size = BoxLines.zero(lower), np.zeros_like(lower), np.full(len(lower), self.constant)
         for weight, quantity, lines, left_out in self._terms:
             at = self.model.expanded(lines, lower, upper)
             least = under(self.model, quantity, lines, at)
             boxes.add(weight, least, left_out)
-            pull, size = pull + weight * least.bends, size + weight * least.value
-        self.hold(boxes, lower, upper)
-        numbers, pulled = self._numbers(lower, upper)
-        broken = self.breaks(lower, upper)
-        found = self.constant + numbers + boxes.least
-        pull = (pull + pulled) / np.where(size + numbers > 0.0, size + numbers, 1.0)[:, None]
-        # simulations cost most, and tell nothing of boxes that are ruled out
-        left = np.flatnonzero(~broken & (found < self.enough))
+            scores, size = scores + weight * least.bends, size + weight * least.value
+        self._add_limits(boxes, lower, upper)
+        numbers, score = self._numbers(lower, upper)
+        violated = self._violated(lower, upper)
+        bounds = self.constant + numbers + boxes.least
+        scores = (scores + score) / np.where(size + numbers > 0.0, size + numbers, 1.0)[:, None]
+        # simulations cost most, and come last
+        left = np.flatnonzero(~violated & (bounds < self.enough))
         if self.simulated is not None and len(left):
-            own = boxes.kept(left)
-            pull[left] = np.maximum(pull[left], self.add_simulated(own, lower[left], upper[left]))
-            found[left] = self.constant + numbers[left] + own.least
-            boxes.pulls.append(np.zeros_like(pull))
-            boxes.pulls[-1][left] = own.pull
+            rest = boxes.subset(left)
+            scores[left] = np.maximum(scores[left], self._add_simulated(rest, lower[left], upper[left]))
+            bounds[left] = self.constant + numbers[left] + rest.least
+            boxes.pulls.append(np.zeros_like(scores))
+            boxes.pulls[-1][left] = rest.pull
         if math.isinf(self.enough):
-            # without a known design the question is whether the limits can be kept
-            pull = boxes.pull
-        found = np.where(broken, np.inf, found)
-        return found, worth_halving(pull, lower, upper)
+            # without an incumbent the question is whether the limits can be kept
+            scores = boxes.pull
+        sides = np.argmax(np.nan_to_num(scores) + EVEN * (upper - lower) / upper.max(), axis=1)
+        return np.where(violated, np.inf, bounds), np.asarray(sides)
 
-    def hold(self, boxes: BoxLines, lower: Array, upper: Array) -> None:
-        """Add limits that have linear functions under them, simulated ones left out."""
+    def _add_limits(self, boxes: BoxLines, lower: Array, upper: Array) -> None:
+        """Add limits with linear lower bounds, except simulated ones."""
         for maximum, quantity, lines, left_out in self._limits:
             least = under(self.model, quantity, lines, self.model.expanded(lines, lower, upper))
-            boxes.hold(least, left_out, maximum)
+            boxes.add_limit(least, left_out, maximum)
         for limit in self._priced:
             least = UNDER[limit.measure.channel](self.model, limit.measure, lower, upper)
-            boxes.hold(least, 0.0, limit.maximum * (1.0 + SLACK))
+            boxes.add_limit(least, 0.0, limit.maximum * (1.0 + SLACK))
 
-    def add_simulated(self, boxes: BoxLines, lower: Array, upper: Array) -> Array:
-        """Add what simulations tell of boxes (E65); return the pull of sides, shape (boxes, open numbers)."""
+    def _add_simulated(self, boxes: BoxLines, lower: Array, upper: Array) -> Array:
+        """Add bounds of simulated measures (E65), and return branching scores, shape (boxes, n)."""
         assert self.simulated is not None
-        pull, problem = np.zeros_like(lower), self.problem
+        scores, problem = np.zeros_like(lower), self.problem
         weights = {term.measure: term.weight for term in problem.objective}
         for measure in self.simulated.measures:
-            # one limit that is broken is enough
-            found = self.simulated.under(measure, lower, upper, boxes.excess <= 0.0)
-            boxes.add(weights.get(measure, 0.0), found)
+            # a box that violates one limit needs no other
+            least = self.simulated.under(measure, lower, upper, boxes.excess <= 0.0)
+            boxes.add(weights.get(measure, 0.0), least)
             for limit in problem.limits:
                 if limit.measure == measure:
-                    boxes.hold(found, 0.0, limit.maximum * (1.0 + SLACK))
-            pull = np.maximum(pull, found.bends / np.where(found.value > 0.0, found.value, 1.0)[:, None])
-        return pull
+                    boxes.add_limit(least, 0.0, limit.maximum * (1.0 + SLACK))
+            scores = np.maximum(scores, least.bends / np.where(least.value > 0.0, least.value, 1.0)[:, None])
+        return scores
 
     def _numbers(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Least of what numbers of the mounts are in the objective, and the pull of sides."""
-        found, pull = np.zeros(len(lower)), np.zeros_like(lower)
-        for asked, weight in ((term.measure, term.weight) for term in self.problem.mount_terms):
-            if is_ratio(asked):
-                ratio, pulled = self._ratio(asked, lower, upper)
-                found, pull = np.asarray(found + weight * ratio), pull + weight * pulled
+        """Return lower bounds of mount numbers in the objective, and branching scores."""
+        bounds, scores = np.zeros(len(lower)), np.zeros_like(lower)
+        for term in self.problem.mount_terms:
+            if is_ratio(term.measure):
+                least, score = self._ratio(term.measure, lower, upper)
+                scores = scores + term.weight * score
             else:
-                found = np.asarray(found + weight * RANGES[asked.channel](self.model, asked, lower, upper)[0])
-        return found, pull
+                least = np.asarray(RANGES[term.measure.channel](self.model, term.measure, lower, upper)[0])
+            bounds = np.asarray(bounds + term.weight * least)
+        return bounds, scores
 
-    def breaks(self, lower: Array, upper: Array) -> Mask:
-        """Boxes on which a limit of a number of the mounts is broken everywhere, beside what `hold` says."""
+    def _violated(self, lower: Array, upper: Array) -> Mask:
+        """Return boxes that violate a limit of a mount number everywhere, shape (boxes,)."""
         out = np.zeros(len(lower), dtype=bool)
         for limit in self.problem.mount_limits:
             if is_ratio(limit.measure):
@@ -247,15 +253,13 @@ class StiffnessBoxes:
                 out |= breaks(self.model, limit, lower, upper)
         return out
 
-    # transmissibility
-
     def _ratio_lines(self, quantity: Measure) -> Lines:
         counted = Measure(channels.MOUNT_FORCE, NORMS["rms"], points=quantity.points, orders=quantity.orders)
         lines = self.model.lines(counted)
-        return lines.kept(lines.omegas > 0.0)
+        return lines.subset(lines.omegas > 0.0)
 
     def _ratio(self, quantity: Measure, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Least transmissibility on every box (E40)."""
+        """Return lower bounds of a transmissibility, and branching scores (E40)."""
         lines = self._ratio_lines(quantity)
         rows = np.arange(3 * len(self.problem.engine.mounts), dtype=np.intp)
         at, still = (self.model.expanded(each, lower, upper) for each in (lines, lines.still()))
@@ -266,16 +270,14 @@ class StiffnessBoxes:
         return ratio_under(over, firm, groups_of(quantity, self.problem.points, lines))
 
 
-def _felt(model: BoxModel, quantity: Measure, budget: float) -> tuple[Lines, float]:
-    """Lines without those that together do less than a budget anywhere, and what they do (E41)."""
+def _relevant_lines(model: BoxModel, quantity: Measure, budget: float) -> tuple[Lines, float]:
+    """Return lines without small ones that sum to less than a budget, and the effect of these on the norm (E41)."""
     lines = model.lines(quantity)
-    factor = max(quantity.direction_weights or (1.0,))
-    felt = factor * model.felt_at_most(lines, quantity.channel)
-    order = np.argsort(felt, kind="stable")
+    size = max(quantity.direction_weights or (1.0,)) * model.largest_response(lines, quantity.channel)
+    order = np.argsort(size, kind="stable")
     # the sum is over any root of squares, so it serves every norm
-    together = np.cumsum(felt[order])
-    kept = np.ones(len(felt), dtype=bool)
-    out = order[together <= budget]
-    kept[out] = False
-    # a peak to peak is twice a largest length at most
-    return lines.kept(kept), (2.0 if quantity.norm.is_diameter else 1.0) * float(felt[out].sum())
+    ignored = order[np.cumsum(size[order]) <= budget]
+    relevant = np.ones(len(size), dtype=bool)
+    relevant[ignored] = False
+    # a peak to peak is at most twice the largest length
+    return lines.subset(relevant), (2.0 if quantity.norm.is_diameter else 1.0) * float(size[ignored].sum())

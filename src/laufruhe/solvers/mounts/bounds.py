@@ -35,42 +35,47 @@ def mount_numbers(design: Design) -> Array:
 
 
 def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
-    """Return what provers tell of a search; where stiffness alone is open, search on where their boxes are least.
+    """Bound the result of a search by all provers; continue the search where their bounds are least.
 
     Parameters
     ----------
     among
-        Whether the problem is one of several; those in which more than stiffness is open are then left to
-        `bounded_under`.
+        Whether the problem is one of several. Those with more than stiffness open then wait for `bounded_under`.
     """
     divided = Divided(0.0, 0)
     if search.moves is not None or not problem.search.proves or (among and not divides(problem)):
         return divided
     for _ in in_time(range(MOST_DIVISIONS)):
-        found = search.chosen
-        met = found is not None and found.design.excess <= KEPT
-        # of what few angles read too much no box can take anything
-        value = found.design.value - over_read(problem, found.design.evaluation) if found and met else math.inf
-        room = room_of(
-            value, problem.tolerance, numerical_zero(problem, found.design.evaluation.engine if found else None)
-        )
-        near = found.design.values if found is not None else ()
-        known = None if found is None or not met else known_of(found.design, mount_numbers(found.design))
+        design = search.chosen.design if search.chosen is not None else None
+        value, known = math.inf, None
+        if design is not None and design.excess <= KEPT:
+            # boxes cannot bound what few samples overestimate
+            value = design.value - over_read(problem, design.evaluation)
+            known = known_of(design, mount_numbers(design))
+        room = room_of(value, problem.tolerance, numerical_zero(problem, design.evaluation.engine if design else None))
+        near = design.values if design is not None else ()
         question, count = Question(problem, value, room, near, known), len(problem.mount_decisions)
         divided = proven(question)
         places = [(place[:count].tolist(), place[count:] if len(place) > count else None) for place in divided.places]
         if not places or passed() or not search.again(places):
             break
-        # what is shown of a value is so of one that differs from it by less than counts
+        # the bound also serves a value that differs by less than the gap tolerance
         if search.best is not None and search.best.design.value > question.value - room:
             break
     return divided
 
 
 def bounded_under(result: Result, value: float, enough: float = math.inf, of_many: bool = False) -> Result:
-    """Return a result with what provers tell of its mounts, designs over a value known from elsewhere left out.
+    """Return a result with a lower bound by all provers of its mounts.
 
-    No more is proven than is enough, and of the first of many what is worth proving of them all.
+    Parameters
+    ----------
+    value
+        Objective of a design known from elsewhere; the bound need not be higher [SI].
+    enough
+        Bound at which the proof stops [SI].
+    of_many
+        Whether many results are bounded, so that cheap bounds come first.
     """
     problem, certificate = result.problem, result.certificate
     if certificate is None or result.objective is None or divides(problem) or problem.phasing is not None:
@@ -78,20 +83,20 @@ def bounded_under(result: Result, value: float, enough: float = math.inf, of_man
     nothing = numerical_zero(problem, result.final.engine)
     room = max(room_of(value, problem.tolerance, nothing), (value - min(enough, value)) / NEARLY)
     question = Question(problem, value, room, values_of(problem, result), of_many=of_many)
-    found = proven(question)
-    if found.bound <= certificate.lower_bound:
+    divided = proven(question)
+    if divided.bound <= certificate.lower_bound:
         return result
-    text = f"{certificate.method}; bounds of mounts looked at in {found.boxes} box{'es' if found.boxes > 1 else ''}"
-    told = certified(
-        result.objective.value, found.bound, nothing, problem.tolerance, Reach.NEAR, certificate.kkt_residual, text
+    text = f"{certificate.method}; bounds of mounts looked at in {divided.boxes} box{'es' if divided.boxes > 1 else ''}"
+    certificate = certified(
+        result.objective.value, divided.bound, nothing, problem.tolerance, Reach.NEAR, certificate.kkt_residual, text
     )
-    return replace(result, certificate=told)
+    return replace(result, certificate=certificate)
 
 
 def excludes(problem: Problem, limits: Sequence[Limit]) -> bool:
-    """Return whether a share of the boxes of a problem that `divides` proves that no stiffness keeps some limits."""
+    """Return whether boxes prove that no stiffness keeps some limits of a problem that `divides`."""
     alone = replace(problem, objective=(), limits=tuple(limits))
-    return bool(limits) and any(found.bound == math.inf for found in divided_bounds(alone, math.inf, 0.0, (FEW,)))
+    return bool(limits) and any(divided.bound == math.inf for divided in divided_bounds(alone, math.inf, 0.0, (FEW,)))
 
 
 def conflict_of(problem: Problem) -> tuple[str, ...]:

@@ -24,33 +24,32 @@ from laufruhe.prove.mounts.convex_functions import (
 )
 from laufruhe.solvers.cones.conic import ATTEMPTS
 
-# duals of a matrix inequality prove no more than what they are good to
+# a bound by duals of a matrix inequality is as accurate as these
 SHARP = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
 
 
 def solve_cones(program: ConvexProgram) -> tuple[Array, ConvexDuals] | None:
-    """Stiffnesses and duals that Clarabel proposes; None where duals prove that the limits cannot be met together.
+    """Return stiffnesses and duals by Clarabel, or None if duals prove that the limits contradict each other.
 
-    Where it stops without an answer it is asked again with other settings, and then how near the limits
-    can be met: that has an answer always, which is a design or the proof that there is none. The middle of
-    the box is all that is left to propose where the solver loses its numbers there too.
+    If the solver fails with all settings, a program with the least violation of limits decides, which is always
+    feasible. If that fails too, the proposal is the middle of the box.
     """
-    stated = _Stated(program)
+    stated = _Program(program)
     if stated.solve():
         return stated.x, stated.duals
-    nearest = _Stated(replace(program, terms=()), relaxed=True)
+    nearest = _Program(replace(program, terms=()), relaxed=True)
     if not nearest.solve():
         return 0.5 * (program.lower + program.upper), ConvexDuals.none(program)
     return None if excludes(program, nearest.x, nearest.duals) else (nearest.x, ConvexDuals.none(program))
 
 
-class _Stated:
-    """A program in cvxpy, everything of size one.
+class _Program:
+    """A scaled program in cvxpy.
 
     Parameters
     ----------
     relaxed
-        Whether the limits may be missed by a share that is to be least.
+        Whether to minimise the relative violation of the limits.
     """
 
     def __init__(self, program: ConvexProgram, relaxed: bool = False) -> None:
@@ -66,7 +65,7 @@ class _Stated:
         self.matrix = 0.5 * (matrix + matrix.T)
         size = max((abs(term.value(middle)) for _, term in program.terms), default=1.0)
         self.size = size if np.isfinite(size) and size > 0.0 else 1.0
-        self.held: list[Any] = [self.y >= lower / self.scale, self.y <= upper / self.scale]
+        self._constraints: list[Any] = [self.y >= lower / self.scale, self.y <= upper / self.scale]
         tops, self._cones = [], []
         for weight, term in program.terms:
             top, cone = self._over(term)
@@ -74,34 +73,34 @@ class _Stated:
             self._cones.append(cone)
         missed = cp.Variable(nonneg=True) if relaxed else 0.0
         self._limits = [self._limited(each.function, each.maximum, missed) for each in program.limits]
-        self._least = cp.Problem(cp.Minimize(sum(tops) + missed if tops or relaxed else 0), self.held)
+        self._problem = cp.Problem(cp.Minimize(sum(tops) + missed if tops or relaxed else 0), self._constraints)
 
     def solve(self) -> bool:
-        """Whether the solver stands by its answer."""
+        """Solve with several settings, and return whether one succeeds."""
         for settings in (SHARP, *ATTEMPTS):
             with warnings.catch_warnings():
-                # an inaccurate answer is judged by its certificate, not by a warning
+                # the certificate shows how accurate a solution is
                 warnings.simplefilter("ignore")
                 with suppress(cp.error.SolverError):
-                    self._least.solve(solver=cp.CLARABEL, **settings)
-            if self._least.status == cp.OPTIMAL:
+                    self._problem.solve(solver=cp.CLARABEL, **settings)
+            if self._problem.status == cp.OPTIMAL:
                 return True
         return False
 
     @property
     def x(self) -> Array:
-        """Stiffnesses, within their bounds."""
+        """Stiffnesses within their bounds [N/m], shape (n,)."""
         return np.asarray(np.clip(np.asarray(self.y.value) * self.scale, self.program.lower, self.program.upper))
 
     @property
     def duals(self) -> ConvexDuals:
-        """Of the solution, in the units of the program."""
-        found = [_dual(constraint, factor, self.size) for constraint, factor in self._limits]
+        """Duals in the units of the program."""
+        limits = [_dual(constraint, factor, self.size) for constraint, factor in self._limits]
         vectors = tuple(_vector(cone) for cone in self._cones)
-        return ConvexDuals(vectors, tuple(price for price, _ in found), tuple(dual for _, dual in found))
+        return ConvexDuals(vectors, tuple(price for price, _ in limits), tuple(dual for _, dual in limits))
 
     def _over(self, function: ConvexFunction) -> tuple[Any, Any]:
-        """An expression that is the function at the optimum, and the cone whose dual proves it."""
+        """Return an expression of the function, and the cone whose dual vector it needs."""
         if isinstance(function, Linear):
             return function.constant + (function.gradient * self.scale) @ self.y, None
         if isinstance(function, Compliance):
@@ -111,33 +110,33 @@ class _Stated:
         raise TypeError(f"{type(function).__name__} is limited, not minimised")
 
     def _residual(self, axis: AxisResidual) -> tuple[Any, Any]:
-        """The length of its rows, counted in what the mounts answer at the middle; the square may be open."""
+        """Return the scaled residual and its cone; the squared frequency may be a variable."""
         answer = axis.answer(self.program.matrices.at(0.5 * (self.program.lower + self.program.upper)))
         unit = float(np.linalg.norm(answer)) or 1.0
         one = unit / float(np.linalg.norm(axis.mass))
         top, square = cp.Variable(), cp.Variable()
-        self.held.append(square >= axis.least / one)
+        self._constraints.append(square >= axis.least / one)
         if axis.most < np.inf:
-            self.held.append(square <= axis.most / one)
+            self._constraints.append(square <= axis.most / one)
         rows = (self.unit / unit) * (axis.left @ self.matrix @ axis.right) - square * (one / unit) * axis.mass
         cone = cp.SOC(top, rows)
-        self.held.append(cone)
+        self._constraints.append(cone)
         return unit * top, cone
 
     def _limited(self, function: ConvexFunction, maximum: float, missed: Any) -> tuple[Any, float]:
-        """The constraint, and what its dual is to be multiplied by."""
+        """Return the constraint, and the factor from its dual to the units of the program."""
         whole = abs(maximum) or 1.0
         if isinstance(function, Eigenvalue):
             room = (maximum + missed * whole) / self.unit
             constraint, factor = room * np.eye(6) - function.sign * self.matrix >> 0, 1.0 / self.unit
         else:
             constraint, factor = self._over(function)[0] / whole <= maximum / whole + missed, 1.0 / whole
-        self.held.append(constraint)
+        self._constraints.append(constraint)
         return constraint, factor
 
 
 def _dual(constraint: Any, factor: float, size: float) -> tuple[float, Array | None]:
-    """Price of a constraint in its own unit, and its dual matrix where it has one."""
+    """Return the price of a constraint in the unit of the program, and its dual matrix if it has one."""
     if constraint.dual_value is None:
         return 0.0, None
     array = np.asarray(constraint.dual_value, dtype=float)

@@ -1,4 +1,4 @@
-"""Mount stiffness to a proven optimum, where all that is asked is convex in it (E16-E19)."""
+"""Mount stiffness by convex programs, if objective and limits are convex in it (E16-E19)."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ CONVEX = (channels.SAG, channels.TORQUE_ROLL, channels.RAW_TORQUE_ROLL, channels
 
 
 def is_convex(problem: Problem) -> bool:
-    """Whether stiffness alone is open, and all that is asked is convex in it."""
+    """Return whether only stiffnesses are open, and objective and limits are convex in them."""
     if problem.load_terms or problem.load_limits or not problem.objective:
         return False
     if not all(decision.is_stiffness for decision in problem.decisions):
         return False
-    asked = all(term.measure.channel in CONVEX for term in problem.objective)
-    return asked and all(_convex_sides(limit) for limit in problem.limits)
+    terms = all(term.measure.channel in CONVEX for term in problem.objective)
+    return terms and all(_is_convex_limit(limit) for limit in problem.limits)
 
 
-def _convex_sides(limit: Limit) -> bool:
+def _is_convex_limit(limit: Limit) -> bool:
     channel = limit.measure.channel
     if channel is channels.FREQUENCIES:
         return limit.outside is None
@@ -61,22 +61,22 @@ def _convex_sides(limit: Limit) -> bool:
 
 
 def convex_program(problem: Problem) -> ConvexProgram:
-    """The functions of a problem that `is_convex`."""
+    """Return the convex program of a problem that `is_convex`."""
     decisions = problem.decisions
     lower, upper = sides_of(decisions)
     start = np.array([d.start_number for d in decisions])
-    given = mounting_in(problem.design(start.tolist()))
-    root = mass_root(given.block)
-    slopes = np.array([root @ _slope(given, decision) @ root.T for decision in decisions]).reshape(-1, 6, 6)
-    base = root @ given.stiffness @ root.T - np.tensordot(start, slopes, axes=1)
+    mounting = mounting_in(problem.design(start.tolist()))
+    root = mass_root(mounting.block)
+    slopes = np.array([root @ _slope(mounting, decision) @ root.T for decision in decisions]).reshape(-1, 6, 6)
+    base = root @ mounting.stiffness @ root.T - np.tensordot(start, slopes, axes=1)
     matrices = Matrices(base, slopes)
-    terms = tuple((term.weight, _function(term.measure, matrices, given, problem)) for term in problem.objective)
-    limits = [part for k, limit in enumerate(problem.limits) for part in _limits(limit, k, matrices, given, problem)]
+    terms = tuple((term.weight, _function(term.measure, matrices, mounting, problem)) for term in problem.objective)
+    limits = [part for k, limit in enumerate(problem.limits) for part in _limits(limit, k, matrices, mounting, problem)]
     return ConvexProgram(matrices, lower, upper, terms, tuple(limits))
 
 
 def _slope(mounting: ElasticMounting, decision: Decision) -> Array:
-    """dK of one decision: exact, for K is linear in it (E3)."""
+    """Return the exact derivative of K by one decision (E3), shape (6, 6)."""
     total, springs = np.zeros((6, 6)), every_spring(mounting.mounts)
     for drive in decision.mount_drives:
         place, spring = springs[drive.mount]
@@ -92,8 +92,8 @@ def _function(quantity: Measure, matrices: Matrices, mounting: ElasticMounting, 
     if quantity.channel.of_axis is not None:
         return Residual(matrices, quantity.channel.of_axis(mounting.block, quantity.frequency))
     gradient = np.array([sum(drive.gain for drive in d.mount_drives) for d in problem.decisions])
-    given = sum(sum(row[STIFFNESS]) for row in problem.mount_numbers)
-    return Linear(given - float(gradient @ [d.start_number for d in problem.decisions]), gradient)
+    start = sum(sum(row[STIFFNESS]) for row in problem.mount_numbers)
+    return Linear(start - float(gradient @ [d.start_number for d in problem.decisions]), gradient)
 
 
 def _limits(limit: Limit, k: int, matrices: Matrices, mounting: ElasticMounting, problem: Problem) -> list[ConvexLimit]:
@@ -113,21 +113,26 @@ def _limits(limit: Limit, k: int, matrices: Matrices, mounting: ElasticMounting,
 
 
 def solve_convex_mounts(problem: Problem) -> Result:
-    """Global optimum of a problem that `is_convex`, with a certificate from the exact model."""
+    """Return the global optimum of a problem that `is_convex`, with its certificate."""
     from laufruhe.solvers.mounts.cones import solve_cones
 
     started = time.perf_counter()
     program = convex_program(problem)
     initial = evaluate_start(problem)
     modelled = time.perf_counter()
-    found = solve_cones(program)
+    solution = solve_cones(program)
     solved = time.perf_counter()
     timing = {"model": modelled - started, "solve": solved - modelled}
-    if found is None:
-        return none_within(problem, initial, _conflict(program, problem), timing)
-    x, duals = found
+    if solution is None:
+
+        def excluded(kept: Sequence[Limit]) -> bool:
+            limits = tuple(limit for limit in program.limits if problem.limits[limit.source] in kept)
+            return solve_cones(replace(program, terms=(), limits=limits)) is None
+
+        return none_within(problem, initial, smallest_conflict(problem.limits, excluded), timing)
+    x, duals = solution
     bound, gradient = dual_bound(program, x, duals)
-    shown = Shown(
+    proof = Shown(
         bound=bound,
         reach=Reach.WHOLE,
         kkt_residual=_residual(program, x, duals, gradient),
@@ -140,11 +145,11 @@ def solve_convex_mounts(problem: Problem) -> Result:
         },
     )
     design = better(judged(problem, [float(v) for v in x]), given_design(problem, initial))
-    return concluded(design, initial, shown, {**timing, "evaluate": time.perf_counter() - solved})
+    return concluded(design, initial, proof, {**timing, "evaluate": time.perf_counter() - solved})
 
 
 def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> dict[Side, Price]:
-    """Fall of the objective per unit by which each side of a limit is relaxed, in the limit's own unit."""
+    """Return the fall of the objective per unit by which each side of a limit is relaxed."""
     prices: dict[Side, Price] = {}
     for limit, price in zip(program.limits, duals.prices, strict=True):
         source = problem.limits[limit.source]
@@ -157,25 +162,14 @@ def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> dic
 
 
 def _residual(program: ConvexProgram, x: Array, duals: ConvexDuals, gradient: Array) -> float:
-    """Largest violation of stationarity, feasibility and complementarity, each over its own scale."""
+    """Return the largest relative violation of stationarity, feasibility and complementarity."""
     width = np.where(program.upper > program.lower, program.upper - program.lower, 1.0)
     whole = abs(program.objective(x)) or 1.0
     moved = np.clip(x - gradient * width**2 / whole, program.lower, program.upper)
-    # how much the objective's linear model could still fall inside the box
-    still = float(np.abs(gradient * (moved - x)).max(initial=0.0)) / whole
-    violations = [still]
+    # possible decrease of the linear model inside the box
+    decrease = float(np.abs(gradient * (moved - x)).max(initial=0.0)) / whole
+    violations = [decrease]
     for limit, price in zip(program.limits, duals.prices, strict=True):
         room = limit.maximum - limit.function.value(x)
         violations += [max(-room, 0.0) / (abs(limit.maximum) or 1.0), abs(price * room) / whole]
     return max(violations)
-
-
-def _conflict(program: ConvexProgram, problem: Problem) -> tuple[str, ...]:
-    """Limits that no stiffness within the bounds meets together."""
-    from laufruhe.solvers.mounts.cones import solve_cones
-
-    def excluded(kept: Sequence[Limit]) -> bool:
-        limits = tuple(limit for limit in program.limits if problem.limits[limit.source] in kept)
-        return solve_cones(replace(program, terms=(), limits=limits)) is None
-
-    return smallest_conflict(problem.limits, excluded)

@@ -1,4 +1,4 @@
-"""Mounts, and unbalances with them, from many starts; the best judged by the exact model."""
+"""Mounts, and unbalances with them: multistart search, then bounds."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_unba
 from laufruhe.solvers.mounts.bounds import conflict_of, divided_by, excludes
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
 from laufruhe.solvers.mounts.places import Place, judged_at
-from laufruhe.solvers.mounts.search import Found, MountSearch
+from laufruhe.solvers.mounts.search import MountSearch, SearchResult
 from laufruhe.solvers.mounts.starts import looks, place_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.ipopt import run
@@ -40,32 +40,32 @@ from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, ends_i
 from laufruhe.solvers.smooth.program import SmoothProgram
 
 WORTH_SAYING = 1.01
-# points of operation looked at for starts from which on a search and its bounds take longer than workers to begin
+# operating points of all candidates from which on a search takes longer than the start of workers
 MANY_LOOKS = 256
 
 
 def solve_mounts(
     problem: Problem, workers: int | None = None, among: bool = False, near: Sequence[float] | None = None
 ) -> Result:
-    """Convex where all that is asked is, else from many starts, as `solve_joint` has them."""
+    """Solve a convex problem exactly, and any other by `solve_joint`."""
     return solve_convex_mounts(problem) if is_convex(problem) else solve_joint(problem, workers, among, near)
 
 
 def solve_joint(
     problem: Problem, workers: int | None = None, among: bool = False, near: Sequence[float] | None = None
 ) -> Result:
-    """The best local optimum that many starts find (E20-E24).
+    """Return the best local optimum of a multistart search, with a lower bound (E20-E24).
 
     Parameters
     ----------
     problem
-        On elastic mounts; `search.starts` points are started from at the most.
+        Problem on elastic mounts.
     workers
-        Processes; as many as processors when left out.
+        Processes; as many as processors by default.
     among
-        Whether it is one of several, whose bounds come once the best of all is known.
+        Whether the problem is one of several, which are bounded when the best of all is known.
     near
-        Mounts that are good for another of them, to start from first.
+        Numbers of the mounts of the first start.
 
     Raises
     ------
@@ -76,19 +76,19 @@ def solve_joint(
 
 
 def solve_moved(problem: Problem, moves: ThrowMoves, even: Result | None) -> tuple[Result, Candidate]:
-    """As `solve_joint`, with throws that may leave the star of the problem; and where they were moved to (E36).
+    """Solve a problem whose throws may leave their star, and return the new throws (E36).
 
     Parameters
     ----------
     problem
-        Of the star.
+        Problem of the star.
     moves
-        What may move.
+        Throws that may move.
     even
-        Result of the star itself, to start from first.
+        Result of the star itself, the first start.
     """
     first = place_of(problem, even) if even is not None and even.decisions else None
-    # throws that move are in no bound of mounts alone
+    # bounds of mounts alone do not hold for moved throws
     result, turns = _solved(problem, None, moves, first, True)
     return result, moves.candidate(turns)
 
@@ -100,7 +100,7 @@ def _solved(
     first: Place | None,
     among: bool,
 ) -> tuple[Result, Array]:
-    """Result, and deviations of the throws."""
+    """Return the result, and deviations of the throws [rad]."""
     started = time.perf_counter()
     initial = evaluate_start(problem)
     worth = looks(problem) >= MANY_LOOKS and workers != 1 and not among
@@ -109,17 +109,17 @@ def _solved(
         modelled = time.perf_counter()
         search.run()
         with speculation(_balance, math.inf) as ahead:
-            # beside the bounds, which may still find a better design
+            # decide the unbalances anew while provers bound, which may still find a better design
             ahead.prefetch((each.design.values, _share(each.design)) for each in [search.chosen] if each is not None)
             divided = divided_by(problem, search, among)
-            found = search.chosen
+            best = search.chosen
             timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
-            if found is None or found.design.excess > KEPT:
+            if best is None or best.design.excess > KEPT:
                 return _none(problem, search, initial, divided, timing), search.turns
-            balance = ahead.result(found.design.values, _share(found.design))
-    proven = None if balance is None else _rebalanced(found.design, *balance)
-    design = found.design if proven is None or proven[0].value >= found.design.value else proven[0]
-    return _result(search, initial, replace(found, design=design), proven, divided, timing, among), search.turns
+            balance = ahead.result(best.design.values, _share(best.design))
+    proven = None if balance is None else _rebalanced(best.design, *balance)
+    design = best.design if proven is None or proven[0].value >= best.design.value else proven[0]
+    return _result(search, initial, replace(best, design=design), proven, divided, timing, among), search.turns
 
 
 def _mounts(design: Design) -> list[float]:
@@ -132,29 +132,30 @@ def _share(design: Design) -> tuple[Problem, Sequence[float]]:
 
 
 def _balance(share: tuple[Problem, Sequence[float]]) -> tuple[list[complex], float] | None:
-    """Unbalances decided anew on mounts found, and the gap that is proven; None where that is not convex."""
+    """Return the best unbalances on fixed mounts and their proven gap, or None if that is not convex."""
     problem, mounts = share
     if not problem.unbalances or not problem.load_terms or problem.mount_terms or passed():
         return None
     if any(limit.measure.unit == "" for limit in problem.mount_limits):
         # transmissibility depends on what excites
         return None
-    held = problem.design(mounts, problem.mount_decisions)
-    result = solve_unbalances(replace(problem, engine=held).balance)
+    engine = problem.design(mounts, problem.mount_decisions)
+    result = solve_unbalances(replace(problem, engine=engine).balance)
     if result.certificate is None or result.status is not Status.OPTIMAL:
         return None
     return unbalances_of(problem, result), result.certificate.gap
 
 
 def _rebalanced(design: Design, unbalances: Sequence[complex], gap: float) -> tuple[Design, float] | None:
-    """A design with other unbalances; None where these break a limit."""
-    given, own = iter(_mounts(design)), iter(unbalances)
-    again = judged_at(design.problem, [next(own) if d.is_affine else next(given) for d in design.problem.decisions])
+    """Return a design with other unbalances, or None if these violate a limit."""
+    mounts, columns = iter(_mounts(design)), iter(unbalances)
+    values = [next(columns) if d.is_affine else next(mounts) for d in design.problem.decisions]
+    again = judged_at(design.problem, values)
     return None if again is None or again.excess > KEPT else (again, gap)
 
 
 def _convex_part(problem: Problem) -> Problem | None:
-    """The problem without all that is not convex in the stiffnesses; None where more than these is open."""
+    """Return the part of a problem that is convex in its stiffnesses, or None if other numbers of mounts are open."""
     decisions = problem.mount_decisions
     if not decisions or not all(decision.is_stiffness for decision in decisions):
         return None
@@ -165,7 +166,7 @@ def _convex_part(problem: Problem) -> Problem | None:
 
 
 def _proven_conflict(problem: Problem) -> tuple[str, ...]:
-    """Limits that cannot be met together, where what mounts do not touch or what is convex in them proves it."""
+    """Return limits that contradict each other by convex programs, or by boxes of stiffness without unbalances."""
     conflict = conflict_on_any_mounts(problem)
     if conflict:
         return conflict
@@ -173,74 +174,78 @@ def _proven_conflict(problem: Problem) -> tuple[str, ...]:
     conflict = () if convex is None else solve_convex_mounts(convex).conflict
     if conflict or not problem.unbalances:
         return conflict
-    # what no load is in is the same for all unbalances
+    # numbers without loads are the same for all unbalances
     limits = tuple(limit for limit in problem.mount_limits if not limit.measure.channel.of_loads)
     alone = replace(problem, decisions=problem.mount_decisions, objective=(), limits=limits)
     return conflict_of(alone) if divides(alone) and excludes(alone, limits) else ()
 
 
 def mounts_bound(problem: Problem, near: Sequence[Value] = ()) -> float:
-    """What no design goes under: each kind of terms alone, for none is under zero.
+    """Return a lower bound by the sum of bounds of each kind of terms, none of which is negative [SI].
 
-    Numbers of the mounts by what of them is convex (E16-E19), loads of the block and masses by the unbalances alone,
-    whatever the mounts (P4); beside these, forces and travel of the mounts by all provers, near a design that is
-    given.
+    Convex programs bound numbers of the mounts (E16-E19). Cone programs of the unbalances bound loads of the block
+    and masses (P4). Provers bound forces and travel of the mounts if other terms are in the objective too.
+
+    Parameters
+    ----------
+    near
+        Values of the decisions of a good design.
     """
-    problem, found, parts = named_part(problem), 0.0, []
-    felt, block = (
-        tuple(term for term in problem.load_terms if term.measure.on_mounts == on_mounts) for on_mounts in (True, False)
+    problem, total, parts = named_part(problem), 0.0, []
+    on_mounts, block = (
+        tuple(term for term in problem.load_terms if term.measure.on_mounts == kind) for kind in (True, False)
     )
-    if near and felt and (block or problem.mount_terms):
-        alone = replace(problem, objective=felt)
+    if near and on_mounts and (block or problem.mount_terms):
+        alone = replace(problem, objective=on_mounts)
         evaluation = evaluate(alone, alone.design(list(near)))
         value = objective_value(alone, evaluation)
-        found += proven(Question(alone, value, room_of(value, alone.tolerance, numerical_zero(alone)), near)).bound
+        total += proven(Question(alone, value, room_of(value, alone.tolerance, numerical_zero(alone)), near)).bound
     if block:
         limits = tuple(limit for limit in problem.load_limits if not limit.measure.on_mounts)
         alone = replace(off_resonance(problem).balance, objective=block, limits=limits)
         if alone.decisions:
             parts.append(solve_unbalances(alone))
         else:
-            found += objective_value(alone, evaluate(alone))
+            total += objective_value(alone, evaluate(alone))
     convex = _convex_part(problem)
     if convex is not None and set(convex.objective) <= set(problem.objective):
         parts.append(solve_convex_mounts(convex))
-    return found + sum(part.certificate.lower_bound for part in parts if part.certificate is not None)
+    return total + sum(part.certificate.lower_bound for part in parts if part.certificate is not None)
 
 
 def _result(
     search: MountSearch,
     initial: Evaluation,
-    found: Found,
+    best: SearchResult,
     proven: tuple[Design, float] | None,
     divided: Divided,
     timing: dict[str, float],
     among: bool,
 ) -> Result:
-    problem, design, optimum = search.problem, found.design, found.optimum
+    problem, design, optimum = search.problem, best.design, best.optimum
     nothing = numerical_zero(problem, design.evaluation.engine)
     bound = divided.bound
-    # throws that move are not in the bound
+    # the bound does not hold for moved throws
     if search.moves is None and problem.search.proves and gap_of(design.value, bound, nothing) > problem.tolerance:
         bound = max(bound, mounts_bound(problem, () if among else design.values))
-    shown = Shown(
+    proof = Shown(
         bound=bound,
         reach=Reach.NEAR if divided.boxes else Reach.ASIDE,
         kkt_residual=optimum.kkt_residual if optimum is not None else math.inf,
         method=_method(search.optima, max(design.value, nothing), proven, divided),
-        prices=found.joint.prices(optimum) if optimum is not None else {},
+        prices=best.joint.prices(optimum) if optimum is not None else {},
     )
     if search.moves is not None:
-        # its throws are open, and move what is limited
+        # prices of limits depend on the open throws
         design = replace(design, problem=replace(design.problem, phasing=search.moves.phasing))
-    return concluded(design, initial, shown, timing)
+    return concluded(design, initial, proof, timing)
 
 
 def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, float] | None, divided: Divided) -> str:
-    apart = distinct(optima, scale)
-    text = ends_in_words(optima, len(apart))
-    if len(apart) > 1 and apart[-1].value > WORTH_SAYING * apart[0].value > 0.0:
-        text += f", up to {apart[-1].value / apart[0].value:.3g} times the best"
+    different = distinct(optima, scale)
+    text = ends_in_words(optima, len(different))
+    if len(different) > 1 and different[-1].value > WORTH_SAYING * different[0].value > 0.0:
+        text += f", up to {different[-1].value / different[0].value:.3g} times the best"
     if proven is not None:
         text += f"; balance on these mounts proven within {proven[1]:.0e}"
     if divided.boxes:
@@ -251,7 +256,7 @@ def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, 
 def _none(
     problem: Problem, search: MountSearch, initial: Evaluation, divided: Divided, timing: dict[str, float]
 ) -> Result:
-    """No start ended at a design within the limits: a proof where the convex limits, or all boxes, tell of none."""
+    """Return a result without a design, with the limits that contradict each other if that is proven."""
     conflict = _proven_conflict(problem)
     if not conflict and divided.bound == math.inf:
         conflict = conflict_of(problem)
@@ -259,7 +264,7 @@ def _none(
     if conflict:
         return result
     nearest = min(search.optima, key=lambda o: o.violation)
-    names = _broken(search.joint, nearest)
+    names = _violated_limits(search.joint, nearest)
     message = (
         f"no design found: from {sum(o.starts for o in search.optima)} starts none meets {names or 'the limits'} "
         f"(nearest misses by {nearest.violation:.3g} of a limit); relax it, or open more"
@@ -269,7 +274,7 @@ def _none(
     return replace(result, status=Status.FAILED, message=message, nearest=near)
 
 
-def _broken(joint: SmoothProgram, optimum: LocalOptimum) -> str:
+def _violated_limits(joint: SmoothProgram, optimum: LocalOptimum) -> str:
     program = joint.program
     g = optimum.constraints
     if len(g) != len(program.constraint_names):

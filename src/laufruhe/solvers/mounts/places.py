@@ -1,4 +1,4 @@
-"""Designs at places of a search of mounts, by the exact model."""
+"""Designs at points of a search of mounts, evaluated by the exact model."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import Design, judged
 
 Place: TypeAlias = tuple[list[float], Array | None]
-"""Mounts, and columns of the unbalances."""
+"""Numbers of the mounts, and columns of the unbalances or None."""
 
 
 def judged_at(problem: Problem, values: Sequence[Value]) -> Design | None:
-    """A design by the exact model; none on a resonance that nothing damps."""
+    """Return a design by the exact model, or None on an undamped resonance."""
     try:
         return judged(problem, values)
     except ModelError:
@@ -25,7 +25,7 @@ def judged_at(problem: Problem, values: Sequence[Value]) -> Design | None:
 
 
 def started_at(problem: Problem, place: tuple[list[float], Array]) -> Design | None:
-    """The design that a start is."""
-    mounts, columns = place
-    own, sizes = iter(mounts), iter(d.complex_value(columns) for d in domains_of(problem.unbalances))
-    return judged_at(problem, [next(sizes) if d.is_affine else next(own) for d in problem.decisions])
+    """Return the design at mounts and columns of unbalances, or None on an undamped resonance."""
+    mounts, columns = iter(place[0]), place[1]
+    unbalances = iter(domain.complex_value(columns) for domain in domains_of(problem.unbalances))
+    return judged_at(problem, [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions])

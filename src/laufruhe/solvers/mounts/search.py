@@ -1,4 +1,4 @@
-"""A search for mounts, and unbalances and throws with them: from many starts, every end judged by the exact model."""
+"""Multistart search of mounts, with unbalances and throws; the exact model evaluates every end."""
 
 from __future__ import annotations
 
@@ -27,36 +27,36 @@ from laufruhe.solvers.smooth.nonlinear import Enough, solve_nonlinear, try_all
 from laufruhe.solvers.smooth.program import SmoothProgram
 
 SLACK = 1e-5
-# share by which two designs are worth the same
+# relative difference by which two designs have the same value
 SAME = 1e-6
 MOST_MARGINS = 6
-# excess over a limit that is more than a peak between the samples
+# violation of a limit that a peak between samples may cause
 NEAR = 0.05
 ITERATIONS = 100
 MOST_AROUND = 3
-# ends of a search from which simulations are followed exactly
+# ends of a search that are refined with exact simulations
 MOST_REFINED = 1
-# of a search whose every step takes a simulation
+# iterations of a search that simulates in every step
 SIMULATED_ITERATIONS = 60
-# share of the size that a search counted in from which it is done again in a smaller one, and how often
+# share of the objective unit below which a search is repeated in a smaller unit, and number of such repetitions
 SMALL = 1e-2
 MOST_SIZES = 3
 SPREAD = 0.4
-# starts at which limits are looked at, share of a limit that has to be left there, and within which it is felt
-LOOKED = 6
-ROOM, FELT = 0.5, 0.05
-# of the throws that a search starts from, about their star [rad]
+# starts at which limits are checked; relative distance to a limit that leaves it out, and that puts it back
+CHECKED_STARTS = 6
+ROOM, CLOSE = 0.5, 0.05
+# deviation of start throws from their star [rad]
 NUDGE = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    """A design, and the end of the search that it stands at; none where it was only looked at.
+class SearchResult:
+    """A design with the local optimum that it comes from; without one if it was only evaluated.
 
     Attributes
     ----------
     joint
-        The program that the end is of.
+        Program of the local optimum.
     """
 
     design: Design
@@ -65,35 +65,36 @@ class Found:
 
     @property
     def rank(self) -> tuple[float, float]:
-        """By what breaks limits least, then by what is least."""
+        """Sort key: violation of limits, then objective."""
         return max(self.design.excess, SLACK), self.design.value
 
 
 class MountSearch:
-    """What was found so far.
+    """Multistart search of open mounts.
 
     Parameters
     ----------
     problem
-        With one star and one firing order.
+        Problem with one crank star and one firing order.
     initial
-        The design as given, which is looked at as well.
+        Evaluation of the baseline design, which competes with the results.
     workers
-        Processes; as many as processors when left out.
+        Processes; as many as processors by default.
     moves
         Throws that may leave the star of the problem.
     first
-        Mounts and columns to start from before all others, in place of those given or `beside` them; without columns
-        the unbalances are those that are best on the mounts as given.
+        First start: mounts and columns of unbalances, or None for those that are best on the baseline mounts.
+    beside
+        Whether the baseline is a start too when `first` is given.
     coarser
-        Times as long as those of the last word steps of simulations are.
+        Length of time steps of simulations, as a multiple of that of the final evaluation.
 
     Attributes
     ----------
     best
-        None where no end of the search has loads.
+        Best result so far; None if no end has loads.
     optima
-        Where all starts ended.
+        Local optima of all starts.
     """
 
     def __init__(
@@ -105,124 +106,129 @@ class MountSearch:
         self._points, self._size = start_points(problem)
         if first is not None:
             mounts, columns = first
-            own = self._points[0][1] if columns is None else columns
-            self._points = [(mounts, own), *self._points[0 if beside else 1 :]]
-        self._left_out = self._kept_anyway()
+            columns = self._points[0][1] if columns is None else columns
+            self._points = [(mounts, columns), *self._points[0 if beside else 1 :]]
+        self._ignored = self._limits_with_room()
         report_progress("smooth program of all that is open")
         self.joint = self._program()
-        self._given = given_design(problem, initial) if moves is None else None
-        self.best: Found | None = None
-        self._near: list[Found] = []
-        self._felt: set[Limit] = set()
+        self._baseline = given_design(problem, initial) if moves is None else None
+        self.best: SearchResult | None = None
+        self._nearly_feasible: list[SearchResult] = []
+        self._active_again: set[Limit] = set()
         self.optima: tuple[LocalOptimum, ...] = ()
 
     def run(self) -> None:
-        """From all starts, and again in a smaller size where that of the starts hid what was found.
+        """Search from all starts, and again in a smaller objective unit if the first one hides the optimum.
 
-        Where time is over already, the first start is the design if it is one.
+        If the time budget is over, the first start is the result if it is feasible.
         """
         start = started_at(self.problem, self._points[0]) if passed() and self.moves is None else None
         if start is not None and start.excess <= SLACK:
-            self._keep(Found(start, self.joint))
+            self._keep_best(SearchResult(start, self.joint))
             return
         nothing = numerical_zero(self.problem)
-        self._under_what_is_felt(lambda: self._search(self._points))
+        self._repeat_with_active_limits(lambda: self._search(self._points))
         for _ in rounds(MOST_SIZES):
             if self.best is None or self.best.design.value >= SMALL * self._size or self._size <= nothing:
                 break
-            # a search ends at a share of the size that it counts in
+            # the solver's tolerance is relative to the unit of the objective
             self._size = max(self.best.design.value, nothing)
             self.joint = self._program()
-            self._search([_point(self.best), *self._points[1:]])
+            self._search([_start_of(self.best), *self._points[1:]])
         self._tighten()
 
     def refined(self) -> None:
-        """Once more from the best ends, with simulations in the steps of the last word."""
+        """Repeat the search from the best ends, with the time steps of the final evaluation."""
         ends = distinct(self.optima, max(abs(self.best.design.value) if self.best else 0.0, 1e-12), 1e-3)
         ends = ends or tuple(sorted(self.optima, key=lambda optimum: optimum.violation)[:1])
-        places = [_parted(self.joint, optimum.x) for optimum in ends[:MOST_REFINED]]
+        places = [_split(self.joint, optimum.x) for optimum in ends[:MOST_REFINED]]
         if self.best is not None and self.best.optimum not in ends[:MOST_REFINED]:
-            places.append(_point(self.best))
+            places.append(_start_of(self.best))
         self._coarser = 1
         self.joint = self._program()
-        starts = [self.joint.start(*place) for place in places]
-        self._take(self._ends(starts))
+        self._take(self._solve([self.joint.start(*place) for place in places]))
         self._tighten()
 
     def again(self, places: Sequence[Place]) -> bool:
-        """From other mounts, where no unbalances are told with those found; whether a better design came of it.
+        """Search from other mounts; return whether the best design improved.
 
-        The places themselves are judged too, where they are whole designs: a search may leave a good start.
+        Starts without columns have the unbalances of the best design. Complete starts are candidates themselves.
         """
         before = self.best
-        columns = self._points[0][1] if before is None or before.optimum is None else _point(before)[1]
-        starts = [(mounts, columns if own is None else own) for mounts, own in places]
-        for place, (_, own) in zip(starts, places, strict=True):
-            alone = None if self.problem.unbalances and own is None else started_at(self.problem, place)
-            # what passes a limit by a rounding is no better for it
-            if alone is not None and alone.excess <= 0.0:
-                self._keep(Found(alone, self.joint))
-        self._under_what_is_felt(lambda: self._take(self._ends([self.joint.start(*start) for start in starts])))
+        default = self._points[0][1] if before is None or before.optimum is None else _start_of(before)[1]
+        starts = []
+        for mounts, columns in places:
+            starts.append((mounts, default if columns is None else columns))
+            if columns is not None or not self.problem.unbalances:
+                start = started_at(self.problem, starts[-1])
+                # a rounding over a limit is no improvement
+                if start is not None and start.excess <= 0.0:
+                    self._keep_best(SearchResult(start, self.joint))
+        self._repeat_with_active_limits(lambda: self._take(self._solve([self.joint.start(*start) for start in starts])))
         self._tighten()
         return self.best is not None and (before is None or self.best.rank < before.rank)
 
     @property
-    def chosen(self) -> Found | None:
-        """The best of all, the design as given included; it has the prices of an end that is worth the same."""
-        best, given = self.best, self._given
-        if given is None or (best is not None and best.rank <= Found(given, self.joint).rank):
+    def chosen(self) -> SearchResult | None:
+        """The best of the results and the baseline; an equally good end lends the baseline its prices."""
+        best, baseline = self.best, self._baseline
+        if baseline is None or (best is not None and best.rank <= SearchResult(baseline, self.joint).rank):
             return best
-        same = best is not None and best.rank[1] <= given.value * (1.0 + SAME) and best.design.excess <= SLACK
-        return Found(given, self.joint, best.optimum if best is not None and same else None)
+        same = best is not None and best.rank[1] <= baseline.value * (1.0 + SAME) and best.design.excess <= SLACK
+        return SearchResult(baseline, self.joint, best.optimum if best is not None and same else None)
 
     @property
     def turns(self) -> Array:
-        """Deviations of the throws of the best design."""
+        """Deviations of the throws of the best design from their star [rad]."""
         optimum = self.best.optimum if self.best is not None else None
         return self.joint.turns(np.zeros(self.joint.program.x.numel()) if optimum is None else optimum.x)
 
+    @property
+    def _is_feasible(self) -> bool:
+        return self.best is not None and self.best.design.excess <= SLACK
+
     def _search(self, points: Sequence[tuple[list[float], Array]]) -> None:
-        """From the points, and from others drawn around the best ends."""
+        """Search from points, then from random points around the best ends."""
         problem, joint = self.problem, self.joint
         generator = np.random.default_rng(problem.search.seed)
         starts = [
             joint.start(mounts, columns, self._nudged(generator, k)) for k, (mounts, columns) in enumerate(points)
         ]
-        optima = self._ends(starts, self._is_explored)
+        optima = self._solve(starts, self._is_explored)
         around = distinct(optima, max(abs(optima[0].value), 1e-12), 1e-3)[:MOST_AROUND]
         if around and len(points) > 1 and not self._is_explored(optima) and not passed():
-            decisions = problem.mount_decisions
-            low, high = sides_of(decisions)
-            again = []
+            low, high = sides_of(problem.mount_decisions)
+            starts = []
             for k in range(max(len(points) // 2, 1)):
                 x = around[k % len(around)].x
-                found, columns = _decided(joint, x)
-                mounts = found + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(found))
-                again.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.turns(x)))
-            more = self._ends(again, try_all, len(points))
+                centre, columns = _split(joint, x)
+                mounts = centre + SPREAD * generator.normal(size=len(low)) * np.minimum(high - low, np.abs(centre))
+                starts.append(joint.start(np.clip(mounts, low, high).tolist(), columns, joint.turns(x)))
+            more = self._solve(starts, try_all, len(points))
             optima = (*optima, *(replace(optimum, start=optimum.start + len(points)) for optimum in more))
         self._take(optima)
 
     def _program(self, margin: float = 0.0) -> SmoothProgram:
-        limits = tuple(limit for limit in self.problem.limits if limit not in self._left_out)
-        asked = self.problem if not self._left_out else replace(self.problem, limits=limits)
-        return SmoothProgram(asked, self._size, margin, self.moves, coarser=self._coarser)
+        limits = tuple(limit for limit in self.problem.limits if limit not in self._ignored)
+        problem = self.problem if not self._ignored else replace(self.problem, limits=limits)
+        return SmoothProgram(problem, self._size, margin, self.moves, coarser=self._coarser)
 
-    def _kept_anyway(self) -> set[Limit]:
-        """Limits on loads that are kept where the search starts, with room to spare: each is hundreds of rows."""
+    def _limits_with_room(self) -> set[Limit]:
+        """Return limits on loads that all starts keep by far; each would add hundreds of rows to the program."""
         if self.moves is not None:
             return set()
         limits = [x for x in self.problem.load_limits if not x.measure.is_mass and not x.measure.channel.simulation]
-        for place in self._points[:LOOKED] if limits else ():
+        for place in self._points[:CHECKED_STARTS] if limits else ():
             design = started_at(self.problem, place)
             limits = [x for x in limits if design is not None and design.evaluation.standing(x).excess < -ROOM]
         return set(limits)
 
-    def _under_what_is_felt(self, search: Callable[[], None]) -> None:
-        """A search, and again under the limits that were left out where its best ends come near them."""
+    def _repeat_with_active_limits(self, search: Callable[[], None]) -> None:
+        """Search, and repeat with ignored limits that the best ends come close to."""
         search()
-        while self._felt and not (passed() and self.best is not None and self.best.design.excess <= SLACK):
-            self._left_out, self._felt, self.optima, self._near = self._left_out - self._felt, set(), (), []
+        while self._active_again and not (passed() and self._is_feasible):
+            self._ignored = self._ignored - self._active_again
+            self._active_again, self.optima, self._nearly_feasible = set(), (), []
             self.joint = self._program()
             search()
 
@@ -230,72 +236,75 @@ class MountSearch:
     def _iterations(self) -> int:
         return ITERATIONS if self.joint.program.told is None else SIMULATED_ITERATIONS
 
-    def _ends(self, starts: Sequence[Array], enough: Enough | None = None, known: int = 0) -> tuple[LocalOptimum, ...]:
-        """Where starts of the program lead to, which has had so many before."""
+    def _solve(self, starts: Sequence[Array], enough: Enough | None = None, known: int = 0) -> tuple[LocalOptimum, ...]:
         return solve_nonlinear(self.joint.program, starts, self._workers, self._iterations, enough=enough, known=known)
 
     def _is_explored(self, optima: Sequence[LocalOptimum]) -> bool:
         return is_explored(optima, max(abs(min(o.value for o in optima)), 1e-12))
 
     def _take(self, optima: Sequence[LocalOptimum]) -> None:
-        """Judge where starts ended; whatever the solver says of an end, the exact model tells."""
+        """Evaluate local optima by the exact model, whatever the solver reports of them."""
         self.optima += tuple(optima)
         designs: list[Design] = []
         for k, optimum in enumerate(optima):
-            kept = self.best is not None and self.best.design.excess <= SLACK
-            report_progress(
-                "ends judged", k, len(optima), self.best.design.value if self.best is not None and kept else np.inf
-            )
-            design = self._judged(optimum, self.joint)
+            best = self.best.design.value if self.best is not None and self._is_feasible else np.inf
+            report_progress("ends judged", k, len(optima), best)
+            design = self._evaluated(optimum, self.joint)
             if design is not None:
                 designs.append(design)
-                found = Found(design, self.joint, optimum)
-                self._keep(found)
+                result = SearchResult(design, self.joint, optimum)
+                self._keep_best(result)
                 if FEASIBLE < design.excess <= NEAR:
-                    self._near.append(found)
-        self._felt = {limit for limit in self._left_out if any(self._feels(design, limit) for design in designs)}
+                    self._nearly_feasible.append(result)
+        self._active_again = {
+            limit for limit in self._ignored if any(self._comes_close(design, limit) for design in designs)
+        }
 
-    def _feels(self, design: Design, limit: Limit) -> bool:
-        """Whether a design that is as good as the best but for what was left out is near a limit, or over it."""
-        best = self.best
-        if best is not None and best.design.excess <= SLACK and design.value > best.design.value:
+    def _comes_close(self, design: Design, limit: Limit) -> bool:
+        """Return whether a design that competes with the best one comes close to an ignored limit."""
+        if self.best is not None and self._is_feasible and design.value > self.best.design.value:
             return False
-        held = [other for other in self.problem.limits if other not in self._left_out]
-        return design.evaluation.standing(limit).excess > -FELT and design.evaluation.excess(held) <= NEAR
+        limits = [other for other in self.problem.limits if other not in self._ignored]
+        return design.evaluation.standing(limit).excess > -CLOSE and design.evaluation.excess(limits) <= NEAR
 
-    def _keep(self, found: Found) -> None:
-        if self.best is None or found.rank < self.best.rank:
-            self.best = found
+    def _keep_best(self, result: SearchResult) -> None:
+        if self.best is None or result.rank < self.best.rank:
+            self.best = result
 
-    def _judged(self, optimum: LocalOptimum, joint: SmoothProgram) -> Design | None:
+    def _evaluated(self, optimum: LocalOptimum, joint: SmoothProgram) -> Design | None:
         if not np.all(np.isfinite(optimum.x)):
             return None
         mounts, unbalances = (iter(part) for part in joint.split(optimum.x))
         try:
             problem = self.problem if self.moves is None else joint.designed(optimum.x)
         except ModelError:
-            # throws where a search was left may not fire in their order
+            # throws at an end that is no optimum may not fire in their order
             return None
         values: list[Value] = [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions]
         return judged_at(problem, values)
 
     def _nudged(self, generator: np.random.Generator, k: int) -> Array:
-        """Throws to start from: on their star first, then beside it, for its own mirror image may be a saddle."""
+        """Return start throws: first the star itself, then random ones, since a symmetric star may be a saddle."""
         if self.moves is None or k == 0:
             return self.joint.turns(np.zeros(self.joint.program.x.numel()))
         nudge = NUDGE * generator.normal(size=self.moves.size)
         return np.clip(nudge, self.moves.lower, self.moves.upper)
 
     def _tighten(self) -> None:
-        """Again with limits a little tighter, from ends that promise more: a peak between the samples breaks them."""
-        worth = sorted(self._near, key=lambda found: found.design.value)
-        self._near = []
-        for near in [found for k, found in enumerate(worth) if k == 0 or _is_other(found, worth[k - 1])][:MOST_AROUND]:
+        """Search with tighter limits from promising ends that a peak between samples makes infeasible."""
+        by_value = sorted(self._nearly_feasible, key=lambda result: result.design.value)
+        self._nearly_feasible = []
+        values = [result.design.value for result in by_value]
+        different = [
+            result for k, result in enumerate(by_value)
+            if k == 0 or abs(values[k] - values[k - 1]) > 1e-3 * abs(values[k - 1])
+        ]  # fmt: skip
+        for near in different[:MOST_AROUND]:
             best = self.best
             if best is None or best.design.excess > FEASIBLE or near.design.value < best.design.value:
-                self._tightened(near)
+                self._search_with_margin(near)
 
-    def _tightened(self, near: Found) -> None:
+    def _search_with_margin(self, near: SearchResult) -> None:
         margin = 0.0
         for _ in rounds(MOST_MARGINS):
             if near.optimum is None or not FEASIBLE < near.design.excess <= NEAR:
@@ -303,29 +312,19 @@ class MountSearch:
             margin += 1.001 * near.design.excess
             joint = self._program(margin)
             ends = solve_nonlinear(joint.program, [near.optimum.x], 1, self._iterations)
-            design = self._judged(ends[0], joint) if ends else None
+            design = self._evaluated(ends[0], joint) if ends else None
             if design is None:
                 break
-            near = Found(design, joint, ends[0])
-            self._keep(near)
+            near = SearchResult(design, joint, ends[0])
+            self._keep_best(near)
 
 
-def _is_other(found: Found, other: Found) -> bool:
-    return abs(found.design.value - other.design.value) > 1e-3 * abs(other.design.value)
-
-
-def _decided(joint: SmoothProgram, x: Array) -> tuple[Array, Array]:
-    """Mounts and columns of the unbalances."""
+def _split(joint: SmoothProgram, x: Array) -> tuple[list[float], Array]:
+    """Return mounts and columns of unbalances of a point of a program."""
     mounts, _ = joint.split(x)
-    return np.array(mounts), x[len(mounts) : len(mounts) + joint.columns]
+    return list(mounts), x[len(mounts) : len(mounts) + joint.columns]
 
 
-def _parted(joint: SmoothProgram, x: Array) -> tuple[list[float], Array]:
-    mounts, columns = _decided(joint, x)
-    return mounts.tolist(), columns
-
-
-def _point(found: Found) -> tuple[list[float], Array]:
-    """Mounts and columns that an end of a search stands at."""
-    assert found.optimum is not None
-    return _parted(found.joint, found.optimum.x)
+def _start_of(result: SearchResult) -> tuple[list[float], Array]:
+    assert result.optimum is not None
+    return _split(result.joint, result.optimum.x)

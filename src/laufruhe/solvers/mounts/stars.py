@@ -1,12 +1,10 @@
-"""Stars decided together with mounts and balance (E35).
+"""Crank stars together with mounts and unbalances (E35).
 
-Even stars are finitely many. On the mounts as given each one's balance is a cone
-program, whose dual rows bound every other star (S14): that ranks them. The best of the
-ranking then have mounts and balance decided together, each as a problem of its own. The
-ranking chooses what is looked at and proves nothing of the joint problem, so the result
-says how many stars were left out. Where firing may be uneven, throws then leave the
-best of these stars, as further variables of the same smooth program (E36). Throws between
-bounds have a bound with mounts and balance: boxes of all of them (E72).
+Even stars are finitely many. On the baseline mounts a cone program balances each star, and its dual rows bound every
+other star (S14). This ranks the stars. The best of them are solved with open mounts and unbalances, one by one. The
+ranking proves nothing of the joint problem, so the result says how many stars were not solved. If firing may be
+uneven, throws then leave the best stars as variables of the same smooth program (E36). Boxes of throws, mounts and
+unbalances bound problems with throws between bounds (E72).
 """
 
 from __future__ import annotations
@@ -24,13 +22,13 @@ from laufruhe.numerics.norms import RMS
 from laufruhe.numerics.progress import report_progress, within
 from laufruhe.numerics.workers import executor_for, ordered_map, working_on
 from laufruhe.problem import channels
-from laufruhe.problem.evaluation import Evaluation, evaluate, with_default_sampling
+from laufruhe.problem.evaluation import Evaluation, with_default_sampling, evaluate
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.prove.best_first import Divided
-from laufruhe.prove.certificate import Certificate, Proof, Reach, certified, room_of
+from laufruhe.prove.certificate import Proof, Reach, certified, room_of
 from laufruhe.prove.mounts.provers import Question, proven
 from laufruhe.solvers.conclusion import contradiction, judged, known_of, result_under, values_of
 from laufruhe.solvers.mounts.bounds import bounded_under, mount_numbers
@@ -46,32 +44,31 @@ from laufruhe.solvers.throws.throw_starts import firing_intervals, starts_of, wh
 from laufruhe.solvers.told_limits import over_read
 
 MOST_SEARCHED = 3
-# starts of a star beside those that are good for the first of the ranking
+# starts of a star besides the mounts of the first of the ranking
 BESIDE = 2
 
 
 Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
-"""A star with a set of shafts, and its steps where it fires evenly."""
+"""A star with a set of shafts, and its steps if it fires evenly."""
 
 
 def _rank(design: StarDesign) -> tuple[bool, float]:
-    """Designs within their limits first, the least objective first."""
-    met = design.result.status.has_design
-    return not met, design.value
+    """Sort key: feasible designs first, then by objective."""
+    return not design.result.status.has_design, design.value
 
 
 def _least(found: list[StarDesign]) -> float:
-    """Objective of the best design that keeps the limits; infinite where there is none."""
+    """Return the objective of the best feasible design; infinite without one."""
     return min((value for broken, value in map(_rank, found) if not broken), default=math.inf)
 
 
 def solve_star_mounts(problem: Problem) -> Result:
-    """The best of the stars, each with mounts and balance decided together (E35).
+    """Return the best of the stars, each with mounts and unbalances decided together (E35).
 
     Parameters
     ----------
     problem
-        On elastic mounts, with throws, firing order or optional shafts open.
+        Problem on elastic mounts with open throws, firing order or optional shafts.
 
     Raises
     ------
@@ -89,7 +86,7 @@ def solve_star_mounts(problem: Problem) -> Result:
              for order in distinct_orders(problem, _only(phasing, star, steps), star, steps)]  # fmt: skip
     designs = count - len(ranking) + len(stars)
     ranked = time.perf_counter()
-    # searches and bounds have the same workers, whose start costs as much as a star
+    # searches and bounds share workers, whose start takes as long as a star
     with executor_for() as executor, working_on(executor):
         found = _solved_shortly(problem, phasing, stars)
         found = _bounded(_solved_fully(problem, found), phasing, designs)
@@ -100,14 +97,14 @@ def solve_star_mounts(problem: Problem) -> Result:
 
 
 def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
-    """Stars by their rank on the mounts as given, as many as are to be ranked; and how many there are."""
+    """Return stars by their rank on the baseline mounts, and the number of all stars."""
     if phasing.throws is not None:
         star = Candidate(phasing.throws, None, *phasing.least_geometry)
         sets = phasing.shafts.allowed
         return [(replace(star, left_out=phasing.without(built)), None) for built in sets], len(sets)
     if phasing.throw_bounds is not None:
         return [], 0
-    # of throws that cylinders share every firing order is looked at later
+    # firing orders of shared throws are listed later
     by_firing = problem.feels_order and not phasing.shares_throws
     families, _ = families_of(phasing, by_firing)
     if sum(family.size for family in families) > MOST_LISTED:
@@ -124,38 +121,37 @@ def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
 
 
 def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> tuple[list[tuple[float, Star]], int]:
-    """Stars of one geometry with their least objective on the mounts as given (S15)."""
+    """Return stars of one geometry with their least objective on the baseline mounts (S15)."""
     model = family.model(phasing)
-    given = model.problem
-    found = search_designs(
-        model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, numerical_zero(given)
+    designs = search_designs(
+        model, family.stars, count, max(problem.tolerance, 1e-3), phasing.time_limit, numerical_zero(model.problem)
     )
     stars: list[tuple[float, Star]] = [
         (
             s.value,
             (family.candidate(phasing, s.star, phasing.without(s.built)), None if family.is_of_orders else s.star),
         )
-        for s in found.solved
+        for s in designs.solved
     ]
-    return stars, found.designs
+    return stars, designs.designs
 
 
 def _on_given_mounts(problem: Problem) -> Problem:
-    """What ranks stars: the objective, or else the RMS mount force, under the limits on masses alone."""
+    """Return the problem that ranks stars: objective or RMS mount force, under limits on masses alone."""
     terms = problem.load_terms or (Term(Measure(channels.MOUNT_FORCE, RMS)),)
     masses = tuple(limit for limit in problem.limits if limit.measure.is_mass)
     return replace(problem.balance, objective=terms, limits=masses)
 
 
 def _problem_of(problem: Problem, phasing: Phasing, candidate: Candidate, starts: int) -> Problem:
-    """The joint problem of one star, nothing of its phasing open any more."""
-    own = phasing.realise(candidate)
+    """Return the problem of one star, without open phasing."""
+    realised = phasing.realise(candidate)
     search = replace(problem.search, starts=starts)
-    return replace(own, phasing=None, tolerance=problem.tolerance, fidelity=problem.fidelity, search=search)
+    return replace(realised, phasing=None, tolerance=problem.tolerance, fidelity=problem.fidelity, search=search)
 
 
 def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star]) -> list[StarDesign]:
-    """The star that ranks first with all starts, the others from its mounts and a few of their own; the best first."""
+    """Solve the first star with all starts, and the others from its mounts and a few starts; return the best first."""
     starts = problem.search.starts
     problems = [_problem_of(problem, phasing, candidate, starts) for candidate, _ in stars[:1]]
     problems += [_problem_of(problem, phasing, candidate, min(starts, BESIDE)) for candidate, _ in stars[1:]]
@@ -166,7 +162,7 @@ def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star]) -> li
                 results.append(solve_mounts(first, among=True))
         known = [result for result in results if result.decisions and starts > BESIDE]
         near = place_of(known[0].problem, known[0])[0] if known else None
-        # stars side by side, and the starts of each in one process
+        # one process for each star
         work = partial(solve_mounts, workers=1, among=True, near=near)
         results += ordered_map(work, problems[1:], "stars on their mounts") if not passed() else []
     found = [StarDesign(star, result, steps) for (star, steps), result in zip(stars, results, strict=False)]
@@ -174,17 +170,17 @@ def _solved_shortly(problem: Problem, phasing: Phasing, stars: list[Star]) -> li
 
 
 def _solved_fully(problem: Problem, found: list[StarDesign]) -> list[StarDesign]:
-    """The best few again with all starts; the better of both answers is kept."""
+    """Solve the best few stars again with all starts."""
     out = list(found)
     starts = problem.search.starts
     for k, each in enumerate(() if passed() else found[:MOST_SEARCHED]):
-        own = each.result.problem
-        # what is proven to be no better than the best needs no more starts
-        if own.search.starts >= starts or each.bound >= found[0].value * (1.0 - problem.tolerance):
+        star_problem = each.result.problem
+        # a star that is proven to be no better than the best needs no more starts
+        if star_problem.search.starts >= starts or each.bound >= found[0].value * (1.0 - problem.tolerance):
             continue
         whole = min(len(found), MOST_SEARCHED)
         report_progress("best stars once more", k, whole, value=_least(out))
-        more = replace(own, search=replace(own.search, starts=starts))
+        more = replace(star_problem, search=replace(star_problem.search, starts=starts))
         with within(f"best star {k + 1} of {whole}"):
             again = replace(each, result=solve_mounts(more, among=True))
         out[k] = min(again, each, key=_rank)
@@ -192,13 +188,13 @@ def _solved_fully(problem: Problem, found: list[StarDesign]) -> list[StarDesign]
 
 
 def _bounded(found: list[StarDesign], phasing: Phasing, designs: int) -> list[StarDesign]:
-    """With what is proven of every star's mounts, designs worse than the best of all stars left out (E54)."""
+    """Return all stars with bounds of their mounts, for designs no worse than the best of all stars (E54)."""
     least = _least(found)
     if len(found) < designs or phasing.continuous or not 0.0 < least < math.inf:
         return found
     first = bounded_under(found[0].result, least, of_many=len(found) > 1)
     out = [replace(found[0], result=first), *found[1:]]
-    # what of all stars is known is what is known of the one with the least bound
+    # the least bound of all stars is that of the problem
     enough = first.certificate.lower_bound if first.certificate is not None else least
     pieces = [(k, each.result) for k, each in enumerate(found)][1:]
     work = partial(_bounded_one, value=least, enough=enough)
@@ -213,7 +209,7 @@ def _bounded_one(piece: tuple[int, Result], value: float, enough: float) -> tupl
 
 
 def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign]) -> list[StarDesign]:
-    """Designs whose throws have left the best stars, or the middle of their own bounds (E36)."""
+    """Return designs whose throws have left the best stars, or the middle of their bounds (E36)."""
     starts: list[tuple[Candidate, Result | None]] = [
         (each.candidate, each.result) for each in found[:MOST_SEARCHED] if not _rank(each)[0]
     ]
@@ -221,9 +217,9 @@ def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign]) -> list[
     out: list[StarDesign] = []
     for k, (candidate, even) in enumerate(() if found and passed() else starts):
         report_progress("throws that leave their star", k, len(starts), value=_least([*found, *out]))
-        own = _problem_of(problem, phasing, candidate, problem.search.starts)
+        star_problem = _problem_of(problem, phasing, candidate, problem.search.starts)
         moves = ThrowMoves(phasing, phasing.layout_of(candidate), candidate, phasing.intervals)
-        result, moved = solve_moved(own, moves, even)
+        result, moved = solve_moved(star_problem, moves, even)
         if result.objective is not None and not phasing.intervals.holds(firing_intervals(phasing, moved)):
             continue
         out.append(StarDesign(moved, result, moved=True))
@@ -231,18 +227,21 @@ def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign]) -> list[
 
 
 def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs: int) -> Result:
-    given = evaluate(problem)
+    baseline = evaluate(problem)
     if not found:
         why, proven = why_none_fires(phasing)
         return no_star(problem, why, Status.INFEASIBLE if proven else Status.FAILED)
     best = found[0]
     if _rank(best)[0]:
-        return _none(problem, found, given, designs)
-    whole = len(found) == designs and not phasing.continuous
-    ranking = [_entry(phasing, each, whole and each is best) for each in found if not _rank(each)[0]]
+        return _none(problem, found, baseline, designs)
+    complete = len(found) == designs and not phasing.continuous
+    ranking = [_entry(phasing, each, complete and each is best) for each in found if not _rank(each)[0]]
     details = ranking_result(phasing, best.candidate, ranking, designs, len(found), _method(found, designs))
     nothing = numerical_zero(problem, best.result.final.engine)
-    bound = _bound(found) if whole else 0.0
+    bound = 0.0
+    if complete:
+        certificates = [each.result.certificate for each in found]
+        bound = min(certificate.lower_bound if certificate else 0.0 for certificate in certificates)
     divided = _divided(problem, phasing, best)
     bound = max(bound, divided.bound)
     result, doubt = result_under(best.result, bound, nothing)
@@ -250,12 +249,15 @@ def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs
     method = details.method
     if divided.boxes:
         method += f"; {divided.boxes} box{'es' if divided.boxes > 1 else ''} of throws, mounts and unbalances"
-    certificate = _certificate(best, bound, doubt, method, nothing, problem.tolerance)
+    certificate = best.result.certificate
+    if certificate is not None:
+        text, residual = f"{method}; of the best: {certificate.method}", certificate.kkt_residual
+        certificate = certified(best.value, bound, nothing, problem.tolerance, Reach.NEAR, residual, text, doubt)
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 
 
 def _divided(problem: Problem, phasing: Phasing, best: StarDesign) -> Divided:
-    """Return what provers tell of mounts and throws between bounds together."""
+    """Bound mounts and throws between bounds together by provers."""
     if phasing.throw_bounds is None or not best.is_met or not problem.search.proves or passed():
         return Divided(0.0, 0)
     realised = with_default_sampling(replace(phasing.realise(best.candidate), phasing=None))
@@ -264,21 +266,6 @@ def _divided(problem: Problem, phasing: Phasing, best: StarDesign) -> Divided:
     value = design.value - over_read(realised, design.evaluation)
     room = room_of(value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))
     return proven(Question(realised, value, room, design.values, known, moves=(phasing, best.candidate)))
-
-
-def _bound(found: list[StarDesign]) -> float:
-    """The least of the bounds of all stars; zero where one has none."""
-    return min(each.result.certificate.lower_bound if each.result.certificate else 0.0 for each in found)
-
-
-def _certificate(
-    best: StarDesign, bound: float, doubt: float, method: str, nothing: float, tolerance: float
-) -> Certificate | None:  # fmt: skip
-    own = best.result.certificate
-    if own is None:
-        return None
-    text = f"{method}; of the best: {own.method}"
-    return certified(best.value, bound, nothing, tolerance, Reach.NEAR, own.kkt_residual, text, doubt)
 
 
 def _method(found: list[StarDesign], designs: int) -> str:
@@ -304,22 +291,22 @@ def _entry(phasing: Phasing, found: StarDesign, proven: bool) -> RankedStar:
 
 
 def _only(phasing: Phasing, star: Candidate, steps: tuple[int, ...] | None) -> Phasing:
-    """What is open of a star: its firing orders, or nothing where it is one of them."""
+    """Return the phasing of a star: open firing orders of even steps, or its own firing order."""
     return phasing if steps else replace(phasing, firing_order=star.firing_order or phasing.firing_order)
 
 
-def _none(problem: Problem, found: list[StarDesign], given: Evaluation, designs: int) -> Result:
-    """No star led to a design: infeasible only if that is proven of every star there is."""
+def _none(problem: Problem, found: list[StarDesign], baseline: Evaluation, designs: int) -> Result:
+    """Return a result without a design, infeasible only if every star is proven to be."""
     proven = len(found) == designs and all(f.result.status is Status.INFEASIBLE for f in found)
     first = found[0].result
     status = Status.INFEASIBLE if proven else Status.FAILED
-    # what one star breaks another may keep
-    told = {name for each in found for name in each.result.conflict} if proven else ()
-    conflict = tuple(limit.name for limit in problem.limits if limit.name in told)
+    # another star may keep a limit that one violates
+    names = {name for each in found for name in each.result.conflict} if proven else ()
+    conflict = tuple(limit.name for limit in problem.limits if limit.name in names)
     message = (
         f"{contradiction(conflict) if proven else first.message} (best of {len(found)} of {counted(designs, 'star')})"
     )
     return replace(
-        first, problem=problem, status=status, objective=None, certificate=None, initial=given, final=given,
+        first, problem=problem, status=status, objective=None, certificate=None, initial=baseline, final=baseline,
         message=message, conflict=conflict,
     )  # fmt: skip

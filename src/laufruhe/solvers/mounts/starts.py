@@ -1,4 +1,4 @@
-"""Where a search of mounts starts: points spread over all bounds, those that promise most first."""
+"""Start points of a search of mounts: a Latin hypercube, the most promising points first."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from laufruhe.solvers.conclusion import unbalances_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.result import Result
 
-# starts at most for each open number, and candidates for each start: so many cost about as much as its search
+# starts for each open number; candidates for each start, which cost about as much as its search
 STARTS = 4
 POOL = 16
-# of unbalances to start from
+# tolerance of the unbalances of starts
 ROUGHLY = 1e-2
-# share of the time that is left for looking at points to start from
+# share of the remaining time for the evaluation of candidates
 LOOKING = 0.25
-# times as many candidates where a simulation, that has many optima, is asked about
+# factor of candidates with simulated measures, which have many optima
 SIMULATED_POOL = 4
-# of what limits are missed by where a simulation is asked: limits that many designs nearly keep, few keep
+# weight of violations with simulated measures, whose limits few designs keep
 MISSED_WEIGHT = 10.0
 POOL_SAMPLES, POOL_ORDERS = 72, 18
 
 
 def looks(problem: Problem) -> int:
-    """Points of operation that are looked at for starts: their number tells how long a search will take."""
+    """Return the number of operating points that the candidates evaluate, a measure of the time of a search."""
     return _candidates(problem) * len(problem.points)
 
 
@@ -51,21 +51,21 @@ def _most_starts(problem: Problem) -> int:
 
 
 def spread_starts(lower: Array, upper: Array, count: int, seed: int = 0) -> Array:
-    """Starts that divide the range of every variable evenly (a Latin hypercube), shape (count, n)."""
+    """Return a Latin hypercube, shape (count, n)."""
     generator = np.random.default_rng(seed)
     cells = np.array([generator.permutation(count) for _ in lower]).T.reshape(count, len(lower))
     return lower + (cells + generator.random(cells.shape)) / count * (upper - lower)
 
 
 def place_of(problem: Problem, result: Result) -> tuple[list[float], Array]:
-    """Mounts and columns of unbalances of a result."""
+    """Return mounts and columns of unbalances of a result."""
     found = {decision.name: decision.value for decision in result.decisions}
     mounts = [found[decision.name] for decision in problem.mount_decisions]
     return mounts, columns_of(domains_of(problem.unbalances), unbalances_of(problem, result))
 
 
-def _balanced(problem: Problem) -> list[complex] | None:
-    """Unbalances that are best on the mounts as given, where that is convex."""
+def _balance_on_baseline(problem: Problem) -> list[complex] | None:
+    """Return the best unbalances on the baseline mounts, or None without open unbalances or load terms."""
     if not problem.unbalances or not problem.load_terms:
         return None
     result = solve_unbalances(replace(off_resonance(problem).balance, tolerance=max(problem.tolerance, ROUGHLY)))
@@ -73,36 +73,34 @@ def _balanced(problem: Problem) -> list[complex] | None:
 
 
 def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], float]:
-    """Mounts and columns of unbalances that a search starts from, and a size of the objective.
+    """Return mounts and columns of unbalances of all starts, and a unit of the objective [SI].
 
-    The design as given, then points spread over all bounds: stiffness by ratio,
-    unbalances in their sets. The size is the least of all that were looked at, so that no
-    start on a flank of a resonance hides what is small beside it; never zero. Where one start is
-    asked for, the design as given is.
+    The first start is the baseline design. The others spread over all bounds, stiffnesses by ratio. The unit is the
+    least positive objective of all candidates, so that a start close to a resonance does not hide smaller values.
     """
     domains, decisions = domains_of(problem.unbalances), problem.mount_decisions
     initial = evaluate_start(problem)
-    # on a resonance a search has nowhere to go
+    # a search cannot start on a resonance
     wanted = _most_starts(problem) - (not initial.resonance)
     pool = _spread_over(problem) if wanted else np.zeros((0, len(decisions)))
-    with _looking(problem, initial, pool) as looked:
-        balanced = _balanced(problem)
-        judged = looked()
+    with _evaluating(problem, initial, pool) as scores:
+        balanced = _balance_on_baseline(problem)
+        scored = scores()
     best = columns_of(domains, [d.start for d in problem.unbalances] if balanced is None else balanced)
-    found = [] if initial.resonance else [([d.start_number for d in decisions], best)]
+    starts = [] if initial.resonance else [([d.start_number for d in decisions], best)]
     if not wanted:
-        return found, objective_value(problem, initial) or 1.0
-    rows, size = _promising(problem, initial, pool, judged, wanted)
+        return starts, objective_value(problem, initial) or 1.0
+    rows, unit = _promising(problem, initial, pool, scored, wanted)
     for k, row in enumerate(rows):
-        own = row[len(decisions) :].copy()
+        columns = row[len(decisions) :].copy()
         for domain in domains:
-            own[domain.columns] = domain.project(own)
-        found.append((row[: len(decisions)].tolist(), own if k % 2 else best))
-    return found, size
+            columns[domain.columns] = domain.project(columns)
+        starts.append((row[: len(decisions)].tolist(), columns if k % 2 else best))
+    return starts, unit
 
 
 def _spread_over(problem: Problem) -> Array:
-    """Points spread over all bounds, shape (points, mounts and columns of unbalances)."""
+    """Return points over all bounds, shape (points, mounts and columns of unbalances)."""
     domains, decisions = domains_of(problem.unbalances), problem.mount_decisions
     ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
     low, high = sides_of(decisions)
@@ -115,12 +113,9 @@ def _spread_over(problem: Problem) -> Array:
     return points
 
 
-def _promising(problem: Problem, initial: Evaluation, pool: Array, judged: Array, wanted: int) -> tuple[Array, float]:
-    """Points of the pool that break limits least and are worth most; a third taken as they come.
-
-    With them the least objective of the pool and of the design as given.
-    """
-    misses, values = judged.T
+def _promising(problem: Problem, initial: Evaluation, pool: Array, scored: Array, wanted: int) -> tuple[Array, float]:
+    """Return the best points of the pool and as they come a third more, and the least positive objective."""
+    misses, values = scored.T
     known = values[np.isfinite(values)]
     middle = float(np.median(known)) if len(known) else 0.0
     best = np.argsort(misses + values / (middle or 1.0), kind="stable")
@@ -132,38 +127,38 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, judged: Array
 
 
 @contextmanager
-def _looking(problem: Problem, initial: Evaluation, pool: Array) -> Iterator[Callable[[], Array]]:
-    """Gives what waits for what points miss limits by and are worth, shape (points, 2); workers begin at once.
+def _evaluating(problem: Problem, initial: Evaluation, pool: Array) -> Iterator[Callable[[], Array]]:
+    """Evaluate points in workers; yield a function that waits for violation and objective, shape (points, 2).
 
-    Infinite where time is over before.
+    Points without an evaluation in time have infinite rows.
     """
-    # higher orders hardly move a block, and take most of the time
+    # higher orders hardly move a block, but take most of the time
     loads = tuple(replace(load, wrench=load.wrench.series.kept(POOL_ORDERS)) for load in initial.loads)
     coarse = replace(initial, samples=POOL_SAMPLES, resonance="", loads=loads)
     shares = [(problem, coarse, points) for points in np.array_split(pool, worker_count(current_executor() or SERIAL))]
-    with speculation(_look, math.inf) as ahead:
+    with speculation(_scores, math.inf) as ahead:
         with limited(LOOKING * left()):
             ahead.prefetch(enumerate(shares))
 
-        def looked() -> Array:
+        def scores() -> Array:
             with limited(LOOKING * left()):
                 return np.concatenate([ahead.result(k, share) for k, share in enumerate(shares)])
 
-        yield looked
+        yield scores
 
 
-def _look(share: tuple[Problem, Evaluation, Array]) -> Array:
-    """Of some points."""
+def _scores(share: tuple[Problem, Evaluation, Array]) -> Array:
+    """Return violation and objective of a share of the points, shape (points, 2)."""
     problem, coarse, points = share
     if not len(points):
         return np.zeros((0, 2))
     count = len(problem.mount_decisions)
-    # unbalances are still to be decided, and may keep a limit on loads
+    # unbalances are not decided yet, and may keep limits on loads
     limits = problem.mount_limits if problem.unbalances else problem.limits
     plain = problem.changed(objective=tuple(term for term in problem.objective if not term.measure.channel.simulation))
     limits = tuple(limit for limit in limits if not limit.measure.channel.simulation)
     peaks = peaks_of(problem, COARSER, roughly=True)
-    found = np.full((len(points), 2), math.inf)
+    out = np.full((len(points), 2), math.inf)
     for k, row in in_time(enumerate(points)):
         try:
             design = remounted(coarse, problem.design(row[:count].tolist(), problem.mount_decisions))
@@ -173,8 +168,8 @@ def _look(share: tuple[Problem, Evaluation, Array]) -> Array:
         if peaks is not None and peaks.is_known:
             excess, worth = _of_peaks(problem, peaks, row)
             missed, value = MISSED_WEIGHT * (missed + excess), value + worth
-        found[k] = missed, value
-    return found
+        out[k] = missed, value
+    return out
 
 
 def _of_peaks(problem: Problem, peaks: Peaks, row: Array) -> tuple[float, float]:
