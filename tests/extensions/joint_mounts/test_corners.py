@@ -17,8 +17,8 @@ from lanes import first_fast
 from laufruhe.errors import BoundError
 from laufruhe.extensions.joint_mounts import corner_boxes as design_boxes
 from laufruhe.extensions.joint_mounts.corner_boxes import DesignBoxes, mixes_corners, priced
-from laufruhe.extensions.joint_mounts.corner_loads import CornerLoads
 from laufruhe.extensions.joint_mounts.mount_loops import mount_loop
+from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads
 from laufruhe.extensions.joint_mounts.multipliers import best_at
 from laufruhe.load_models.affine import AffineModel
 from laufruhe.problem.decision import TURNED
@@ -29,7 +29,7 @@ from laufruhe.solvers.mounts.places import started_at
 @pytest.mark.parametrize("seed", first_fast((780017, 780000, 780004, 780012), 3))
 def test_multipliers_of_a_corner_say_the_same_of_other_mounts_as_rows_do(seed: int) -> None:
     problem, generator = joint(seed), np.random.default_rng(seed)
-    loads = CornerLoads(problem)
+    loads = MountedLoads(problem)
     (_, mounts), (_, other) = boxes_of(problem, generator, 2, 0.5)
     given = loads.at(mounts)
     _, multipliers = best_at(given)
@@ -62,7 +62,7 @@ def test_multipliers_of_a_corner_that_keeps_no_limits_call_it_bad(seed: int) -> 
     """Its bound is over the value of the unbalances told, and those are the best where the limits are kept."""
     problem, generator = joint(seed), np.random.default_rng(1)
     ((_, mounts),) = boxes_of(problem, generator, 1, 0.5)
-    given = CornerLoads(problem).at(mounts)
+    given = MountedLoads(problem).at(mounts)
     x, multipliers = best_at(given)
     assert all(norm.value(x) <= most * (1.0 + 1e-6) for most, norm in given.limits)
     assert lower_bound(given, multipliers).value == pytest.approx(given.objective(x), rel=1e-3)
@@ -76,7 +76,7 @@ def test_multipliers_of_a_corner_that_keeps_no_limits_call_it_bad(seed: int) -> 
 def test_a_corner_is_proven_as_closely_whatever_the_weights() -> None:
     problem = joint(780017)
     ((_, mounts),) = boxes_of(problem, np.random.default_rng(1), 1, 0.5)
-    given, gaps = CornerLoads(problem).at(mounts), []
+    given, gaps = MountedLoads(problem).at(mounts), []
     for times in (1e-6, 1.0, 1e6):
         weighted = replace(given, terms=tuple((times * weight, norm) for weight, norm in given.terms))
         x, multipliers = best_at(weighted)
@@ -91,7 +91,7 @@ def test_what_multipliers_say_in_a_box_is_a_polynomial_and_a_rest(seed: int) -> 
     boxes, near_rest = DesignBoxes(problem, math.inf, lambda *_: math.inf), 0.0
     for lower, upper in boxes_of(problem, generator, 5, 0.25):
         pairing = boxes.corner(lower).pairing
-        columns, told, rest = boxes.said(pairing, lower, upper)
+        columns, told, rest = boxes.expanded(pairing, lower, upper)
         if not np.isfinite(rest).all():
             continue
         for mounts in generator.uniform(lower, upper, (8, len(lower))):

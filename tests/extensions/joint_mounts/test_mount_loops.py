@@ -103,8 +103,8 @@ def test_a_loop_is_the_block_on_any_mounts_of_its_box(kind: int | str, tmp_path:
             felt = np.concatenate([k @ g @ motion for g, k in zip(mounting.motions, each, strict=True)])
             felt += mounting.dynamic.forces(np.array([omega]), np.eye(6))[0] @ motion
             gone = np.concatenate([g @ motion for g in mounting.motions])
-            turned = np.diag(share[loop.own])
-            back = turned @ np.linalg.solve(np.eye(len(turned)) + loop.gain[w] @ turned, loop.met[w] @ load)
+            turned = np.diag(share[loop.numbers])
+            back = turned @ np.linalg.solve(np.eye(len(turned)) + loop.gain[w] @ turned, loop.inputs[w] @ load)
             for maps, true in ((loop.forces, felt), (loop.travels, gone)):
                 found = maps[0][w] @ load + maps[1][w] @ back
                 assert np.abs(found - true).max() <= 1e-9 * np.abs(true).max()

@@ -1,6 +1,6 @@
-"""Bound mounts that are open together with unbalances and throws: boxes of all of them, and their corners (E68-E72).
+"""Lower bounds of mounts that are open together with unbalances and throws, by boxes of all of them (E68-E72).
 
-Without it such designs are bounded by spring forces alone, where `mount_relaxation` is there.
+Without this extension the bound is that of `mount_relaxation`.
 """
 
 from laufruhe.extension import Extension

@@ -1,4 +1,4 @@
-"""Polynomials over a box by their Bernstein coefficients, of which none of its values is under the least (N6)."""
+"""Polynomials over a box by Bernstein coefficients, the least of which is a lower bound (N6)."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 
 from laufruhe.numerics.arrays import Array
 
-# of (1 - t) and t times 1, s and s^2, s = 2 t - 1, in the basis (1 - t)^3, 3 (1 - t)^2 t, 3 (1 - t) t^2, t^3:
-# shape (4, ends, powers)
+# coefficients of (1 - t) and t times 1, s and s^2, s = 2 t - 1, in the basis (1 - t)^3, 3 (1 - t)^2 t, 3 (1 - t) t^2,
+# t^3: shape (4, ends, powers)
 _TIMES = np.array(
     [
         [[1.0, -1.0, 1.0], [0.0, 0.0, 0.0]],
@@ -22,17 +22,17 @@ _TIMES = np.array(
 
 
 def corners_of(count: int) -> Array:
-    """Of the box from -1 to 1 in so many numbers, shape (2^n, n)."""
+    """Return the vertices of the box from -1 to 1 in each number, shape (2^n, n)."""
     return np.array(list(itertools.product((-1.0, 1.0), repeat=count))).reshape(-1, count)
 
 
 @lru_cache(maxsize=8)
 def mixed(count: int) -> Array:
-    """Coefficients of the sum over corners of quadratics, each times what is one at its corner and linear in every s.
+    """Return the map from quadratics at vertices to coefficients of their multilinear mix.
 
     Returns
     -------
-    Shape (4^n, 2^n, 1 + n + n^2), of (1, s, s s').
+    Shape (4^n, 2^n, 1 + n + n^2), for quadratics by (1, s, s s').
     """
     unit = np.eye(count, dtype=int)
     powers = [np.zeros(count, dtype=int), *unit, *(one + other for one in unit for other in unit)]
@@ -46,5 +46,5 @@ def mixed(count: int) -> Array:
 
 @lru_cache(maxsize=8)
 def coefficients(count: int) -> Array:
-    """Coefficients of one quadratic, shape (4^n, 1 + n + n^2): what corners have shares of is shared out."""
+    """Return the map from one quadratic by (1, s, s s') to its coefficients, shape (4^n, 1 + n + n^2)."""
     return np.asarray(mixed(count).sum(axis=1))

@@ -1,14 +1,13 @@
-"""What no mounts of a box, with any unbalances, go under: multipliers of its corners, mixed (E69).
+"""Lower bounds over boxes of mounts with any unbalances, by multipliers at the vertices of boxes (E69).
 
-On given mounts multipliers Z_k prove what unbalances can reach, and what they say is affine in the unbalances on other
-mounts too (P4). Shares b_k >= 0 that are linear in every s and add up to one mix the multipliers of all corners of a
-box into multipliers of each of its mounts:
+Multipliers Z_k at the mounts of vertex k bound the objective for all unbalances, and on other mounts this bound is
+affine in the unbalances too (P4). Multilinear weights b_k(s) >= 0 with sum one mix the multipliers of all vertices:
 
     N(V(s, u)) >= sum_k b_k(s) <Z_k, V(s, u)> = a(s) + g(s) . u
 
-At a corner these are its own, so that nothing is lost there. V is a quadratic in s and a rest (E68), so a and g are
-cubic in every s, and none of their values is outside of their Bernstein coefficients: the least of a_v + min_u g_v . u
-over these, u in the sets of unbalances, bounds all designs of the box.
+The bound is tight at the vertices. V is a quadratic in s and a remainder (E68), so a and g are cubic in each s, and
+their values lie between their Bernstein coefficients. The least a_v + min_u g_v . u over coefficients v, with u in the
+sets of unbalances, bounds all designs of the box.
 """
 
 from __future__ import annotations
@@ -22,15 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.extensions.joint_mounts.bernstein import corners_of, mixed
-from laufruhe.extensions.joint_mounts.corner_loads import CornerLoads, Pairing
 from laufruhe.extensions.joint_mounts.mount_loops import Loop, is_looped, mount_loop
+from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads, Pairing
 from laufruhe.extensions.joint_mounts.multipliers import best_at
 from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
 from laufruhe.load_models.affine import FEASIBLE, MOST_NUMBERS
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import with_default_sampling
-from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Around, Bounded, Box, Divided
 from laufruhe.prove.certificate import Multipliers
@@ -40,35 +38,35 @@ from laufruhe.prove.mounts.subdivision import EVEN, divides
 from laufruhe.prove.witness import Known, check_around
 
 MOST_OPEN = 5
-"""Open numbers of mounts, whose corners and coefficients are 2 and 4 to their power."""
+"""Largest number n of open numbers of mounts: a box has 2^n vertices and 4^n coefficients."""
 MOST_CORNERS, ROWS = 1200, 7e6
-"""Corners whose multipliers are sought, and rows of all of them."""
+"""Largest number of vertices with multipliers, and of rows of all of them."""
 BOXES = 4
-"""Boxes of three numbers or fewer, for each corner."""
+"""Boxes for each vertex, with up to three numbers."""
 WORTH = 0.7
-"""Of a gain, under which the series of an order ends soon enough for multipliers to tell anything."""
+"""Gain under which the series of an order converges fast enough for useful bounds."""
 FEW = 2
-"""Times as many corners as a box has are worth beginning with."""
+"""Least budget of vertices, as a multiple of those of a box."""
 NO_PRICE = 1e-8
-"""Of the objective, what all of a limit is worth that has no price."""
+"""Price of a limit, in objectives, that counts as zero."""
 ROUNDS, STEPS = 2, 40
-"""Times that prices of several limits are sought in turn, and steps to each."""
-_SHARE = 0.5 * (math.sqrt(5.0) - 1.0)
+"""Passes over the limits to find their prices, and steps of each golden section search."""
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 Judge: TypeAlias = Callable[[Array, Array], float]
-"""Objective of mounts and unbalances by the exact model, infinite where they break a limit."""
+"""Objective of mounts and columns of unbalances by the exact model; infinite if a limit is violated."""
 
 
 @dataclass(frozen=True, eq=False)
 class Corner:
-    """What is known on the mounts of a corner.
+    """Unbalances and multipliers on the mounts of a vertex.
 
     Attributes
     ----------
     columns
-        Of the best unbalances, or of those that break the limits least.
+        Optimal unbalances, or those with the least violation of limits.
     pairing
-        What its multipliers say of all mounts; None where they say nothing.
+        Lower bound on all mounts by the multipliers; None on an undamped resonance.
     """
 
     columns: Array
@@ -76,51 +74,49 @@ class Corner:
 
 
 def mixes_corners(problem: Problem) -> bool:
-    """Return whether unbalances or other numbers of mounts are open, several but few, and all that is asked are loads.
+    """Return whether vertices bound a problem: few mixed decisions, and only loads in the objective.
 
-    Boxes of one number, and of stiffness alone, are few without corners.
+    One open number, or stiffness alone, needs no vertices.
     """
-    terms, few = problem.load_terms, len(problem.decisions) > 1 and len(problem.mount_decisions) <= MOST_OPEN
-    of_loads = named_part(problem) is problem and not problem.mount_terms and len(terms) == len(problem.objective)
-    if not (few and of_loads) or divides(problem):
+    if len(problem.decisions) < 2 or len(problem.mount_decisions) > MOST_OPEN or divides(problem):
         return False
-    loads = [measure for measure in problem.measures if measure.is_load]
-    plain = all(not measure.load.adds_up for measure in loads if measure.on_mounts) and not problem.known_rows
-    return plain and is_looped(problem) and any(term.measure.on_mounts for term in terms)
+    terms = problem.load_terms
+    if named_part(problem) is not problem or problem.mount_terms or len(terms) != len(problem.objective):
+        return False
+    summed = any(measure.load.adds_up for measure in problem.measures if measure.is_load and measure.on_mounts)
+    on_mounts = any(term.measure.on_mounts for term in terms)
+    return on_mounts and not summed and not problem.known_rows and is_looped(problem)
 
 
 class DesignBoxes:
-    """Bounds of boxes.
+    """Bounds of boxes of mounts by multipliers at vertices.
 
     Attributes
     ----------
     value
-        Of the best design known.
+        Objective of the incumbent [SI].
     best
-        Its mounts and columns, where it was met at a corner.
+        Mounts and columns of the incumbent if it was found at a vertex.
     """
 
     what, at_once = "boxes of mounts, with unbalances", 2
 
     def __init__(self, problem: Problem, value: float, judge: Judge) -> None:
-        # as they are told
         problem = with_default_sampling(problem)
-        self.loads, self.value, self._judge = CornerLoads(problem), value, judge
+        self.loads, self.value, self._judge = MountedLoads(problem), value, judge
         self.lower, self.upper = sides_of(problem.mount_decisions)
         self._rest = RestLimits(problem)
         self._corners: dict[tuple[float, ...], Corner] = {}
-        asked = [term.measure for term in problem.load_terms if term.measure.on_mounts]
-        self._felt = np.any([self._counts(measure) for measure in asked], axis=0)
+        orders = self.loads.orders
+        self._counted = np.zeros(len(orders.numbers), dtype=bool)
+        for measure in (term.measure for term in problem.load_terms if term.measure.on_mounts):
+            shares = measure.shares(problem.points)
+            self._counted |= (shares[orders.points] > 0.0) & measure.counted(orders.numbers)
         self.best: tuple[Array, Array] | None = None
-
-    def _counts(self, measure: Measure) -> Mask:
-        """Orders that count in it."""
-        orders, shares = self.loads.orders, measure.shares(self.loads.problem.points)
-        return np.asarray((shares[orders.points] > 0.0) & measure.counted(orders.numbers))
 
     @property
     def most_boxes(self) -> int:
-        """As many as some tens of seconds allow."""
+        """Box budget: as requested, or for some tens of seconds."""
         count = len(self.lower)
         if self.most_corners < FEW * 2**count or self.loads.rows * self.loads.columns > MOST_NUMBERS:
             return 0
@@ -128,17 +124,23 @@ class DesignBoxes:
 
     @property
     def most_corners(self) -> int:
-        """As many as their rows allow."""
+        """Largest number of vertices with multipliers."""
         return int(min(MOST_CORNERS, ROWS / max(self.loads.rows, 1)))
 
     def bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        """Least objective on every box, and the side worth halving."""
+        """Return lower bounds of boxes, and the sides to halve.
+
+        Parameters
+        ----------
+        lower, upper
+            Open numbers of the mounts, shape (boxes, n).
+        """
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            found = [self._bound(*box) for box in zip(lower, upper, strict=True)]
-        return np.array([bound for bound, _ in found]), np.array([side for _, side in found], dtype=np.intp)
+            pairs = [self._bound(*box) for box in zip(lower, upper, strict=True)]
+        return np.array([bound for bound, _ in pairs]), np.array([side for _, side in pairs], dtype=np.intp)
 
     def corner(self, mounts: Array) -> Corner:
-        """What is known there."""
+        """Return unbalances and multipliers on mounts, shape (n,), computed once."""
         key = tuple(mounts.tolist())
         if key not in self._corners:
             self._corners[key] = self._new_corner(mounts)
@@ -150,12 +152,12 @@ class DesignBoxes:
             return Corner(problem.start, None)
         columns, multipliers = best_at(problem)
         value = problem.objective(columns)
-        # a price that is a rounding would be felt where nothing is known of what it is of
-        felt = tuple(
+        # a price by rounding would add the remainder of its limit
+        limits = tuple(
             z if norm.dual_norm(z) * most > NO_PRICE * value else np.zeros_like(z)
             for (most, norm), z in zip(problem.limits, multipliers.limits, strict=True)
         )
-        pairing = self.loads.pairing(problem, Multipliers(multipliers.terms, felt))
+        pairing = self.loads.pairing(problem, Multipliers(multipliers.terms, limits))
         if value < self.value and problem.excess(columns) <= FEASIBLE:
             judged = self._judge(mounts, columns)
             if judged < self.value:
@@ -167,82 +169,82 @@ class DesignBoxes:
         if any(each.min() > 0.0 for each in over):
             return math.inf, 0
         loop = mount_loop(self.loads.problem, self.loads.orders.omegas, lower, upper)
-        even = _Even.of(loop, len(lower))
-        if not (even.most[self._felt] < WORTH).all():
-            # little is known before the series of all orders end
-            return 0.0, int(np.argmax(even.pull(self._felt) + EVEN * (upper - lower) / (self.upper - self.lower)))
+        even = _BalancedLoop.from_loop(loop, len(lower))
+        if not (even.most[self._counted] < WORTH).all():
+            # halve until the series of all orders converge
+            return 0.0, int(np.argmax(even.scores(self._counted) + EVEN * (upper - lower) / (self.upper - self.lower)))
         places = [np.where(end < 0.0, lower, upper) for end in corners_of(len(lower))]
         known = [self._corners.get(tuple(place.tolist())) for place in places]
-        found, is_over = None, len(self._corners) >= self.most_corners
+        rough, is_over = None, len(self._corners) >= self.most_corners
         if is_over and not any(known):
             return 0.0, int(np.argmax((upper - lower) / (self.upper - self.lower)))
         if any(known) and not all(known):
-            # multipliers of other mounts are enough where all designs are worse by far
-            found = self._mixed(even, over, [each or _next(places, known, k) for k, each in enumerate(known)])
-            if found[0] >= self.value or is_over:
-                return found
+            # multipliers of adjacent vertices suffice if all designs of the box are worse by far
+            rough = self._mixed(even, over, [each or _adjacent(places, known, k) for k, each in enumerate(known)])
+            if rough[0] >= self.value or is_over:
+                return rough
         bound, side = self._mixed(even, over, [self.corner(place) for place in places])
-        return (bound, side) if found is None or bound >= found[0] else (found[0], side)
+        return (bound, side) if rough is None or bound >= rough[0] else (rough[0], side)
 
-    def _mixed(self, even: _Even, over: list[Array], corners: Sequence[Corner]) -> tuple[float, int]:
-        """Bound by multipliers of all corners, and the side that takes most of it."""
+    def _mixed(self, loop: _BalancedLoop, over: list[Array], corners: Sequence[Corner]) -> tuple[float, int]:
+        """Return the bound by multipliers of all vertices, and the side to halve."""
         near = np.mean([corner.columns for corner in corners], axis=0)
-        met = self._met(even, near)
+        loaded = self._loaded(loop, near)
         ends = np.array([d.ends for d in self.loads.domains for _ in range(d.width)]).reshape(-1, 2)
         reach = np.append(1.0, np.abs(ends - near[:, None]).max(axis=1))
-        told, rests = zip(*(self._told(corner.pairing, met, near) for corner in corners), strict=True)
+        quadratics, rests = zip(*(self._expanded(corner.pairing, loaded, near) for corner in corners), strict=True)
         rest = np.array(rests) @ reach
-        if not (np.isfinite(rest).all() and np.isfinite(told).all()):
-            return 0.0, int(np.argmax(even.pull(np.ones_like(self._felt))))
-        mixes = np.einsum("vkp,kcp->vc", mixed(even.count), np.array(told), optimize=True)
+        if not (np.isfinite(rest).all() and np.isfinite(quadratics).all()):
+            return 0.0, int(np.argmax(loop.scores(np.ones_like(self._counted))))
+        mixes = np.einsum("vkp,kcp->vc", mixed(loop.count), np.array(quadratics), optimize=True)
         least = np.array([line[0] + self.least(line[1:], near) for line in mixes])
-        # shares of corners add up to one, so that no more is left than of the worst
+        # weights of vertices have sum one, so the remainder is at most that of the worst vertex
         least = priced(least, over) - rest.sum(axis=1).max()
-        pull = _bent(least.reshape((4,) * even.count)) + even.shares.T @ rest[rest.sum(axis=1).argmax()]
-        return max(float(least.min()), 0.0), int(np.argmax(pull))
+        scores = _concavity(least.reshape((4,) * loop.count)) + loop.shares.T @ rest[rest.sum(axis=1).argmax()]
+        return max(float(least.min()), 0.0), int(np.argmax(scores))
 
-    def said(self, pairing: Pairing, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
-        """Of a corner in a box about its unbalances: these, and what `_told` gives."""
+    def expanded(self, pairing: Pairing, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
+        """Return the unbalances at the lower vertex of a box, and a bound about these as in `_expanded`."""
         loop = mount_loop(self.loads.problem, self.loads.orders.omegas, lower, upper)
         near = self.corner(lower).columns
-        return near, *self._told(pairing, self._met(_Even.of(loop, len(lower)), near), near)
+        return near, *self._expanded(pairing, self._loaded(_BalancedLoop.from_loop(loop, len(lower)), near), near)
 
-    def _met(self, even: _Even, near: Array) -> _Met:
-        orders = self.loads.orders
-        still = orders.loads[:, :1] + np.einsum("q,wqi->wi", near, orders.loads[:, 1:])[:, None]
-        return _Met(even, np.concatenate([still, orders.loads[:, 1:]], axis=1))
+    def _loaded(self, loop: _BalancedLoop, near: Array) -> _LoadedLoop:
+        loads = self.loads.orders.loads
+        fixed = loads[:, :1] + np.einsum("q,wqi->wi", near, loads[:, 1:])[:, None]
+        return _LoadedLoop(loop, np.concatenate([fixed, loads[:, 1:]], axis=1))
 
-    def _told(self, pairing: Pairing | None, met: _Met, near: Array) -> tuple[Array, Array]:
-        """By (1, s, s s') and columns what multipliers say, (1 + columns, p); and the rest, (w, 1 + columns)."""
-        found, rest = np.zeros((1 + len(near), 1 + met.count + met.count**2)), np.zeros(met.loads.shape[:2])
+    def _expanded(self, pairing: Pairing | None, loaded: _LoadedLoop, near: Array) -> tuple[Array, Array]:
+        """Return a bound by (1, s, s s') and columns, (1 + columns, p), and its remainder, (w, 1 + columns)."""
+        powers, rest = np.zeros((1 + len(near), 1 + loaded.count + loaded.count**2)), np.zeros(loaded.loads.shape[:2])
         if pairing is None:
-            return found, rest
-        found[0, 0], found[1:, 0] = pairing.constant + pairing.slopes @ near, pairing.slopes
-        for duals, maps in ((pairing.forces, met.loop.forces), (pairing.travels, met.loop.travels)):
+            return powers, rest
+        powers[0, 0], powers[1:, 0] = pairing.constant + pairing.slopes @ near, pairing.slopes
+        for duals, maps in ((pairing.forces, loaded.loop.forces), (pairing.travels, loaded.loop.travels)):
             if duals.any():
-                own, left = met.of(duals.conj(), maps)
-                found, rest = found + own, rest + left
-        return found, rest
+                more, further = loaded.paired(duals.conj(), maps)
+                powers, rest = powers + more, rest + further
+        return powers, rest
 
     def least(self, slopes: Array, near: Array) -> float:
-        """min g . (u - near) over the sets of unbalances."""
+        """Return min g . (u - near) over the sets of unbalances."""
         return float(sum(domain.least(slopes) for domain in self.loads.domains) - slopes @ near)
 
 
 @dataclass(frozen=True, eq=False)
-class _Even:
-    """A loop with channels counted so that what goes through each is about what comes back (E37).
+class _BalancedLoop:
+    """A loop with scaled channels (E37).
 
     Attributes
     ----------
     count
-        Open numbers.
+        Number of open numbers n.
     balance
-        Diagonal of T, shape (w, m).
+        Diagonal of the scaling T, shape (w, m).
     gain
         T G T^-1, shape (w, m, m).
     most
-        Its norm, shape (w,).
+        Upper bound of its norm, shape (w,).
     """
 
     loop: Loop
@@ -252,98 +254,99 @@ class _Even:
     most: Array
 
     @classmethod
-    def of(cls, loop: Loop, count: int) -> _Even:
-        """Of a loop."""
+    def from_loop(cls, loop: Loop, count: int) -> _BalancedLoop:
+        """Return a loop with balanced channels."""
         return cls(loop, count, *balanced(loop.gain))
 
     @property
-    def own(self) -> Array:
-        """One where a channel is of a number, shape (m, n)."""
-        return np.asarray((self.loop.own[:, None] == np.arange(self.count)).astype(float))
+    def incidence(self) -> Array:
+        """One where a channel belongs to a number, shape (m, n)."""
+        return np.asarray((self.loop.numbers[:, None] == np.arange(self.count)).astype(float))
 
     @property
     def sizes(self) -> Array:
-        """What each number has of the gain, (w, n)."""
+        """Gain of each number, shape (w, n)."""
         squares = np.nan_to_num(np.square(np.abs(self.gain)), nan=1.0, posinf=1.0)
-        return np.asarray(np.sqrt((squares.sum(axis=1) + squares.sum(axis=2)) @ self.own))
+        return np.asarray(np.sqrt((squares.sum(axis=1) + squares.sum(axis=2)) @ self.incidence))
 
     @property
     def shares(self) -> Array:
-        """The same of one in all, (w, n)."""
+        """Share of each number in the gain, shape (w, n)."""
         sizes = self.sizes
         return np.asarray(sizes / np.maximum(sizes.sum(axis=1, keepdims=True), 1e-300))
 
-    def pull(self, felt: Mask) -> Array:
-        """By how much each number keeps the series of these orders from ending, (n,)."""
-        return np.asarray(self.sizes[felt & ~(self.most < WORTH)].max(axis=0, initial=0.0))
+    def scores(self, orders: Mask) -> Array:
+        """Return branching scores of numbers for orders whose series converges slowly, shape (n,)."""
+        return np.asarray(self.sizes[orders & ~(self.most < WORTH)].max(axis=0, initial=0.0))
 
 
-class _Met:
-    """What loads meet in a box: z0 of every column, and what is left of its series (E68)."""
+class _LoadedLoop:
+    """A loop under loads: z0 of every column, and the remainder of its series (E68)."""
 
-    def __init__(self, even: _Even, loads: ComplexArray) -> None:
-        self.loop, self.loads, self.count, self._own = even.loop, loads, even.count, even.own
-        self._met, self._balance = np.einsum("wmi,wci->wcm", self.loop.met, loads, optimize=True), even.balance
-        hit = np.abs(self._met) * even.balance[:, None]
-        # what a column does not load stays at rest
-        self._rest = np.where(hit.any(axis=-1), rest_of(even.gain[:, None], even.most[:, None], hit), 0.0)
+    def __init__(self, even: _BalancedLoop, loads: ComplexArray) -> None:
+        self.loop, self.loads, self.count = even.loop, loads, even.count
+        self._incidence, self._balance = even.incidence, even.balance
+        self._inputs = np.einsum("wmi,wci->wcm", self.loop.inputs, loads, optimize=True)
+        size = np.abs(self._inputs) * self._balance[:, None]
+        # a column without loads has no motion
+        rest = rest_of(even.gain[:, None], even.most[:, None], size)
+        self._rest = np.where(size.any(axis=-1), rest, 0.0)
 
-    def of(self, duals: ComplexArray, maps: tuple[ComplexArray, ComplexArray]) -> tuple[Array, Array]:
-        """Sums over orders of Z* f: by (1, s, s s') and columns, and what the rest of orders and columns may add."""
-        still = np.einsum("wr,wri->wi", duals, maps[0], optimize=True)
-        pulls = np.einsum("wr,wrm->wm", duals, maps[1], optimize=True)
-        constant = np.einsum("wi,wci->c", still, self.loads, optimize=True).real
-        first = np.einsum("wm,wcm->cm", pulls, self._met, optimize=True).real @ self._own
-        pairs = -np.einsum("wm,wmk,wck->cmk", pulls, self.loop.gain, self._met, optimize=True).real
-        second = np.einsum("cmk,mi,kj->cij", pairs, self._own, self._own, optimize=True)
-        size = np.linalg.norm(pulls / self._balance, axis=-1)[:, None]
+    def paired(self, duals: ComplexArray, maps: tuple[ComplexArray, ComplexArray]) -> tuple[Array, Array]:
+        """Return sums over orders of Z* f by (1, s, s s') and columns, and remainders of orders and columns."""
+        rigid = np.einsum("wr,wri->wi", duals, maps[0], optimize=True)
+        weights = np.einsum("wr,wrm->wm", duals, maps[1], optimize=True)
+        constant = np.einsum("wi,wci->c", rigid, self.loads, optimize=True).real
+        first = np.einsum("wm,wcm->cm", weights, self._inputs, optimize=True).real @ self._incidence
+        pairs = -np.einsum("wm,wmk,wck->cmk", weights, self.loop.gain, self._inputs, optimize=True).real
+        second = np.einsum("cmk,mi,kj->cij", pairs, self._incidence, self._incidence, optimize=True)
+        size = np.linalg.norm(weights / self._balance, axis=-1)[:, None]
         rest = np.where(size > 0.0, size * self._rest, 0.0)
         return np.column_stack([constant, first, second.reshape(len(constant), -1)]), np.asarray(rest)
 
 
-def _next(places: Sequence[Array], known: Sequence[Corner | None], k: int) -> Corner:
-    shared = [(int(np.sum(place == places[k])), -n) for n, place in enumerate(places) if known[n] is not None]
-    found = known[-max(shared)[1]]
-    assert found is not None
-    return found
+def _adjacent(places: Sequence[Array], known: Sequence[Corner | None], k: int) -> Corner:
+    """Return the known vertex with the most coordinates of vertex k."""
+    pairs = [(corner, place) for corner, place in zip(known, places, strict=True) if corner is not None]
+    return max(pairs, key=lambda pair: int(np.sum(pair[1] == places[k])))[0]
 
 
-def _bent(values: Array) -> Array:
-    """By how much coefficients lie under the straight lines between their ends at the most, along every side."""
-    shares, found = np.arange(4) / 3.0, []
+def _concavity(values: Array) -> Array:
+    """Return the largest distance of coefficients below the chord along every side, shape (n,)."""
+    shares, out = np.arange(4) / 3.0, []
     for side in range(values.ndim):
         along = np.moveaxis(values, side, -1)
         straight = along[..., :1] * (1.0 - shares) + along[..., -1:] * shares
-        found.append(float((straight - along).max()))
-    return np.array(found)
+        out.append(float((straight - along).max()))
+    return np.array(out)
 
 
-class _Designing(Bounded):
-    """Boxes halved until none may hold a better design, those met at corners included."""
+class _VertexBranching(Bounded):
+    """Branch and bound with designs at vertices as incumbents."""
 
     def __init__(self, search: DesignBoxes, room: float, known: Known | None = None) -> None:
         super().__init__(search, search.value, room, known)
         self._boxes = search
 
     def look(self, _: Box) -> None:
-        """At the best corner so far."""
+        """Lower the value to that of the best vertex."""
         self.value = min(self.value, self._boxes.value)
 
 
 def designed_bound(boxes: DesignBoxes, room: float, known: Known | None = None) -> Divided:
-    """Halve boxes of a problem that `mixes_corners`, until no design is more than `room` better than the best known."""
-    division = _Designing(boxes, room, known)
+    """Bound a problem that `mixes_corners`, until no design is more than `room` better than the incumbent."""
+    division = _VertexBranching(boxes, room, known)
     most = boxes.most_boxes
     if not most:
         return Divided(0.0, 0)
-    found = division.run(division.bounded([(boxes.lower, boxes.upper)])[0], most)
+    divided = division.run(division.bounded([(boxes.lower, boxes.upper)])[0], most)
     if known is not None:
         check_around(Around(boxes, boxes.lower, boxes.upper), known.place, known)
-    return found
+    return divided
 
 
 def priced(values: Array, over: list[Array]) -> Array:
-    """Values with limits at the prices at which the least of them is largest, (v,); infinite where one is broken."""
+    """Add limits with prices that maximise the least value, shape (v,); infinite if a limit is violated."""
     if any(float(each.min()) > 0.0 for each in over):
         return np.full_like(values, math.inf)
     for _ in range(ROUNDS if len(over) > 1 else 1):
@@ -353,7 +356,7 @@ def priced(values: Array, over: list[Array]) -> Array:
 
 
 def _price(values: Array, over: Array) -> float:
-    """At which the least of values + price over is largest, which is concave in it (P4)."""
+    """Return the price with the largest minimum of values + price over, by golden section (P4)."""
 
     def least(price: float) -> float:
         return float((values + price * over).min())
@@ -364,7 +367,7 @@ def _price(values: Array, over: Array) -> float:
     high = float(values.max() - values[worst]) / float(over[worst])
     low, best = 0.0, 0.0
     for _ in range(STEPS):
-        one, two = high - _SHARE * (high - low), low + _SHARE * (high - low)
+        one, two = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
         if least(one) >= least(two):
             high = two
         else:

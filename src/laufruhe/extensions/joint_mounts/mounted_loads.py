@@ -1,48 +1,44 @@
-"""Norms of what unbalances and all else load on mounts of any numbers, and multipliers of them order by order (E69).
-
-Rows of forces and travel at the samples of the exact model, of one set of mounts after the other; what dual rows at
-these samples say of the rows on any other mounts is told by their sums over the cycle, one for every order.
-"""
+"""Loads of a problem with open unbalances and numbers of mounts, order by order (E69)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from laufruhe.extensions.joint_mounts.mount_loops import mount_loop
 from laufruhe.extensions.joint_mounts.open_throws import OpenThrows
-from laufruhe.load_models.affine import AffineModel, AffineNorm
+from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
 from laufruhe.numerics.arrays import Array, ComplexArray, Indices
 from laufruhe.numerics.namespaces import NUMBERS
-from laufruhe.numerics.spectrum import in_one_base
+from laufruhe.numerics.spectrum import Spectrum, in_one_base
 from laufruhe.physics.mount_numbers import mass_root
 from laufruhe.physics.rigid_body import moved_wrench
 from laufruhe.problem.channels import mounting_in
-from laufruhe.problem.measure import Measure
+from laufruhe.problem.measure import Measure, load_rows
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.box_response import NOTHING
-
-COARSER = 8
-"""Times as few samples from which multipliers are sought first."""
+from laufruhe.prove.certificate import Multipliers, minorant
+from laufruhe.prove.mounts.box_response import NOTHING, is_travel
+from laufruhe.prove.mounts.ranges import SLACK
 
 
 @dataclass(frozen=True, eq=False)
 class Orders:
-    """Orders of all operating points with a load.
+    """Loaded orders of all operating points.
 
     Attributes
     ----------
     points, places
-        Operating point, and the order in periods of the rows, shape (w,).
+        Index of the operating point, and multiple of the lowest order of the rows, shape (w,).
     numbers, omegas
-        Orders of crank speed, and their frequencies [rad/s], shape (w,).
+        Orders of crank speed, and angular frequencies [rad/s], shape (w,).
     loads
-        r of all but the unbalances, and of one unit of every column, in coordinates in which the mass is one, shape
+        Wrenches r of the fixed loads, and of a unit of every column, in coordinates with unit mass, shape
         (w, 1 + columns, 6).
     turned
-        r of what turns with every open throw at an angle of zero, shape (w, throws, 6).
+        Wrenches r of every open throw at an angle of zero, shape (w, throws, 6).
     """
 
     points: Indices
@@ -52,33 +48,51 @@ class Orders:
     loads: ComplexArray
     turned: ComplexArray
 
-    def kept(self, which: Indices) -> Orders:
-        """Return some of them."""
-        own = self.points[which], self.places[which], self.numbers[which], self.omegas[which]
-        return Orders(*own, self.loads[which], self.turned[which])
+    def subset(self, which: Indices) -> Orders:
+        """Return some of the orders."""
+        indices = self.points[which], self.places[which]
+        return Orders(*indices, self.numbers[which], self.omegas[which], self.loads[which], self.turned[which])
+
+
+@dataclass(frozen=True, eq=False)
+class Pairing:
+    """Lower bound of the objective by multipliers: constant + slopes . u + Re sum of conj(Z) f over orders.
+
+    Attributes
+    ----------
+    forces, travels
+        Multipliers Z of forces and travel of all mounts, shape (w, 3 mounts).
+    constant, slopes
+        Part that does not depend on mounts, with prices of limits; slopes of shape (columns,).
+    """
+
+    forces: ComplexArray
+    travels: ComplexArray
+    constant: float
+    slopes: Array
 
 
 class MountedLoads:
-    """Loads of a problem that is open in unbalances and numbers of mounts.
+    """Loads of a problem with open unbalances and numbers of mounts.
 
     Attributes
     ----------
     samples
-        Of the rows, over their period.
+        Samples of the rows over their period.
 
     Parameters
     ----------
     throws
-        That are open too; loads beside the unbalances are then without what turns with these.
+        Open throws, whose loads are then not among the fixed ones.
     """
 
     def __init__(self, problem: Problem, throws: OpenThrows | None = None) -> None:
         self.problem, self._throws = problem, throws
         known = off_resonance(problem)
         self._model = AffineModel(known, keep_all=True)
-        told = problem.fidelity.samples * known.engine.cycle.base_order
-        if throws or self._model.full_samples * self._model.base != told:
-            # rows stand where the exact model has them
+        samples = problem.fidelity.samples * known.engine.cycle.base_order
+        if throws or self._model.full_samples * self._model.base != samples:
+            # rows have the samples of the exact model
             self._model = AffineModel(known, keep_all=True, whole_cycle=True)
         self.samples, self.domains = self._model.full_samples, self._model.domains
         self.root = mass_root(mounting_in(problem.engine).block)
@@ -86,9 +100,9 @@ class MountedLoads:
 
     @cached_property
     def orders(self) -> Orders:
-        """Return the orders that are loaded."""
+        """Loaded orders."""
         moved = moved_wrench(NUMBERS, mounting_in(self.problem.engine).block.centre_of_gravity).T @ self.root.T
-        found: list[tuple[int, int, float, float, ComplexArray]] = []
+        rows: list[tuple[int, int, float, float, ComplexArray]] = []
         at = self._throws.given[self._throws.open] if self._throws else np.zeros(0)
         for p, (point, (bare, slopes)) in enumerate(zip(self.problem.points, self._model.wrenches(), strict=True)):
             base, series = in_one_base([bare, *slopes, *(self._throws.wrenches(p) if self._throws else ())])
@@ -98,14 +112,130 @@ class MountedLoads:
             size = np.abs(loads).max(axis=(0, 2), initial=0.0)
             for k in np.flatnonzero(size > NOTHING * size.max(initial=0.0)):
                 number, place = float(k) * float(base), int(k) * base / self._model.base
-                found.append((p, round(place), number, number * point.speed, loads[:, k]))
-        points, places, numbers, omegas, each = zip(*found, strict=True)
-        own = np.array(points), np.array(places), np.array(numbers), np.array(omegas)
+                rows.append((p, round(place), number, number * point.speed, loads[:, k]))
+        points, places, numbers, omegas, each = zip(*rows, strict=True)
+        indices = np.array(points), np.array(places), np.array(numbers), np.array(omegas)
         loads, turned = np.split(np.array(each), [len(each[0]) - len(at)], axis=1)
-        return Orders(*own, loads, turned)
+        return Orders(*indices, loads, turned)
 
     def still(self, measure: Measure, averaged: bool) -> AffineNorm:
-        """Return a norm that mounts do not change, at their samples."""
+        """Return a norm that does not depend on mounts."""
         if (measure, averaged) not in self._still:
             self._still[measure, averaged] = self._model.norm(measure, self.samples, averaged)
         return self._still[measure, averaged]
+
+    @property
+    def columns(self) -> int:
+        """Number of columns of the rows: unbalances and fixed loads, in three directions."""
+        return 3 * (1 + sum(domain.width for domain in self.domains))
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of all measures on mounts."""
+        problem = self.problem
+        measures = [*(t.measure for t in problem.load_terms), *(limit.measure for limit in problem.load_limits)]
+        places = [mount.name for mount in problem.engine.mounts]
+        return sum(
+            self.samples * len(measure.places(places)) * int(np.count_nonzero(measure.shares(problem.points)))
+            for measure in measures
+            if measure.on_mounts
+        )
+
+    def at(self, mounts: Array) -> AffineProblem:
+        """Return norms as functions of the unbalances on mounts, shape (n,); infinite on an undamped resonance."""
+        loop, orders = mount_loop(self.problem, self.orders.omegas, mounts, mounts), self.orders
+        responses = [
+            np.einsum("wri,wci->cwr", maps[0], orders.loads, optimize=True) for maps in (loop.forces, loop.travels)
+        ]
+
+        def norm(measure: Measure, averaged: bool) -> AffineNorm:
+            if not measure.on_mounts:
+                return self.still(measure, averaged)
+            return self._norm(measure, averaged, responses[is_travel(measure.channel)])
+
+        terms = tuple((term.weight, norm(term.measure, False)) for term in self.problem.load_terms)
+        # averages are lower bounds of means by few samples (P7)
+        limits = tuple(
+            (limit.maximum * (1.0 + SLACK), norm(limit.measure, limit.measure.norm.averages))
+            for limit in self.problem.load_limits
+        )
+        return AffineProblem(terms, limits, self.domains, self.samples)
+
+    def _norm(self, measure: Measure, averaged: bool, responses: ComplexArray) -> AffineNorm:
+        none = [np.zeros(0)] * len(self.problem.points)
+        rows = [
+            load_rows(measure, self.problem.points, signals, self.problem.engine, self.samples, none)
+            for signals in (self._signals(each, averaged) for each in responses)
+        ]
+        slopes = [each.vectors for each in rows[1:]]
+        slope = np.stack(slopes, axis=-1) if slopes else np.zeros((*rows[0].vectors.shape, 0))
+        return AffineNorm(measure.norm, rows[0].vectors, slope, rows[0].grid)
+
+    def _signals(self, response: ComplexArray, averaged: bool) -> list[Spectrum]:
+        """Return signals of all operating points from orders, shape (w, 3 mounts)."""
+        signals, mounts = [], response.shape[1] // 3
+        for p in range(len(self.problem.points)):
+            at = self.orders.points == p
+            coefficients = np.zeros((1 + int(self.orders.places.max(initial=0)), mounts, 3), dtype=complex)
+            coefficients[self.orders.places[at]] = response[at].reshape(-1, mounts, 3)
+            signal = Spectrum(self._model.base, coefficients)
+            signals.append(signal.averaged(signal.period / self.samples) if averaged else signal)
+        return signals
+
+    def pairing(self, problem: AffineProblem, multipliers: Multipliers) -> Pairing:
+        """Return the lower bound on all mounts by multipliers of the unbalances on some mounts.
+
+        Parameters
+        ----------
+        problem
+            Norms on these mounts, from `at`.
+        """
+        used = minorant(problem, multipliers).multipliers
+        terms = zip(self.problem.load_terms, problem.terms, used.terms, strict=True)
+        limits = zip(self.problem.load_limits, problem.limits, used.limits, strict=True)
+        rows = [(term.weight, term.measure, False, norm, z) for term, (_, norm), z in terms]
+        rows += [(1.0, limit.measure, limit.measure.norm.averages, norm, z) for limit, (_, norm), z in limits]
+        prices = [norm.dual_norm(z) * most for (most, norm), z in zip(problem.limits, used.limits, strict=True)]
+        constant, slopes = -sum(prices), np.zeros(problem.size)
+        width = 3 * len(self.problem.engine.mounts)
+        sums = [np.zeros((len(self.orders.omegas), width), dtype=complex) for _ in range(2)]
+        for weight, measure, averaged, norm, z in rows:
+            if measure.on_mounts:
+                sums[is_travel(measure.channel)] += weight * self._sums(measure, z, averaged)
+            else:
+                constant += weight * float(np.vdot(z, norm.constant))
+                slopes = slopes + weight * norm.pulled(z)
+        return Pairing(sums[0], sums[1], constant, slopes)
+
+    def _sums(self, measure: Measure, z: Array, averaged: bool) -> ComplexArray:
+        """Return Z of all orders from dual rows z of samples: <z, rows> = Re sum of conj(Z) f."""
+        problem, orders = self.problem, self.orders
+        chosen, shares = measure.places([mount.name for mount in problem.engine.mounts]), measure.shares(problem.points)
+        points = [p for p in range(len(problem.points)) if shares[p] > 0.0]
+        rows = z.reshape(len(points), len(chosen), self.samples, 3) * np.array(measure.direction_weights or (1.0,) * 3)
+        # sum of z exp(-i k t) over samples
+        waves = np.fft.fft(rows, axis=2)
+        out = np.zeros((len(orders.omegas), len(problem.engine.mounts), 3), dtype=complex)
+        counted = measure.counted(orders.numbers)
+        for k, p in enumerate(points):
+            at = np.flatnonzero((orders.points == p) & counted)
+            out[np.ix_(at, np.array(chosen))] = waves[k][:, orders.places[at] % self.samples].transpose(1, 0, 2)
+        if averaged:
+            step = 1.0 / self.samples
+            out *= (np.sinc(orders.places * step) ** 2)[:, None, None]
+        return out.reshape(len(out), -1)
+
+
+def coarser(problem: AffineProblem, times: int) -> AffineProblem:
+    """Return a program with a factor fewer samples."""
+
+    def fewer(norm: AffineNorm) -> AffineNorm:
+        # masses have no samples
+        if norm.grid.steps != problem.samples or problem.samples % times:
+            return norm
+        rows = slice(0, None, times)
+        grid = replace(norm.grid, weights=norm.grid.weights[rows] * times, steps=norm.grid.steps // times)
+        return replace(norm, constant=norm.constant[rows], slope=norm.slope[rows], grid=grid)
+
+    terms, limits = (tuple((number, fewer(norm)) for number, norm in each) for each in (problem.terms, problem.limits))
+    return replace(problem, terms=terms, limits=limits, samples=problem.samples // times)

@@ -1,11 +1,11 @@
-"""Loads of throws between bounds as numbers of a box (E72).
+"""Loads of throws between bounds as linear functions over a box (E72).
 
-Order h of a throw loads by c e^{i h theta}. Over theta = m + t d with t from -1 to 1 and a = h d at most pi this is
+Order h of a throw has the load c e^{i h theta}. Over theta = m + t d with t from -1 to 1 and a = h d at most pi this is
 
     c e^{i h m} ((1 + cos a) / 2 + i t sin a)
 
-but for a rest of |c| ((1 - cos a)^2 / 4 + (a^3 / (9 root 3))^2)^(1/2) at most: cos(a t) lies between cos a and 1, and
-sin(a t) bends away from its chord by no more than a^3 (t - t^3) / 6. Where that is over |c|, the order is all rest.
+up to a remainder of |c| ((1 - cos a)^2 / 4 + (a^3 / (9 root 3))^2)^(1/2): cos(a t) lies between cos a and 1, and
+sin(a t) differs from its chord by at most a^3 (t - t^3) / 6. If the remainder is over |c|, it replaces the order.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ _NONE = Spectrum(Fraction(1), np.zeros((1, 6), dtype=complex))
 
 @dataclass(frozen=True, eq=False)
 class OpenThrows:
-    """Throws of a crank without gas, some of them between bounds, and nothing open that rides on them.
+    """Throws of a crank without gas, some of them between bounds, and without open unbalances on them.
 
     Attributes
     ----------
     waves
-        Of a problem whose throws stand where they are given.
+        Loads of the throws.
     given, lower, upper
-        Every throw, and its bounds [rad].
+        Angle of every throw, and its bounds [rad].
     """
 
     waves: ThrowWaves
@@ -46,7 +46,7 @@ class OpenThrows:
 
     @property
     def open(self) -> list[int]:
-        """Numbers of the throws that are between bounds."""
+        """Indices of the open throws."""
         return [int(k) for k in np.flatnonzero(self.lower < self.upper)]
 
     @property
@@ -55,21 +55,20 @@ class OpenThrows:
         return self.lower[self.open], self.upper[self.open]
 
     def wrenches(self, point: int) -> list[Spectrum]:
-        """Return what turns with every open throw at an operating point, at an angle of zero."""
-        return [
-            sum((self._turned(part, point) for part in self.waves.parts if part.pin == pin), start=_NONE)
-            for pin in self.open
-        ]
+        """Return the wrench of every open throw at an angle of zero, for an operating point."""
 
-    def _turned(self, part: Moving, point: int) -> Spectrum:
-        wrench = part.found[0].loads[point].wrench.series
-        return wrench.holding(wrench.coefficients * np.exp(1j * wrench.orders * part.ahead)[:, None])
+        def turned(part: Moving) -> Spectrum:
+            wrench = part.found[0].loads[point].wrench.series
+            return wrench.holding(wrench.coefficients * np.exp(1j * wrench.orders * part.ahead)[:, None])
+
+        parts = self.waves.parts
+        return [sum((turned(part) for part in parts if part.pin == pin), start=_NONE) for pin in self.open]
 
 
 def throws_at(problem: Problem, phasing: Phasing, candidate: Candidate) -> OpenThrows | None:
-    """Return the throws of a design, at the turn that is nearest to their bounds; None where they are not all known.
+    """Return the throws of a design, in the turn closest to their bounds, or None if a bound cannot cover them.
 
-    Gas would fire at another time with every throw, and an open bank angle, pin or shaft is no throw.
+    Gas loads depend on throws nonlinearly, and open bank angles, pins or shafts are no throws.
     """
     unknown = problem.feels_gas or problem.fidelity.is_uneven or any(phasing.opened) or phasing.shafts.optional
     if phasing.throw_bounds is None or unknown:
@@ -87,8 +86,8 @@ def throws_at(problem: Problem, phasing: Phasing, candidate: Candidate) -> OpenT
 
 
 def along_arcs(halves: Array) -> tuple[Array, Array, Array]:
-    """Return the middle, the slope along i and the rest of e^{i a t}, t from -1 to 1, of these a (E72)."""
+    """Return the middle, the slope along i and the remainder of e^{i a t}, t from -1 to 1 (E72)."""
     rest = np.hypot(0.5 * (1.0 - np.cos(halves)), halves**3 / (9.0 * math.sqrt(3.0)))
     near = (halves <= math.pi) & (rest < 1.0)
-    told = np.where(near, 0.5 * (1.0 + np.cos(halves)), 0.0), np.where(near, np.sin(halves), 0.0)
-    return *told, np.where(near, rest, 1.0)
+    middle, slope = np.where(near, 0.5 * (1.0 + np.cos(halves)), 0.0), np.where(near, np.sin(halves), 0.0)
+    return middle, slope, np.where(near, rest, 1.0)

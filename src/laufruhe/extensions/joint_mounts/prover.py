@@ -1,4 +1,4 @@
-"""Ask boxes of mounts and unbalances, their corners first, where better designs are met on the way."""
+"""Provers of open mounts, unbalances and throws: multipliers at vertices of boxes first, then boxes of all numbers."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from laufruhe.solvers.mounts.places import started_at
 from laufruhe.solvers.told_limits import over_read
 
 EARLY = 0.1
-"""Share of the boxes that is tried before other provers go on."""
+"""Share of the boxes before other provers have their turn."""
 
 
 def corner_answers(question: Question) -> Iterator[Divided]:
-    """Yield one bound, with the best design that was met at a corner, whose value the question then has."""
+    """Yield one bound, with the best design at a vertex if it improves the value of the question."""
     problem = question.problem
     if question.of_many or question.value == math.inf:
         return
@@ -37,36 +37,36 @@ def corner_answers(question: Question) -> Iterator[Divided]:
         return design.value - over_read(problem, design.evaluation)
 
     boxes = DesignBoxes(problem, question.value, judge)
-    found = designed_bound(boxes, question.room, question.known)
+    divided = designed_bound(boxes, question.room, question.known)
     question.value = boxes.value
-    yield replace(found, places=() if boxes.best is None else (np.concatenate(boxes.best),))
+    yield replace(divided, places=() if boxes.best is None else (np.concatenate(boxes.best),))
 
 
 def load_answers(question: Question) -> Iterator[Divided]:
-    """Yield what boxes of mounts and unbalances prove; those behind others after a share of them are given up."""
+    """Yield bounds by boxes of mounts and unbalances; end early if another prover is better after a share of them."""
     if question.of_many:
         return
     problem, known = question.problem, _known(question)
-    # boxes of one number are few
+    # a problem of one number needs few boxes
     shares = (1.0,) if len(problem.decisions) == 1 else (EARLY, 1.0)
-    for found in load_bounds(problem, question.value, question.room, shares, known):
-        yield replace(found, places=())
-        if found.bound < question.bound:
+    for divided in load_bounds(problem, question.value, question.room, shares, known):
+        yield replace(divided, places=())
+        if divided.bound < question.bound:
             return
 
 
 def throw_answers(question: Question) -> Iterator[Divided]:
-    """Yield what boxes of throws between bounds, mounts and unbalances prove, in whatever order these fire (E72)."""
+    """Yield one bound by boxes of throws, mounts and unbalances, for any firing order (E72)."""
     throws = None if question.moves is None else throws_at(question.problem, *question.moves)
     if throws is not None:
         known = _known(question)
-        place = None if known is None else np.append(known.place, throws.given[throws.open])
-        known = None if known is None or place is None else replace(known, place=place)
+        if known is not None:
+            known = replace(known, place=np.append(known.place, throws.given[throws.open]))
         yield from load_bounds(throws.waves.problem, question.value, question.room, (1.0,), known, throws)
 
 
 def _known(question: Question) -> Known | None:
-    """Return the known design by its numbers of the mounts and the columns of its unbalances."""
+    """Return the known design by its numbers of the mounts and columns of unbalances."""
     known, problem = question.known, question.problem
     if known is None:
         return None

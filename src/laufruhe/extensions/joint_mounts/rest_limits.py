@@ -1,11 +1,11 @@
-"""Limits on numbers of the block at rest over a box of mounts, as polynomials that are over zero where broken (E70).
+"""Limits on sag, frequencies and stiffness over a box of mounts, as polynomials with a multiplier (E70).
 
-A quadratic form y' A y is a quadratic in s and a rest, whatever of the mounts is open (E68). No frequency is over that
-of any motion, nor the highest under it, and for every y
+For all open numbers of mounts, a quadratic form y' A y is a quadratic in s and a remainder (E68). The Rayleigh quotient
+of any y lies between the squares of the lowest and the highest frequency, and for every y
 
     p' A^-1 p >= 2 p' y - y' A y,
 
-so that each of these is a function of s that is nowhere over what the limit is of: it has a price.
+so each limit has a function of s nowhere above its violation.
 """
 
 from __future__ import annotations
@@ -37,11 +37,13 @@ class _Rest:
     Attributes
     ----------
     count
-        Open numbers.
+        Number of open numbers n.
+    at
+        Stiffness matrix over the box.
     pull, weight
-        Weight of the block in coordinates in which its mass is one, and its size [N].
+        Weight of the block in coordinates with unit mass, and its size [N].
     stiffness
-        In all, by (1, s, s s') [N/m].
+        Total stiffness by (1, s, s s') [N/m].
     """
 
     count: int
@@ -51,13 +53,13 @@ class _Rest:
     stiffness: Array
 
     def form(self, y: Array) -> tuple[Array, float]:
-        """Coefficients of y' A y, (4^n,), and what it may differ by."""
+        """Return Bernstein coefficients of y' A y, (4^n,), and its remainder."""
         powers, rest = self.at.form(y, self.count)
         return coefficients(self.count) @ powers, rest
 
     @cached_property
     def motions(self) -> Array:
-        """Of the middle, those of the lowest frequency first, shape (6, 6)."""
+        """Modes of the middle by rising frequency, shape (6, 6)."""
         return np.asarray(np.linalg.eigh(0.5 * (self.at.middle + self.at.middle.T))[1], dtype=np.float64)
 
 
@@ -71,19 +73,19 @@ def _sag(limit: Limit, rest: _Rest) -> list[Array]:
 
 
 def _frequencies(limit: Limit, rest: _Rest) -> list[Array]:
-    found = []
+    violations = []
     if limit.minimum > 0.0:
         least, (form, off) = (math.tau * limit.minimum * (1.0 - SLACK)) ** 2, rest.form(rest.motions[:, 0])
-        found.append((least - form - off) / least)
+        violations.append((least - form - off) / least)
     if limit.maximum < math.inf:
         most, (form, off) = (math.tau * limit.maximum * (1.0 + SLACK)) ** 2, rest.form(rest.motions[:, -1])
-        found.append((form - off - most) / most)
-    return found
+        violations.append((form - off - most) / most)
+    return violations
 
 
 def _stiffness(limit: Limit, rest: _Rest) -> list[Array]:
-    given, edges = coefficients(rest.count) @ rest.stiffness, ((1.0, limit.maximum), (-1.0, limit.minimum))
-    return [sign * (given - edge) / edge - SLACK for sign, edge in edges if 0.0 < edge < math.inf]
+    total, edges = coefficients(rest.count) @ rest.stiffness, ((1.0, limit.maximum), (-1.0, limit.minimum))
+    return [sign * (total - edge) / edge - SLACK for sign, edge in edges if 0.0 < edge < math.inf]
 
 
 OVER: Mapping[Channel, Callable[[Limit, _Rest], list[Array]]] = {
@@ -91,11 +93,11 @@ OVER: Mapping[Channel, Callable[[Limit, _Rest], list[Array]]] = {
     channels.FREQUENCIES: _frequencies,
     channels.TOTAL_STIFFNESS: _stiffness,
 }
-"""Coefficients that are nowhere over the excess over a limit of a number, as a share of it."""
+"""Bernstein coefficients of lower bounds of the relative violation of a limit."""
 
 
 class RestLimits:
-    """Of a problem that is open in numbers of mounts: those of its limits that are in the table."""
+    """Limits of a problem on the block at rest, as far as the table `OVER` has them."""
 
     def __init__(self, problem: Problem) -> None:
         self._problem = problem
@@ -103,15 +105,15 @@ class RestLimits:
         weight = weight_wrench(block)
         self._pull, self._weight = mass_root(block) @ weight, -float(weight[2])
         self._limits = [limit for limit in problem.mount_limits if limit.measure.channel in OVER]
-        stiffer = [[d.gain for d in each.mount_drives if d.number < STIFFNESS.stop] for each in problem.mount_decisions]
-        self._stiffer = np.array([sum(gains) for gains in stiffer], dtype=float)
+        gains = [[d.gain for d in each.mount_drives if d.number < STIFFNESS.stop] for each in problem.mount_decisions]
+        self._stiffness_slopes = np.array([sum(each) for each in gains], dtype=float)
 
     def over(self, lower: Array, upper: Array) -> list[Array]:
-        """Of every limit the Bernstein coefficients of what is not over its excess, as a share of it, (4^n,) each."""
+        """Return Bernstein coefficients of lower bounds of the relative violation of every limit, (4^n,) each."""
         if not self._limits:
             return []
-        whole = [float(edge[:, STIFFNESS].sum()) for edge in number_ranges(self._problem, lower, upper)]
-        stiffness = [[0.5 * sum(whole)], 0.5 * (upper - lower) * self._stiffer, np.zeros(len(lower) ** 2)]
+        total = [float(edge[:, STIFFNESS].sum()) for edge in number_ranges(self._problem, lower, upper)]
+        stiffness = [[0.5 * sum(total)], 0.5 * (upper - lower) * self._stiffness_slopes, np.zeros(len(lower) ** 2)]
         at = open_stiffness(self._problem, lower, upper)
         rest = _Rest(len(lower), at, self._pull, self._weight, np.concatenate(stiffness))
         return [each for limit in self._limits for each in OVER[limit.measure.channel](limit, rest)]
