@@ -22,7 +22,7 @@ from laufruhe.numerics.norms import RMS
 from laufruhe.numerics.progress import report_progress, within
 from laufruhe.numerics.workers import executor_for, ordered_map, working_on
 from laufruhe.problem import channels
-from laufruhe.problem.evaluation import Evaluation, with_default_sampling, evaluate
+from laufruhe.problem.evaluation import Evaluation, evaluate, with_default_sampling
 from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Method
