@@ -108,10 +108,10 @@ class DesignBoxes:
         self._rest = RestLimits(problem)
         self._corners: dict[tuple[float, ...], Corner] = {}
         orders = self.loads.orders
-        self._counted = np.zeros(len(orders.numbers), dtype=bool)
+        self._counted = np.zeros(len(orders.orders), dtype=bool)
         for measure in (term.measure for term in problem.load_terms if term.measure.on_mounts):
             shares = measure.shares(problem.points)
-            self._counted |= (shares[orders.points] > 0.0) & measure.counted(orders.numbers)
+            self._counted |= (shares[orders.points] > 0.0) & measure.counted(orders.orders)
         self.best: tuple[Array, Array] | None = None
 
     @property

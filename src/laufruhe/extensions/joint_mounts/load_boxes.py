@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.extensions.joint_mounts.mount_loops import Loop, is_looped, mount_loop
-from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads, Orders
+from laufruhe.extensions.joint_mounts.mounted_loads import MountedLoads
 from laufruhe.extensions.joint_mounts.open_throws import OpenThrows, along_arcs
 from laufruhe.extensions.joint_mounts.rest_limits import RestLimits
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
@@ -32,8 +32,8 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided, divided_on
 from laufruhe.prove.mounts.box_lines import BoxLines
-from laufruhe.prove.mounts.box_norms import Sampled, Under, counted_rows, line_weights, norm_under
-from laufruhe.prove.mounts.box_response import is_travel
+from laufruhe.prove.mounts.box_norms import Under, counted_rows, line_weights, norm_under
+from laufruhe.prove.mounts.box_response import LoadedOrders, is_travel
 from laufruhe.prove.mounts.box_series import Answer, Expansion, Sides, balanced, mapped, rest_of
 from laufruhe.prove.mounts.named import is_named
 from laufruhe.prove.mounts.ranges import SLACK
@@ -139,11 +139,6 @@ class LoadBoxes:
         self._rest = RestLimits(problem) if self._numbers else None
         self._left_out = self._drop_small_orders(left_out)
 
-    @property
-    def _sampled(self) -> Sampled:
-        orders = self._orders
-        return Sampled(orders.points, orders.places, orders.numbers, self.loads.samples)
-
     def _box(self, lower: Array, upper: Array) -> _Boxes:
         return _Boxes(self.loads, self._orders, self._numbers, lower, upper, self._ratios)
 
@@ -166,13 +161,13 @@ class LoadBoxes:
     @property
     def is_sampled_fully(self) -> bool:
         """Whether sums of squares over orders equal those over samples, as remainders suppose."""
-        return self._sampled.is_full
+        return self._orders.is_full
 
     @property
     def _cost(self) -> float:
         """Estimated time of one box, in about microseconds of one core."""
         columns, rows = len(self.lower) - self._numbers, 3 * len(self.problem.engine.mounts)
-        lifted, lines = len(self.lower) + self._numbers * columns, len(self._orders.numbers)
+        lifted, lines = len(self.lower) + self._numbers * columns, len(self._orders.orders)
         measures = 1 + len(self._limits) + len(self._terms) + 2 * self._ratios
         euclidean = all(m.norm.is_euclidean for _, m in (*self._terms, *self._limits) if m.on_mounts)
         samples = 0 if euclidean else self.loads.samples
@@ -239,8 +234,8 @@ class LoadBoxes:
             if _is_affine(measure, self.problem):
                 continue
             answer = box.answer(FORCE if is_ratio(measure) else measure)
-            share = np.sqrt(weight * line_weights(self.problem, measure, self._sampled))
-            share = share * measure.counted(self._sampled.orders)
+            share = np.sqrt(weight * line_weights(self.problem, measure, self._orders))
+            share = share * measure.counted(self._orders.orders)
             known = np.isfinite(answer.rest)[..., None] * share[:, None]
             value = np.where(known > 0.0, answer.value * known, 0.0).reshape(len(gram), -1)
             slopes = np.where(known[:, :, None] > 0.0, answer.slopes * known[:, :, None], 0.0)
@@ -255,17 +250,17 @@ class LoadBoxes:
             return box.affine_under(measure, near, averaged and measure.norm.averages)
         if is_ratio(measure):
             over, firm = (box.answer(FORCE, still) for still in (False, True))
-            groups = groups_of(measure, self.problem.points, self._sampled)
+            groups = groups_of(measure, self.problem.points, self._orders)
             ratio, scores = ratio_under(over, firm, groups)
             return Under(ratio, np.zeros((len(ratio), box.count)), np.zeros(len(ratio)), scores)
-        answer = _counted(box.answer(measure), measure.counted(self._sampled.orders))
+        answer = _counted(box.answer(measure), measure.counted(self._orders.orders))
         if averaged and measure.norm.averages:
             # averages are lower bounds of means by few samples (P7)
-            factors = np.sinc(self._sampled.places / self.loads.samples) ** 2
+            factors = np.sinc(self._orders.places / self.loads.samples) ** 2
             one, two = factors[:, None], factors[:, None, None]
             answer = Answer(answer.value * one, answer.slopes * two, answer.rest * factors, answer.bends * one)
         value = answer.value + np.einsum("bwkr,bk->bwr", answer.slopes, near)
-        bound = norm_under(self.problem, measure, replace(answer, value=value), self._sampled)
+        bound = norm_under(self.problem, measure, replace(answer, value=value), self._orders)
         return replace(bound, value=bound.value - np.einsum("bk,bk->b", bound.slopes, near))
 
 
@@ -279,20 +274,21 @@ class _Boxes:
     """
 
     def __init__(
-        self, loads: MountedLoads, orders: Orders, numbers: int, lower: Array, upper: Array, ratios: bool
+        self, loads: MountedLoads, orders: LoadedOrders, numbers: int, lower: Array, upper: Array, ratios: bool
     ) -> None:
         self._loads, self._numbers, self.lower, self.upper = loads, numbers, lower, upper
         self.columns = lower.shape[1] - numbers
         self.count = lower.shape[1] + numbers * self.columns
         centres, self._halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
         self._centres = centres[:, numbers:]
-        self._unbalances = unbalances = orders.loads.shape[1] - 1
+        self._unbalances = unbalances = sum(domain.width for domain in loads.domains)
         centres, halves = np.split(np.array([self._centres, self._halves[:, numbers:]]), [unbalances], axis=2)
-        fixed = orders.loads[:, :1] + np.einsum("bq,wqi->bwi", centres[0], orders.loads[:, 1:])[:, :, None]
-        moved = centres[1][:, None, :, None] * orders.loads[:, 1:]
+        columns, throws = np.split(orders.loads[:, 1:], [unbalances], axis=1)
+        fixed = orders.loads[:, :1] + np.einsum("bq,wqi->bwi", centres[0], columns)[:, :, None]
+        moved = centres[1][:, None, :, None] * columns
         at, reach = halves[0], halves[1]
-        turned = orders.turned * np.exp(1j * orders.numbers[:, None] * at[:, None])[..., None]
-        middle, slope, rest = (each[..., None] for each in along_arcs(orders.numbers[:, None] * reach[:, None]))
+        turned = throws * np.exp(1j * orders.orders[:, None] * at[:, None])[..., None]
+        middle, slope, rest = (each[..., None] for each in along_arcs(orders.orders[:, None] * reach[:, None]))
         fixed = fixed + (middle * turned).sum(axis=2, keepdims=True)
         self._columns: ComplexArray = np.concatenate([fixed, moved, 1j * slope * turned, rest * turned], axis=2)
         sides = list(zip(lower[:, :numbers], upper[:, :numbers], strict=True))

@@ -10,7 +10,7 @@ import numpy as np
 from laufruhe.extensions.joint_mounts.mount_loops import mount_loop
 from laufruhe.extensions.joint_mounts.open_throws import OpenThrows
 from laufruhe.load_models.affine import AffineModel, AffineNorm, AffineProblem
-from laufruhe.numerics.arrays import Array, ComplexArray, Indices
+from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.namespaces import NUMBERS
 from laufruhe.numerics.spectrum import Spectrum, in_one_base
 from laufruhe.physics.mount_numbers import mass_root
@@ -20,38 +20,8 @@ from laufruhe.problem.measure import Measure, load_rows
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Multipliers, minorant
-from laufruhe.prove.mounts.box_response import NOTHING, is_travel
+from laufruhe.prove.mounts.box_response import NOTHING, LoadedOrders, is_travel
 from laufruhe.prove.mounts.ranges import SLACK
-
-
-@dataclass(frozen=True, eq=False)
-class Orders:
-    """Loaded orders of all operating points.
-
-    Attributes
-    ----------
-    points, places
-        Index of the operating point, and multiple of the lowest order of the rows, shape (w,).
-    numbers, omegas
-        Orders of crank speed, and angular frequencies [rad/s], shape (w,).
-    loads
-        Wrenches r of the fixed loads, and of a unit of every column, in coordinates with unit mass, shape
-        (w, 1 + columns, 6).
-    turned
-        Wrenches r of every open throw at an angle of zero, shape (w, throws, 6).
-    """
-
-    points: Indices
-    places: Indices
-    numbers: Array
-    omegas: Array
-    loads: ComplexArray
-    turned: ComplexArray
-
-    def subset(self, which: Indices) -> Orders:
-        """Return some of the orders."""
-        indices = self.points[which], self.places[which]
-        return Orders(*indices, self.numbers[which], self.omegas[which], self.loads[which], self.turned[which])
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +69,8 @@ class MountedLoads:
         self._still: dict[tuple[Measure, bool], AffineNorm] = {}
 
     @cached_property
-    def orders(self) -> Orders:
-        """Loaded orders."""
+    def orders(self) -> LoadedOrders:
+        """Loaded orders with wrenches of fixed loads, a unit of every column, and every open throw at zero."""
         moved = moved_wrench(NUMBERS, mounting_in(self.problem.engine).block.centre_of_gravity).T @ self.root.T
         rows: list[tuple[int, int, float, float, ComplexArray]] = []
         at = self._throws.given[self._throws.open] if self._throws else np.zeros(0)
@@ -113,10 +83,8 @@ class MountedLoads:
             for k in np.flatnonzero(size > NOTHING * size.max(initial=0.0)):
                 number, place = float(k) * float(base), int(k) * base / self._model.base
                 rows.append((p, round(place), number, number * point.speed, loads[:, k]))
-        points, places, numbers, omegas, each = zip(*rows, strict=True)
-        indices = np.array(points), np.array(places), np.array(numbers), np.array(omegas)
-        loads, turned = np.split(np.array(each), [len(each[0]) - len(at)], axis=1)
-        return Orders(*indices, loads, turned)
+        points, places, numbers, omegas, wrenches = (np.array(column) for column in zip(*rows, strict=True))
+        return LoadedOrders(points, places, numbers, omegas, wrenches, self.samples)
 
     def still(self, measure: Measure, averaged: bool) -> AffineNorm:
         """Return a norm that does not depend on mounts."""
@@ -216,7 +184,7 @@ class MountedLoads:
         # sum of z exp(-i k t) over samples
         waves = np.fft.fft(rows, axis=2)
         out = np.zeros((len(orders.omegas), len(problem.engine.mounts), 3), dtype=complex)
-        counted = measure.counted(orders.numbers)
+        counted = measure.counted(orders.orders)
         for k, p in enumerate(points):
             at = np.flatnonzero((orders.points == p) & counted)
             out[np.ix_(at, np.array(chosen))] = waves[k][:, orders.places[at] % self.samples].transpose(1, 0, 2)

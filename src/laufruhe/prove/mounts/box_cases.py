@@ -17,7 +17,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, counted_cases
 from laufruhe.problem.measure import Measure
 from laufruhe.prove.mounts.box_norms import Under, counted_rows, nothing_under
-from laufruhe.prove.mounts.box_response import BoxModel, Lines, is_travel
+from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders, is_travel
 from laufruhe.prove.mounts.box_series import Expansion, mapped, series
 
 STEPS, HALVINGS = 30, 12
@@ -25,7 +25,7 @@ STEPS, HALVINGS = 30, 12
 ROUNDS, WIDER, FASTER = 16, 1.0 + 1e-6, 1.4
 # accuracy of an equilibrium as a share of a gap, and spans of travel within which a stop may close
 EXACT, NEXT = 1e-9, 2.0
-STILL = Lines(*(np.zeros(1, dtype=np.intp),) * 2, *(np.zeros(1),) * 2, np.zeros((1, 6), dtype=np.complex128))
+STILL = LoadedOrders(*(np.zeros(1, dtype=np.intp),) * 2, *(np.zeros(1),) * 2, np.zeros((1, 6), dtype=np.complex128), 0)
 _AS_LOADS: Mapping[Channel, Channel] = {
     channels.STATIC_TRAVEL: channels.MOUNT_TRAVEL,
     channels.STATIC_FORCE: channels.MOUNT_FORCE,

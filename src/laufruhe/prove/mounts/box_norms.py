@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.numerics.arrays import Array, Indices, Mask
+from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.box_response import BoxModel, Lines
+from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders
 from laufruhe.prove.mounts.box_series import Answer, Expansion
 
 PARTS = ("value", "slopes", "rest", "bends")
@@ -59,53 +58,14 @@ def nothing_under(lower: Array) -> Under:
     return Under(np.zeros(len(lower)), np.zeros_like(lower), np.zeros(len(lower)), np.zeros_like(lower))
 
 
-@dataclass(frozen=True, eq=False)
-class Sampled:
-    """Orders of operating points with the samples of one period.
-
-    Attributes
-    ----------
-    points
-        Index of the operating point, shape (lines,).
-    places, orders
-        Multiples of the lowest order of the period, and of crank speed, shape (lines,).
-    samples
-        Samples of the period.
-    """
-
-    points: Indices
-    places: Indices
-    orders: Array
-    samples: int
-
-    @classmethod
-    def of(cls, model: BoxModel, lines: Lines) -> Sampled:
-        """Return the orders of lines with the samples of a working cycle."""
-        base = model.problem.engine.cycle.base_order
-        steps = np.array([int(loads.wrench.base / base) for loads in model.evaluation.loads], dtype=np.intp)
-        return cls(lines.points, lines.places * steps[lines.points], lines.orders, model.evaluation.samples)
-
-    @property
-    def is_full(self) -> bool:
-        """Whether every order has more than two samples, so that sums over samples equal those over the period."""
-        return bool(2 * self.places.max(initial=0) < self.samples)
-
-    def turns(self, own: NDArray[np.intp]) -> NDArray[np.complex128]:
-        """Return phases of samples and some orders, shape (samples, orders), without repeated samples."""
-        factor = int(np.gcd.reduce(self.places[own])) or 1
-        factor = factor if self.samples % factor == 0 else 1
-        places, samples = self.places[own] // factor, self.samples // factor
-        return np.asarray(np.exp(2j * math.pi / samples * (np.outer(np.arange(samples), places) % samples)))
-
-
-def under(model: BoxModel, quantity: Measure, lines: Lines, at: Expansion) -> Under:
+def under(model: BoxModel, quantity: Measure, lines: LoadedOrders, at: Expansion) -> Under:
     """Return a linear lower bound of a norm of forces or travel on every box (E38)."""
     rows, factors = counted_rows(model.problem, quantity)
     answer = model.answer(lines, at, quantity.channel, rows, factors)
-    return norm_under(model.problem, quantity, answer, Sampled.of(model, lines))
+    return norm_under(model.problem, quantity, answer, lines)
 
 
-def norm_under(problem: Problem, quantity: Measure, answer: Answer, lines: Sampled) -> Under:
+def norm_under(problem: Problem, quantity: Measure, answer: Answer, lines: LoadedOrders) -> Under:
     """Return a linear lower bound of a norm of responses on every box (E38).
 
     Parameters
@@ -148,14 +108,14 @@ def counted_rows(problem: Problem, quantity: Measure) -> tuple[NDArray[np.intp],
     return rows, np.tile(np.array(quantity.direction_weights or (1.0, 1.0, 1.0)), len(chosen))
 
 
-def line_weights(problem: Problem, quantity: Measure, lines: Sampled | Lines) -> Array:
+def line_weights(problem: Problem, quantity: Measure, lines: LoadedOrders) -> Array:
     """Return the weights of squares of orders in the mean over cycle, mounts and operating points, shape (lines,)."""
     chosen = quantity.places([mount.name for mount in problem.engine.mounts])
     share = quantity.shares(problem.points)
     return np.asarray(share[lines.points] * np.where(lines.orders > 0.0, 0.5, 1.0) / len(chosen))
 
 
-def _sampled(quantity: Measure, answer: Answer, lines: Sampled, p: int) -> Under:
+def _sampled(quantity: Measure, answer: Answer, lines: LoadedOrders, p: int) -> Under:
     """Bound a mean, maximum or peak to peak over the samples of one operating point."""
     own = np.flatnonzero(lines.points == p)
     value, slopes, rest, bends = answer.value[:, own], answer.slopes[:, own], answer.rest[:, own], answer.bends[:, own]

@@ -30,17 +30,19 @@ NOTHING = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
+class LoadedOrders:
     """Loaded orders of all operating points.
 
     Attributes
     ----------
     points, places
-        Index of the operating point, and of the order in its spectrum, shape (lines,).
+        Index of the operating point, and multiple of the lowest order of the sampled period, shape (lines,).
     orders, omegas
-        Orders, and angular frequencies [rad/s], shape (lines,).
+        Orders of crank speed, and angular frequencies [rad/s], shape (lines,).
     loads
-        Wrenches r in coordinates with unit mass, shape (lines, 6).
+        Wrenches r in coordinates with unit mass, shape (lines, 6), or (lines, loads, 6) for several loads.
+    samples
+        Samples of the period; zero if some order is no multiple of its lowest order.
     """
 
     points: Indices
@@ -48,15 +50,28 @@ class Lines:
     orders: Array
     omegas: Array
     loads: ComplexArray
+    samples: int
 
-    def subset(self, which: NDArray[np.bool_]) -> Lines:
-        """Return some of the lines."""
-        parts = (self.points[which], self.places[which], self.orders[which], self.omegas[which], self.loads[which])
-        return Lines(*parts)
+    def subset(self, which: NDArray[np.bool_] | Indices) -> LoadedOrders:
+        """Return some of the orders."""
+        indices, numbers = (self.points[which], self.places[which]), (self.orders[which], self.omegas[which])
+        return LoadedOrders(*indices, *numbers, self.loads[which], self.samples)
 
-    def still(self) -> Lines:
+    def still(self) -> LoadedOrders:
         """Return the same loads at zero frequency, for forces on rigid mounts (E11)."""
-        return Lines(self.points, self.places, self.orders, np.zeros_like(self.omegas), self.loads)
+        return replace(self, omegas=np.zeros_like(self.omegas))
+
+    @property
+    def is_full(self) -> bool:
+        """Whether every order has more than two samples, so that sums over samples equal those over the period."""
+        return bool(2 * self.places.max(initial=0) < self.samples)
+
+    def turns(self, which: Indices) -> ComplexArray:
+        """Return phases of samples and some orders, shape (samples, orders), without repeated samples."""
+        factor = int(np.gcd.reduce(self.places[which])) or 1
+        factor = factor if self.samples % factor == 0 else 1
+        places, samples = self.places[which] // factor, self.samples // factor
+        return np.asarray(np.exp(2j * math.pi / samples * (np.outer(np.arange(samples), places) % samples)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,33 +151,27 @@ class BoxModel:
         maps = ((part @ motions).reshape(-1, 6) for part in parts)
         return Matrices(*totals, *maps)
 
-    def lines(self, quantity: Measure | None = None) -> Lines:
+    def lines(self, quantity: Measure | None = None) -> LoadedOrders:
         """Return all loaded orders, or those that a quantity counts."""
         moved = self.root @ moved_wrench(NUMBERS, self.mounting(self.lower).block.centre_of_gravity)
-        found: list[tuple[int, int, float, float, ComplexArray]] = []
+        base, samples = self.problem.engine.cycle.base_order, self.evaluation.samples
+        rows: list[tuple[int, int, float, float, ComplexArray]] = []
         for p, loads in enumerate(self.evaluation.loads):
+            step = loads.wrench.base / base
+            samples = samples if step.denominator == 1 else 0
             size = np.abs(loads.wrench.coefficients).max(axis=1, initial=0.0)
             for k in np.flatnonzero(size > NOTHING * size.max(initial=0.0)):
                 order = float(loads.wrench.orders[k])
-                found.append((p, int(k), order, order * loads.point.speed, moved @ loads.wrench.coefficients[k]))
-        points, places, orders, omegas, loads_ = zip(*found, strict=True) if found else ((), (), (), (), ())
-        lines = Lines(
+                rows.append((p, int(int(k) * step), order, order * loads.point.speed, moved @ loads.wrench.coefficients[k]))
+        points, places, orders, omegas, wrenches = zip(*rows, strict=True) if rows else ((), (), (), (), ())
+        lines = LoadedOrders(
             np.array(points, dtype=np.intp), np.array(places, dtype=np.intp), np.array(orders, dtype=float),
-            np.array(omegas, dtype=float), np.array(loads_, dtype=complex).reshape(-1, 6),
+            np.array(omegas, dtype=float), np.array(wrenches, dtype=complex).reshape(-1, 6), samples,
         )  # fmt: skip
         if quantity is None:
             return lines
         keep = np.isin(lines.points, self.counted(quantity.points))
         return lines.subset(keep & quantity.counted(lines.orders))
-
-    def samples_fully(self, lines: Lines) -> bool:
-        """Return whether every order has more than two samples in a period of the loads."""
-        base = self.problem.engine.cycle.base_order
-        steps = [loads.wrench.base / base for loads in self.evaluation.loads]
-        if any(step.denominator != 1 for step in steps):
-            return False
-        places = lines.places * np.array([int(step) for step in steps])[lines.points]
-        return bool(2 * places.max(initial=0) < self.evaluation.samples)
 
     def counted(self, names: tuple[str, ...] | None) -> list[int]:
         """Return the indices of operating points by name; all for None."""
@@ -196,7 +205,7 @@ class BoxModel:
         base: Array = getattr(self._base, name)
         return np.asarray(base + np.einsum("bn,nij->bij", x - self.lower, self.slopes[name]))
 
-    def expanded(self, lines: Lines, lower: Array, upper: Array) -> Expansion:
+    def expanded(self, lines: LoadedOrders, lower: Array, upper: Array) -> Expansion:
         """Return the series of motion over boxes of stiffness, shape (boxes, n) (E37)."""
         centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
         stiffness, loss, damping = (self.at(name, centres)[:, None] for name in ("stiffness", "loss", "damping"))
@@ -206,13 +215,13 @@ class BoxModel:
         motion = np.matmul(inverse, lines.loads[:, :, None])[..., 0]
         return series(centres, halves, inverse, self.sides, _dynamic(lines, *self._inside), motion)
 
-    def answer(self, lines: Lines, at: Expansion, channel: Channel, rows: Indices, factors: Array) -> Answer:
+    def answer(self, lines: LoadedOrders, at: Expansion, channel: Channel, rows: Indices, factors: Array) -> Answer:
         """Return selected rows of forces or travel, times factors, as linear functions over boxes (E37)."""
         value, turned = self.maps(lines, at, channel, rows)
         return mapped(at, value * factors[:, None], None if turned is None else turned * factors[:, None])
 
     def maps(
-        self, lines: Lines, at: Expansion, channel: Channel, rows: Indices
+        self, lines: LoadedOrders, at: Expansion, channel: Channel, rows: Indices
     ) -> tuple[ComplexArray, ComplexArray | None]:
         """Return maps from motion to forces or travel, (boxes, lines, r, 6), and their slopes, (..., r, m)."""
         if is_travel(channel):
@@ -225,7 +234,7 @@ class BoxModel:
         by_side = _dynamic(lines, *(each[rows] for each in self._along))
         return value, by_side * at.halves[:, None, None, self.sides.own]
 
-    def largest_response(self, lines: Lines, channel: Channel) -> Array:
+    def largest_response(self, lines: LoadedOrders, channel: Channel) -> Array:
         """Return upper bounds of the response of all mounts within all bounds, shape (lines,) (E41).
 
         Orders that are not above all natural frequencies have an infinite bound.
@@ -244,7 +253,7 @@ class BoxModel:
         return np.asarray(motion * (still + lines.omegas * math.sqrt(most) * float(np.linalg.norm(top.dampers))))
 
 
-def _dynamic(lines: Lines, springs: Array, losses: Array, dampers: Array) -> ComplexArray:
+def _dynamic(lines: LoadedOrders, springs: Array, losses: Array, dampers: Array) -> ComplexArray:
     """Return dynamic stiffnesses at the frequencies of lines, (..., i, j) to (..., lines, i, j)."""
     moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
     return np.asarray(springs + 1j * (moving * losses + omegas * dampers))

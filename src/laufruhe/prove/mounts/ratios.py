@@ -12,8 +12,8 @@ from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.problem import channels
 from laufruhe.problem.measure import Measure
-from laufruhe.prove.mounts.box_norms import Sampled, Under, root_under
-from laufruhe.prove.mounts.box_response import Lines
+from laufruhe.prove.mounts.box_norms import Under, root_under
+from laufruhe.prove.mounts.box_response import LoadedOrders
 from laufruhe.prove.mounts.box_series import Answer
 
 HALVINGS = 45
@@ -26,7 +26,7 @@ def is_ratio(measure: Measure) -> bool:
     return measure.channel in RATIOS
 
 
-def groups_of(quantity: Measure, points: Sequence[OperatingPoint], lines: Lines | Sampled) -> list[Mask]:
+def groups_of(quantity: Measure, points: Sequence[OperatingPoint], lines: LoadedOrders) -> list[Mask]:
     """Return masks of the lines of each ratio: one per operating point and named order, or all orders above zero."""
     out = []
     for p in (p for p in np.unique(lines.points) if quantity.counts_point(points[p])):
@@ -46,17 +46,17 @@ def ratio_under(over: Answer, firm: Answer, groups: Sequence[Mask]) -> tuple[Arr
     groups
         Orders of each ratio, from `groups_of`.
     """
-    best, pull = np.zeros(len(over.value)), np.zeros(over.bends[:, 0].shape)
+    best, scores = np.zeros(len(over.value)), np.zeros(over.bends[:, 0].shape)
     for group in groups:
         weights = group.astype(float)
         top, bottom = root_under(over, weights), root_under(firm, weights)
-        bent = np.einsum("k,bk->b", weights, np.linalg.norm(firm.slopes, axis=-1).sum(axis=-1) ** 2)
+        square = np.einsum("k,bk->b", weights, np.linalg.norm(firm.slopes, axis=-1).sum(axis=-1) ** 2)
         known = np.all(np.isfinite(firm.rest[:, group]), axis=1) & (bottom.value > 0.0)
-        bend = bent / (2.0 * np.where(known, bottom.value, 1.0))
-        least = _least_ratio(top, replace(bottom, rest=bottom.rest + bend))
+        curvature = square / (2.0 * np.where(known, bottom.value, 1.0))
+        least = _least_ratio(top, replace(bottom, rest=bottom.rest + curvature))
         best = np.maximum(best, np.where(known, least, 0.0))
-        pull = np.maximum(pull, (top.bends + least[:, None] * bottom.bends) / bottom.value[:, None])
-    return best, pull
+        scores = np.maximum(scores, (top.bends + least[:, None] * bottom.bends) / bottom.value[:, None])
+    return best, scores
 
 
 def _least_ratio(top: Under, bottom: Under) -> Array:

@@ -28,7 +28,7 @@ from laufruhe.prove.best_first import NEARLY, Divided, divided_on
 from laufruhe.prove.mounts.box_lines import BoxLines
 from laufruhe.prove.mounts.box_norms import Under, under
 from laufruhe.prove.mounts.box_numbers import RANGES, SAID, UNDER, breaks
-from laufruhe.prove.mounts.box_response import BoxModel, Lines
+from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.ranges import SLACK
 from laufruhe.prove.mounts.ratios import groups_of, is_ratio, ratio_under
@@ -148,7 +148,7 @@ class StiffnessBoxes:
     @property
     def is_sampled_fully(self) -> bool:
         """Whether sums of squares over orders equal those over samples, as remainders suppose."""
-        return all(self.model.samples_fully(lines) for _, _, lines, _ in (*self._terms, *self._limits))
+        return all(lines.is_full for _, _, lines, _ in (*self._terms, *self._limits))
 
     @property
     def _cost(self) -> int:
@@ -253,7 +253,7 @@ class StiffnessBoxes:
                 out |= breaks(self.model, limit, lower, upper)
         return out
 
-    def _ratio_lines(self, quantity: Measure) -> Lines:
+    def _ratio_lines(self, quantity: Measure) -> LoadedOrders:
         counted = Measure(channels.MOUNT_FORCE, NORMS["rms"], points=quantity.points, orders=quantity.orders)
         lines = self.model.lines(counted)
         return lines.subset(lines.omegas > 0.0)
@@ -270,7 +270,7 @@ class StiffnessBoxes:
         return ratio_under(over, firm, groups_of(quantity, self.problem.points, lines))
 
 
-def _relevant_lines(model: BoxModel, quantity: Measure, budget: float) -> tuple[Lines, float]:
+def _relevant_lines(model: BoxModel, quantity: Measure, budget: float) -> tuple[LoadedOrders, float]:
     """Return lines without small ones that sum to less than a budget, and the effect of these on the norm (E41)."""
     lines = model.lines(quantity)
     size = max(quantity.direction_weights or (1.0,)) * model.largest_response(lines, quantity.channel)
