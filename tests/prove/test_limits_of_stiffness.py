@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from laufruhe.prove.mounts.box_lines import BoxLines
+from laufruhe.prove.mounts.box_lines import LinearRelaxation
 from laufruhe.solvers import solve
 from laufruhe.solvers.result import Status
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
@@ -21,7 +21,9 @@ def test_the_least_excess_is_never_over_that_of_a_linear_program() -> None:
     for _ in range(80):
         n, count = int(r.integers(1, 5)), int(r.integers(1, 4))
         overs, by = r.uniform(-1.5, 0.5, count), r.normal(size=(count, n))
-        lines = BoxLines(np.zeros(1), np.zeros((1, n)), [(overs[k : k + 1], by[k : k + 1]) for k in range(count)])
+        lines = LinearRelaxation(
+            np.zeros(1), np.zeros((1, n)), [(overs[k : k + 1], by[k : k + 1]) for k in range(count)]
+        )
         # least t with over + by x <= t
         exact = linprog(
             [*np.zeros(n), 1.0], A_ub=np.column_stack([by, -np.ones(count)]), b_ub=-overs,
@@ -41,7 +43,7 @@ def test_three_limits_exclude_a_box_that_no_two_of_them_do() -> None:
 
     def excess(which: list[int]) -> float:
         limits = [(np.array([over]), n[k : k + 1]) for k in which]
-        return float(BoxLines(np.zeros(1), np.zeros((1, 2)), limits).excess[0])
+        return float(LinearRelaxation(np.zeros(1), np.zeros((1, 2)), limits).excess[0])
 
     assert excess([0, 1, 2]) == pytest.approx(over)
     assert all(excess(pair) < 0.0 for pair in ([0, 1], [0, 2], [1, 2]))

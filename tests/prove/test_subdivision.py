@@ -17,7 +17,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.mounts.box_lines import BoxLines
+from laufruhe.prove.mounts.box_lines import LinearRelaxation
 from laufruhe.prove.mounts.box_norms import under
 from laufruhe.prove.mounts.box_numbers import sag, sag_under
 from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bounds, divides
@@ -312,7 +312,9 @@ def test_prices_of_limits_are_never_over_what_a_box_has() -> None:
         n, limits = int(generator.integers(1, 5)), int(generator.integers(1, 4))
         value, slopes = generator.uniform(2.0, 6.0), generator.normal(size=n)
         overs, by = generator.uniform(-1.5, 0.5, limits), generator.normal(size=(limits, n))
-        boxes = BoxLines(np.array([value]), slopes[None], [(overs[k : k + 1], by[k : k + 1]) for k in range(limits)])
+        boxes = LinearRelaxation(
+            np.array([value]), slopes[None], [(overs[k : k + 1], by[k : k + 1]) for k in range(limits)]
+        )
         found = float(boxes.least[0])
         exact = linprog(slopes, A_ub=by, b_ub=-overs, bounds=[(-1.0, 1.0)] * n)
         if exact.status == 2:

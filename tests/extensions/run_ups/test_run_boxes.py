@@ -31,7 +31,7 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.mounts.box_norms import Under
+from laufruhe.prove.mounts.box_norms import LinearBound
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.solvers import Status
 from problem_files import PROBLEMS
@@ -119,7 +119,7 @@ def of_seed(seed: int) -> Boxes:
     return Boxes(seed)
 
 
-def least(under: Under) -> Array:
+def least(under: LinearBound) -> Array:
     found = under.value - under.rest - np.abs(under.slopes).sum(axis=1)
     return np.where(np.isfinite(found), found, -np.inf)
 

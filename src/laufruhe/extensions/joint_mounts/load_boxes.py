@@ -31,10 +31,10 @@ from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import Divided, divided_on
-from laufruhe.prove.mounts.box_lines import BoxLines
-from laufruhe.prove.mounts.box_norms import Under, counted_rows, line_weights, norm_under
+from laufruhe.prove.mounts.box_lines import LinearRelaxation
+from laufruhe.prove.mounts.box_norms import LinearBound, counted_rows, line_weights, norm_under
 from laufruhe.prove.mounts.box_response import LoadedOrders, is_travel
-from laufruhe.prove.mounts.box_series import Answer, Expansion, Sides, balanced, mapped, rest_of
+from laufruhe.prove.mounts.box_series import Expansion, LinearResponse, Sides, balanced, mapped, rest_of
 from laufruhe.prove.mounts.named import is_named
 from laufruhe.prove.mounts.ranges import SLACK
 from laufruhe.prove.mounts.ratios import groups_of, is_ratio, ratio_under
@@ -199,7 +199,7 @@ class LoadBoxes:
     def _bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
         box = self._box(lower, upper)
         near = self._nearest(box)
-        lines = BoxLines.zero(np.zeros((len(lower), box.count)))
+        lines = LinearRelaxation.zero(np.zeros((len(lower), box.count)))
         scores, size = np.zeros_like(lower), np.zeros(len(lower))
         for weight, measure in self._terms:
             bound = self._under(box, measure, near, False)
@@ -244,7 +244,7 @@ class LoadBoxes:
             pull = pull + np.matmul(slopes.conj().swapaxes(1, 2), value[..., None])[..., 0].real
         return _least_squares(gram, pull)
 
-    def _under(self, box: _Boxes, measure: Measure, near: Array, averaged: bool) -> Under:
+    def _under(self, box: _Boxes, measure: Measure, near: Array, averaged: bool) -> LinearBound:
         """Return the tangent of a measure at numbers, shape (boxes, numbers), as a lower bound."""
         if _is_affine(measure, self.problem):
             return box.affine_under(measure, near, averaged and measure.norm.averages)
@@ -252,13 +252,13 @@ class LoadBoxes:
             over, firm = (box.answer(FORCE, still) for still in (False, True))
             groups = groups_of(measure, self.problem.points, self._orders)
             ratio, scores = ratio_under(over, firm, groups)
-            return Under(ratio, np.zeros((len(ratio), box.count)), np.zeros(len(ratio)), scores)
+            return LinearBound(ratio, np.zeros((len(ratio), box.count)), np.zeros(len(ratio)), scores)
         answer = _counted(box.answer(measure), measure.counted(self._orders.orders))
         if averaged and measure.norm.averages:
             # averages are lower bounds of means by few samples (P7)
             factors = np.sinc(self._orders.places / self.loads.samples) ** 2
             one, two = factors[:, None], factors[:, None, None]
-            answer = Answer(answer.value * one, answer.slopes * two, answer.rest * factors, answer.bends * one)
+            answer = LinearResponse(answer.value * one, answer.slopes * two, answer.rest * factors, answer.bends * one)
         value = answer.value + np.einsum("bwkr,bk->bwr", answer.slopes, near)
         bound = norm_under(self.problem, measure, replace(answer, value=value), self._orders)
         return replace(bound, value=bound.value - np.einsum("bk,bk->b", bound.slopes, near))
@@ -295,7 +295,7 @@ class _Boxes:
         self._running = self._expanded([mount_loop(loads.problem, orders.omegas, *box) for box in sides])
         still = np.zeros_like(orders.omegas)
         self._static = self._expanded([mount_loop(loads.problem, still, *box) for box in sides]) if ratios else None
-        self._cache: dict[tuple[bool, tuple[int, ...], tuple[float, ...], bool], Answer] = {}
+        self._cache: dict[tuple[bool, tuple[int, ...], tuple[float, ...], bool], LinearResponse] = {}
 
     def _expanded(self, loops: list[Loop]) -> tuple[list[Loop], list[Expansion]]:
         """Return one expansion for the fixed loads, and one for each column."""
@@ -314,7 +314,7 @@ class _Boxes:
             expansions.append(Expansion(ones, ones, sides, column, still, gain, channels_in, balance, rest))
         return loops, expansions
 
-    def answer(self, measure: Measure, still: bool = False) -> Answer:
+    def answer(self, measure: Measure, still: bool = False) -> LinearResponse:
         """Return forces or travel that a measure counts, times its factors; static forces if `still`."""
         rows, factors = counted_rows(self._loads.problem, measure)
         key = (is_travel(measure.channel), tuple(rows.tolist()), tuple(factors.tolist()), still)
@@ -325,7 +325,7 @@ class _Boxes:
             self._cache[key] = self._together([_shared(at, mapped(at, value, turned)) for at in expansions])
         return self._cache[key]
 
-    def _together(self, answers: list[Answer]) -> Answer:
+    def _together(self, answers: list[LinearResponse]) -> LinearResponse:
         """Join the responses to fixed loads, columns, and remainders of throws to one linear function."""
         fixed, moved, beyond = answers[0], answers[1 : 1 + self.columns], answers[1 + self.columns :]
         value, (boxes, lines, rows) = fixed.value, fixed.value.shape
@@ -338,9 +338,9 @@ class _Boxes:
         bends = fixed.bends + sum((each.bends for each in moved), np.zeros_like(fixed.bends))
         # smaller sides of unbalances do not make a series converge
         bends = np.concatenate([bends, np.moveaxis(np.where(np.isfinite(rests), rests, 0.0), 0, -1)], axis=2)
-        return Answer(value, slopes, fixed.rest + rests.sum(axis=0), bends)
+        return LinearResponse(value, slopes, fixed.rest + rests.sum(axis=0), bends)
 
-    def scores(self, bound: Under) -> Array:
+    def scores(self, bound: LinearBound) -> Array:
         """Return branching scores, shape (boxes, open numbers)."""
         crossed = np.abs(bound.slopes[:, self._numbers + self.columns :]).reshape(
             len(self.lower), self.columns, self._numbers
@@ -348,7 +348,7 @@ class _Boxes:
         shared = np.concatenate([crossed.sum(axis=1), crossed.sum(axis=2)], axis=1)
         return np.asarray(np.nan_to_num(bound.bends, posinf=1e300) + 0.5 * shared)
 
-    def affine_under(self, measure: Measure, near: Array, averaged: bool) -> Under:
+    def affine_under(self, measure: Measure, near: Array, averaged: bool) -> LinearBound:
         """Return the tangent of a norm that does not depend on mounts."""
         norm, columns = self._loads.still(measure, averaged), slice(self._numbers, self._numbers + self._unbalances)
         centres, halves = self._centres[:, : self._unbalances], self._halves[:, columns]
@@ -358,24 +358,24 @@ class _Boxes:
             by = norm.pulled(z)
             value[k] = float(np.vdot(z, norm.constant)) + by @ centres[k]
             slopes[k, columns] = by * halves[k]
-        return Under(value, slopes, np.zeros(len(near)), np.abs(slopes[:, : self.lower.shape[1]]))
+        return LinearBound(value, slopes, np.zeros(len(near)), np.abs(slopes[:, : self.lower.shape[1]]))
 
 
-def _shared(at: Expansion, answer: Answer) -> Answer:
+def _shared(at: Expansion, answer: LinearResponse) -> LinearResponse:
     """Return an answer whose branching scores include the whole remainder, by the gain of each side."""
     beyond = np.where(np.isfinite(answer.rest), answer.rest - answer.bends.sum(axis=-1), 0.0)
     pull = at.pull / np.maximum(at.pull.sum(axis=-1, keepdims=True), 1e-300)
     return replace(answer, bends=answer.bends + np.maximum(beyond, 0.0)[..., None] * pull)
 
 
-def _counted(answer: Answer, which: Mask) -> Answer:
+def _counted(answer: LinearResponse, which: Mask) -> LinearResponse:
     """Return an answer with zero for all other orders."""
     if which.all():
         return answer
     value, slopes = (
         np.where(which.reshape(-1, *(1,) * n), each, 0.0) for n, each in ((1, answer.value), (2, answer.slopes))
     )
-    return Answer(value, slopes, np.where(which, answer.rest, 0.0), np.where(which[:, None], answer.bends, 0.0))
+    return LinearResponse(value, slopes, np.where(which, answer.rest, 0.0), np.where(which[:, None], answer.bends, 0.0))
 
 
 def _least_squares(gram: Array, pull: Array) -> Array:

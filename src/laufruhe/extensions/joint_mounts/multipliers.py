@@ -54,7 +54,9 @@ def _solve(problem: AffineProblem) -> tuple[Array | None, Bound]:
         coarse = coarser(problem, times)
         solution = solve_cones(coarse)
         if solution.x is None:
-            limits = spread(problem, refine_multipliers(coarse, problem, replace(solution.multipliers, terms=()))).limits
+            limits = spread(
+                problem, refine_multipliers(coarse, problem, replace(solution.multipliers, terms=()))
+            ).limits
             return None, replace(best, multipliers=replace(best.multipliers, limits=limits))
         x, best = solution.x, best_bound(problem, solution.x, refine_multipliers(coarse, problem, solution.multipliers))
         if times > 1 and _depends_on_few_rows(problem):

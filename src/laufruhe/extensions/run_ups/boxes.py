@@ -20,7 +20,7 @@ from laufruhe.physics.time_model import time_model
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.box_norms import Under
+from laufruhe.prove.mounts.box_norms import LinearBound
 from laufruhe.prove.mounts.box_response import BoxModel
 
 # long steps that a run has at least
@@ -66,7 +66,7 @@ class RunBoxes:
             runs.append(RunMoments(sweep, wrenches, self._matrices.base.load, max(int(most), 1)))
         return tuple(runs)
 
-    def under(self, measure: Measure, lower: Array, upper: Array, mask: Mask | None = None) -> Under:
+    def under(self, measure: Measure, lower: Array, upper: Array, mask: Mask | None = None) -> LinearBound:
         """Return linear functions under a measure on boxes, shapes (boxes, open numbers), or on those of a mask.
 
         The rest is infinite where no bound is known.
@@ -75,7 +75,7 @@ class RunBoxes:
         step = max(run.step for run in self._runs)
         known = of.known & (np.linalg.norm(of.matrix, 2, axis=(-2, -1)) * step <= FARTHEST)
         which = np.flatnonzero(known if mask is None else known & mask)
-        out = Under(np.zeros(len(lower)), np.zeros_like(lower), np.full(len(lower), np.inf), np.ones_like(lower))
+        out = LinearBound(np.zeros(len(lower)), np.zeros_like(lower), np.full(len(lower), np.inf), np.ones_like(lower))
         if len(which):
             of = of if len(which) == len(lower) else self._equations(lower[which], upper[which])
             bounds = self._under(measure, of)
@@ -86,14 +86,14 @@ class RunBoxes:
     def _equations(self, lower: Array, upper: Array) -> Equations:
         return equations(self._model, self._matrices, self._scale, lower, upper)
 
-    def _under(self, measure: Measure, of: Equations) -> Under:
+    def _under(self, measure: Measure, of: Equations) -> LinearBound:
         maps_of, d = self._rows[measure]
         maps = mapped(maps_of, of.above, of.halves, of.turn, of.roots)
         looks = [_Look(of, run, maps, d).under() for run in self._runs]
         bounds = [np.nan_to_num(one.least, nan=-np.inf) for one in looks]
         best, pick = np.argmax(bounds, axis=0), np.arange(of.count)
         parts = ("value", "slopes", "rest", "bends")
-        return Under(*(np.array([getattr(one, part) for one in looks])[best, pick] for part in parts))
+        return LinearBound(*(np.array([getattr(one, part) for one in looks])[best, pick] for part in parts))
 
 
 def bounds_runs(problem: Problem) -> bool:
@@ -136,7 +136,7 @@ class _Look:
         self._of, self._run, self._maps, self._d = of, run, maps, d
         self._steps = Steps(of, run.step)
 
-    def under(self) -> Under:
+    def under(self) -> LinearBound:
         """The best of all moments and places, of steps of which one ends where motion at the middle is largest."""
         steps = [self._run.ending_at(int(place)) for place in self._peaks()]
         count = min(one.count for one in steps)
@@ -174,7 +174,7 @@ class _Look:
         seen = self._rows(self._maps.position, self._maps.rate) @ z
         return np.asarray(np.linalg.norm(self._places(seen), axis=-2))
 
-    def _of_motion(self, motion: Motion) -> Under:
+    def _of_motion(self, motion: Motion) -> LinearBound:
         maps, pairs = self._maps, self._steps.pairs
         at_middle, by = self._rows(maps.position, maps.rate), self._rows(maps.positions, maps.rates)
         value = at_middle @ motion.middle
@@ -195,7 +195,7 @@ class _Look:
         bent = np.where(alike, np.maximum(-bent, 0.0), np.abs(bent))
         return self._best(size, slopes, bent, rest)
 
-    def _best(self, size: Array, slopes: Array, bent: Array, rest: Array) -> Under:
+    def _best(self, size: Array, slopes: Array, bent: Array, rest: Array) -> LinearBound:
         """Return the highest bound of all places and times."""
         bound = size - np.abs(slopes).sum(axis=1) - bent.sum(axis=1) - rest
         known = np.nan_to_num(bound, nan=-np.inf)
@@ -209,7 +209,7 @@ class _Look:
         for number, (j, k) in enumerate(self._steps.pairs):
             for side in {j, k}:
                 pull[:, side] += bent[:, number]
-        return Under(size, slopes, rest + bent.sum(axis=1), pull)
+        return LinearBound(size, slopes, rest + bent.sum(axis=1), pull)
 
     def _gains(self, along: Array) -> Array:
         """Return the largest signal of a motion of energy one along directions (boxes, places, d, times), without d."""

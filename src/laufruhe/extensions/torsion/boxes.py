@@ -30,8 +30,8 @@ from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.loads import PointLoads
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.box_norms import Under, root_under
-from laufruhe.prove.mounts.box_series import Answer, Expansion, Sides, directions_of, inverses, mapped, series
+from laufruhe.prove.mounts.box_norms import LinearBound, root_under
+from laufruhe.prove.mounts.box_series import Expansion, LinearResponse, Sides, directions_of, inverses, mapped, series
 from laufruhe.prove.mounts.ranges import SLACK
 
 # orders whose share of the squares is less, in the middle of the bounds and at their corners, are left out
@@ -218,13 +218,13 @@ class TwistBoxes:
         along = replace(lines.along, columns=lines.along.columns / root[:, None])
         return series(centre[None], half[None], inverse[None], along, lines.inside, angles[None])
 
-    def _under(self, measure: Measure, chains: Sequence[Torsion], twists: Sequence[Expansion]) -> Under:
+    def _under(self, measure: Measure, chains: Sequence[Torsion], twists: Sequence[Expansion]) -> LinearBound:
         """Return a linear function under a root mean square over orders, sections and operating points."""
         names = [section.name for section in chains[1].sections]
         places = measure.load.places(self.problem.engine)
         chosen = np.array([names.index(places[k]) for k in measure.places(places)], dtype=np.intp)
         shares = measure.shares([lines.loads.point for lines in self._lines]) / len(chosen)
-        answers, weights = list[Answer](), list[Array]()
+        answers, weights = list[LinearResponse](), list[Array]()
         for share, lines, twist in zip(shares, self._lines, twists, strict=True):
             answers.append(self._alternating(measure, chains, lines, twist, chosen))
             weights.append(np.where(measure.counted(lines.orders), 0.5 * share, 0.0))
@@ -235,11 +235,11 @@ class TwistBoxes:
             np.concatenate([getattr(answer, part) for answer in answers], axis=1)
             for part in ("value", "slopes", "rest", "bends")
         )
-        return root_under(Answer(*parts), np.concatenate(weights))
+        return root_under(LinearResponse(*parts), np.concatenate(weights))
 
     def _alternating(
         self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, twist: Expansion, chosen: Indices
-    ) -> Answer:
+    ) -> LinearResponse:
         """Return the signal of the chosen sections in every order but zero, over a box."""
         root, factors = np.sqrt(inertias(chains[1])), FACTORS[measure.channel]
         twisted = _twist_of(len(chains[1].sections), len(root))
@@ -258,7 +258,7 @@ class TwistBoxes:
         most = np.abs(alone.value) + np.abs(alone.slopes).sum(axis=2) + alone.rest[..., None]
         return replace(answer, rest=answer.rest + np.linalg.norm(np.where(bend > 0.0, bend * most, 0.0), axis=-1))
 
-    def _mean(self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, chosen: Indices) -> Answer:
+    def _mean(self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, chosen: Indices) -> LinearResponse:
         zero, speed, factors = np.zeros(1), lines.loads.point.speed, FACTORS[measure.channel]
         low, here, high = (
             ((receptances(chain, zero, speed)[0] @ lines.mean) * factors(chain, zero, speed)[0])[chosen]
@@ -266,7 +266,7 @@ class TwistBoxes:
         )
         slopes = self.coordinates.owners[:, chosen] * (0.5 * (high - low))
         rest = np.array([[float(np.linalg.norm(here - 0.5 * (high + low)))]])
-        return Answer(here[None, None], slopes[None, None], rest, np.zeros((1, 1, len(slopes))))
+        return LinearResponse(here[None, None], slopes[None, None], rest, np.zeros((1, 1, len(slopes))))
 
     def _overheats(self, limit: Limit, chains: Sequence[Torsion], twists: Sequence[Expansion]) -> bool:
         """Return whether an absorber gives off too much all over a box: its loss for a swing is least at low ends."""
@@ -309,7 +309,7 @@ def _is_square(measure: Measure) -> bool:
     return measure.channel in FACTORS and measure.norm.is_euclidean
 
 
-def _root_bound(terms: Sequence[tuple[float, Under]]) -> float:
+def _root_bound(terms: Sequence[tuple[float, LinearBound]]) -> float:
     slopes = sum((weight * under.slopes[0] for weight, under in terms), np.zeros(1))
     bound = sum(weight * float(under.value[0] - under.rest[0]) for weight, under in terms) - float(np.abs(slopes).sum())
     return max(bound, 0.0) if math.isfinite(bound) else 0.0

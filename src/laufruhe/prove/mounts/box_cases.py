@@ -16,7 +16,7 @@ from laufruhe.physics.static_cases import Stops, case_wrench, stops_of
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, counted_cases
 from laufruhe.problem.measure import Measure
-from laufruhe.prove.mounts.box_norms import Under, counted_rows, nothing_under
+from laufruhe.prove.mounts.box_norms import LinearBound, counted_rows, nothing_under
 from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders, is_travel
 from laufruhe.prove.mounts.box_series import Expansion, mapped, series
 
@@ -32,7 +32,7 @@ _AS_LOADS: Mapping[Channel, Channel] = {
 }
 
 
-def static_loads(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Under:
+def static_loads(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> LinearBound:
     """Return a linear lower bound of the largest travel or force under load cases on every box (E60)."""
     mounting, best = model.mounting(model.lower), nothing_under(lower)
     every = stops_of(mounting)
@@ -46,7 +46,9 @@ def static_loads(model: BoxModel, measure: Measure, lower: Array, upper: Array) 
     return best
 
 
-def _bound_case(model: BoxModel, measure: Measure, stops: Stops, load: Array, lower: Array, upper: Array) -> Under:
+def _bound_case(
+    model: BoxModel, measure: Measure, stops: Stops, load: Array, lower: Array, upper: Array
+) -> LinearBound:
     centres, halves = 0.5 * (lower + upper), 0.5 * (upper - lower)
     matrices, soft = model.stiffness(centres), model.stiffness(lower)
     stable = np.linalg.eigvalsh(soft)[:, 0] > 0.0
@@ -63,7 +65,7 @@ def _bound_case(model: BoxModel, measure: Measure, stops: Stops, load: Array, lo
 
 def _with_stops(
     model: BoxModel, measure: Measure, stops: Stops, load: Array, boxes: tuple[Array, ...], signs: Array
-) -> tuple[Under, Array]:
+) -> tuple[LinearBound, Array]:
     """Return the bound with stops of nonzero sign as springs, and the span of travels without other stops."""
     centres, halves, matrices, soft, travel = boxes
     on = signs != 0.0
@@ -96,7 +98,7 @@ def _with_stops(
     # the series diverges close to a free mode
     least = np.where(np.isfinite(rest), size - np.abs(slope).sum(axis=-1) - rest, -np.inf)
     box, best = np.arange(len(size)), np.argmax(least, axis=1)
-    bound = Under(size[box, best], slope[box, best], rest[box, best], answer.bends[:, 0])
+    bound = LinearBound(size[box, best], slope[box, best], rest[box, best], answer.bends[:, 0])
     return bound.where(np.isfinite(least[box, best])), span
 
 

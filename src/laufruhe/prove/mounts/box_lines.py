@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.numerics.arrays import Array
-from laufruhe.prove.mounts.box_norms import Under
+from laufruhe.prove.mounts.box_norms import LinearBound
 
 # passes over the limits to find their multipliers
 ROUNDS = 2
 
 
 @dataclass(eq=False)
-class BoxLines:
+class LinearRelaxation:
     """Linear functions of s nowhere above objective and limits, s from -1 to 1 in each number of a box.
 
     Attributes
@@ -34,23 +34,23 @@ class BoxLines:
     pulls: list[Array] = field(default_factory=list)
 
     @classmethod
-    def zero(cls, lower: Array) -> BoxLines:
+    def zero(cls, lower: Array) -> LinearRelaxation:
         """Return zero objective without limits, for boxes of this shape."""
         return cls(np.zeros(len(lower)), np.zeros_like(lower))
 
-    def subset(self, which: NDArray[np.intp]) -> BoxLines:
+    def subset(self, which: NDArray[np.intp]) -> LinearRelaxation:
         """Return some of the boxes."""
         limits = [(over[which], by[which]) for over, by in self.limits]
-        return BoxLines(self.value[which], self.slopes[which], limits, [pull[which] for pull in self.pulls])
+        return LinearRelaxation(self.value[which], self.slopes[which], limits, [pull[which] for pull in self.pulls])
 
-    def add(self, weight: float, least: Under, left_out: float = 0.0) -> None:
+    def add(self, weight: float, least: LinearBound, left_out: float = 0.0) -> None:
         """Add a term to the objective, or zero where its bound is not positive."""
         value = least.value - least.rest - left_out
         known = np.isfinite(value) & (value > 0.0)
         self.value = self.value + weight * np.where(known, value, 0.0)
         self.slopes = self.slopes + weight * np.where(known[:, None], least.slopes, 0.0)
 
-    def add_limit(self, least: Under, left_out: float, maximum: float) -> None:
+    def add_limit(self, least: LinearBound, left_out: float, maximum: float) -> None:
         """Add a limit."""
         unit = maximum or 1.0
         over = (least.value - least.rest - left_out - maximum) / unit

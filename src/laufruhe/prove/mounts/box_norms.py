@@ -11,13 +11,13 @@ from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders
-from laufruhe.prove.mounts.box_series import Answer, Expansion
+from laufruhe.prove.mounts.box_series import Expansion, LinearResponse
 
 PARTS = ("value", "slopes", "rest", "bends")
 
 
 @dataclass(frozen=True, eq=False)
-class Under:
+class LinearBound:
     """Lower bound value + slopes . s - rest of a quantity over boxes, s from -1 to 1 in each number (E38).
 
     Attributes
@@ -40,32 +40,32 @@ class Under:
         """Least value over every box, shape (boxes,)."""
         return np.asarray(self.value - self.rest - np.abs(self.slopes).sum(axis=-1))
 
-    def where(self, known: Mask) -> Under:
+    def where(self, known: Mask) -> LinearBound:
         """Return the bound on boxes of a mask, and zero on the others."""
         masks = (known, known[:, None], known, known[:, None])
         parts = (np.where(mask, getattr(self, part), 0.0) for part, mask in zip(PARTS, masks, strict=True))
-        return Under(*parts)
+        return LinearBound(*parts)
 
-    def or_else(self, other: Under) -> Under:
+    def or_else(self, other: LinearBound) -> LinearBound:
         """Return for every box the bound with the larger least value."""
         better = self.least >= other.least
         first, second = self.where(better), other.where(~better)
-        return Under(*(getattr(first, part) + getattr(second, part) for part in PARTS))
+        return LinearBound(*(getattr(first, part) + getattr(second, part) for part in PARTS))
 
 
-def nothing_under(lower: Array) -> Under:
+def nothing_under(lower: Array) -> LinearBound:
     """Return the bound zero of a length, for boxes of this shape."""
-    return Under(np.zeros(len(lower)), np.zeros_like(lower), np.zeros(len(lower)), np.zeros_like(lower))
+    return LinearBound(np.zeros(len(lower)), np.zeros_like(lower), np.zeros(len(lower)), np.zeros_like(lower))
 
 
-def under(model: BoxModel, quantity: Measure, lines: LoadedOrders, at: Expansion) -> Under:
+def under(model: BoxModel, quantity: Measure, lines: LoadedOrders, at: Expansion) -> LinearBound:
     """Return a linear lower bound of a norm of forces or travel on every box (E38)."""
     rows, factors = counted_rows(model.problem, quantity)
     answer = model.answer(lines, at, quantity.channel, rows, factors)
     return norm_under(model.problem, quantity, answer, lines)
 
 
-def norm_under(problem: Problem, quantity: Measure, answer: Answer, lines: LoadedOrders) -> Under:
+def norm_under(problem: Problem, quantity: Measure, answer: LinearResponse, lines: LoadedOrders) -> LinearBound:
     """Return a linear lower bound of a norm of responses on every box (E38).
 
     Parameters
@@ -88,7 +88,7 @@ def norm_under(problem: Problem, quantity: Measure, answer: Answer, lines: Loade
         parts = (
             np.array([getattr(bound, part) for bound in by_point]) for part in ("value", "slopes", "rest", "bends")
         )
-        largest = Under(*(part[best, pick] for part in parts))
+        largest = LinearBound(*(part[best, pick] for part in parts))
         # the largest length is at least the root mean square, and the largest distance of two rows at least that of all
         # distances, whose mean square is twice that of the rows about their mean
         squares = 2.0 * weights * (lines.orders > 0.0) if quantity.norm.is_diameter else weights
@@ -98,7 +98,7 @@ def norm_under(problem: Problem, quantity: Measure, answer: Answer, lines: Loade
         for part in ("value", "slopes")
     )
     rest, bends = root_of(weights, answer.rest), root_of(weights, answer.bends)
-    return Under(np.asarray(value), np.asarray(slopes), rest, bends)
+    return LinearBound(np.asarray(value), np.asarray(slopes), rest, bends)
 
 
 def counted_rows(problem: Problem, quantity: Measure) -> tuple[NDArray[np.intp], Array]:
@@ -115,7 +115,7 @@ def line_weights(problem: Problem, quantity: Measure, lines: LoadedOrders) -> Ar
     return np.asarray(share[lines.points] * np.where(lines.orders > 0.0, 0.5, 1.0) / len(chosen))
 
 
-def _sampled(quantity: Measure, answer: Answer, lines: LoadedOrders, p: int) -> Under:
+def _sampled(quantity: Measure, answer: LinearResponse, lines: LoadedOrders, p: int) -> LinearBound:
     """Bound a mean, maximum or peak to peak over the samples of one operating point."""
     own = np.flatnonzero(lines.points == p)
     value, slopes, rest, bends = answer.value[:, own], answer.slopes[:, own], answer.rest[:, own], answer.bends[:, own]
@@ -132,13 +132,13 @@ def _sampled(quantity: Measure, answer: Answer, lines: LoadedOrders, p: int) -> 
         rests = root_of(squares, rest), root_of(squares, bends)
         by_mount, share = slopes.reshape(*slopes.shape[:3], mounts, 3), 1.0 / (samples * mounts)
 
-        def pair_with(length: Array) -> Under:
+        def pair_with(length: Array) -> LinearBound:
             dual = rows / np.where(length > 0.0, length, 1.0)[:, :, None]
             duals = np.matmul(waves.T, dual.reshape(boxes, samples, -1)).reshape(boxes, 2, len(own), 3, mounts)
             slope = np.einsum("bkxm,bknmx->bn", duals[:, 0], by_mount.real)
             slope = share * (slope + np.einsum("bkxm,bknmx->bn", duals[:, 1], by_mount.imag))
             value = share * (size**2 / np.where(length > 0.0, length, 1.0)).sum(axis=(1, 2))
-            return Under(value, slope, *rests)
+            return LinearBound(value, slope, *rests)
 
         # where the sum of squares is least, rows of equal weight have no slope
         most = np.broadcast_to(size.max(axis=(1, 2), keepdims=True), size.shape)
@@ -156,7 +156,7 @@ def _sampled(quantity: Measure, answer: Answer, lines: LoadedOrders, p: int) -> 
     own_slopes = slopes.reshape(*slopes.shape[:3], mounts, 3)[box, :, :, mount]
     phases = turns[t] if times == 1.0 else turns[t] - turns[start[box, mount]]
     slope = np.einsum("bk,bkna,ba->bn", phases, own_slopes, along).real
-    return Under(length, slope, times * rest.sum(axis=1), times * bends.sum(axis=1))
+    return LinearBound(length, slope, times * rest.sum(axis=1), times * bends.sum(axis=1))
 
 
 def _lengths(rows: Array) -> Array:
@@ -165,14 +165,14 @@ def _lengths(rows: Array) -> Array:
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
-def root_under(answer: Answer, weights: Array) -> Under:
+def root_under(answer: LinearResponse, weights: Array) -> LinearBound:
     """Bound the root of a weighted sum of squares; orders whose series may diverge count as zero."""
     known = np.isfinite(answer.rest)
     value, slopes = np.where(known[..., None], answer.value, 0.0), np.where(known[..., None, None], answer.slopes, 0.0)
     size = np.sqrt(np.einsum("k,bkr->b", weights, np.abs(value) ** 2))
     slopes = np.einsum("k,bkr,bknr->bn", weights, value.conj(), slopes).real
     rest = root_of(weights, np.where(known, answer.rest, 0.0))
-    return Under(size, slopes / np.where(size > 0.0, size, 1.0)[:, None], rest, root_of(weights, answer.bends))
+    return LinearBound(size, slopes / np.where(size > 0.0, size, 1.0)[:, None], rest, root_of(weights, answer.bends))
 
 
 def root_of(weights: Array, parts: Array) -> Array:

@@ -15,7 +15,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.prove.mounts.box_cases import static_loads
-from laufruhe.prove.mounts.box_norms import Under
+from laufruhe.prove.mounts.box_norms import LinearBound
 from laufruhe.prove.mounts.box_response import BoxModel
 from laufruhe.prove.mounts.box_shares import most_shares, shortfall
 from laufruhe.prove.mounts.ranges import SLACK
@@ -30,14 +30,14 @@ def sag(model: BoxModel, x: Array) -> Array:
     return np.where(stable, y @ pull / -weight[2], math.inf)
 
 
-def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> Under:
+def sag_under(model: BoxModel, _: Measure, lower: Array, upper: Array) -> LinearBound:
     """Return the tangent of the convex sag at the middle, for boxes whose softest corner has no free mode (E9)."""
     weight, halves = weight_wrench(model.mounting(model.lower).block), 0.5 * (upper - lower)
     matrices, pull = model.stiffness(0.5 * (lower + upper)), model.root @ weight
     stable = np.linalg.eigvalsh(model.stiffness(lower))[:, 0] > 0.0
     y = np.linalg.solve(np.where(stable[:, None, None], matrices, np.eye(6)), pull)
     slopes = halves * np.einsum("bi,nij,bj->bn", y, model.stiffness_slopes, y) / weight[2]
-    return Under(y @ pull / -weight[2], slopes, np.zeros(len(lower)), np.abs(slopes)).where(stable)
+    return LinearBound(y @ pull / -weight[2], slopes, np.zeros(len(lower)), np.abs(slopes)).where(stable)
 
 
 def axis_residual(model: BoxModel, asked: Measure, lower: Array, upper: Array) -> Array:
@@ -87,7 +87,7 @@ RANGES: Mapping[Channel, Ranges] = {
 
 Of several numbers the lower bound is that of the largest, and the upper bound that of the least.
 """
-UNDER: Mapping[Channel, Callable[[BoxModel, Measure, Array, Array], Under]] = {
+UNDER: Mapping[Channel, Callable[[BoxModel, Measure, Array, Array], LinearBound]] = {
     channels.SAG: sag_under,
     channels.STATIC_TRAVEL: static_loads,
     channels.STATIC_FORCE: static_loads,

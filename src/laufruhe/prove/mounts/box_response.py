@@ -24,7 +24,7 @@ from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.mounts.box_series import Answer, Expansion, directions_of, inverses, mapped, series
+from laufruhe.prove.mounts.box_series import Expansion, LinearResponse, directions_of, inverses, mapped, series
 
 NOTHING = 1e-13
 
@@ -75,8 +75,8 @@ class LoadedOrders:
 
 
 @dataclass(frozen=True, eq=False)
-class Matrices:
-    """Matrices of a mounting in coordinates with unit mass.
+class MountMatrices:
+    """MountMatrices of a mounting in coordinates with unit mass.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ def is_travel(channel: Channel) -> bool:
 
 
 class BoxModel:
-    """Matrices of a problem with open stiffnesses alone.
+    """MountMatrices of a problem with open stiffnesses alone.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ class BoxModel:
     root
         Inverse square root of the mass matrix, shape (6, 6); it takes wrenches to coordinates with unit mass.
     slopes
-        Derivatives of `Matrices` by every open number, shape (n, ...).
+        Derivatives of `MountMatrices` by every open number, shape (n, ...).
     """
 
     def __init__(self, problem: Problem, evaluation: Evaluation) -> None:
@@ -145,11 +145,11 @@ class BoxModel:
         """Return the mounting at stiffnesses [N/m], shape (n,)."""
         return mounting_in(self.problem.design([float(v) for v in x], self.problem.mount_decisions))
 
-    def _parts(self, mounting: ElasticMounting) -> Matrices:
+    def _parts(self, mounting: ElasticMounting) -> MountMatrices:
         parts, motions = (mounting.springs, mounting.losses, mounting.dampers), mounting.motions @ self.root.T
         totals = (self.root @ mounting.total(part) @ self.root.T for part in parts)
         maps = ((part @ motions).reshape(-1, 6) for part in parts)
-        return Matrices(*totals, *maps)
+        return MountMatrices(*totals, *maps)
 
     def lines(self, quantity: Measure | None = None) -> LoadedOrders:
         """Return all loaded orders, or those that a quantity counts."""
@@ -162,7 +162,9 @@ class BoxModel:
             size = np.abs(loads.wrench.coefficients).max(axis=1, initial=0.0)
             for k in np.flatnonzero(size > NOTHING * size.max(initial=0.0)):
                 order = float(loads.wrench.orders[k])
-                rows.append((p, int(int(k) * step), order, order * loads.point.speed, moved @ loads.wrench.coefficients[k]))
+                rows.append(
+                    (p, int(int(k) * step), order, order * loads.point.speed, moved @ loads.wrench.coefficients[k])
+                )
         points, places, orders, omegas, wrenches = zip(*rows, strict=True) if rows else ((), (), (), (), ())
         lines = LoadedOrders(
             np.array(points, dtype=np.intp), np.array(places, dtype=np.intp), np.array(orders, dtype=float),
@@ -201,7 +203,7 @@ class BoxModel:
         return np.asarray(np.maximum(np.linalg.eigvalsh(self.added(omegas).real)[..., -1], 0.0))
 
     def at(self, name: str, x: Array) -> Array:
-        """Return a matrix of `Matrices` at many designs, shape (boxes, n) to (boxes, ...)."""
+        """Return a matrix of `MountMatrices` at many designs, shape (boxes, n) to (boxes, ...)."""
         base: Array = getattr(self._base, name)
         return np.asarray(base + np.einsum("bn,nij->bij", x - self.lower, self.slopes[name]))
 
@@ -215,7 +217,9 @@ class BoxModel:
         motion = np.matmul(inverse, lines.loads[:, :, None])[..., 0]
         return series(centres, halves, inverse, self.sides, _dynamic(lines, *self._inside), motion)
 
-    def answer(self, lines: LoadedOrders, at: Expansion, channel: Channel, rows: Indices, factors: Array) -> Answer:
+    def answer(
+        self, lines: LoadedOrders, at: Expansion, channel: Channel, rows: Indices, factors: Array
+    ) -> LinearResponse:
         """Return selected rows of forces or travel, times factors, as linear functions over boxes (E37)."""
         value, turned = self.maps(lines, at, channel, rows)
         return mapped(at, value * factors[:, None], None if turned is None else turned * factors[:, None])

@@ -121,7 +121,7 @@ class Expansion:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class LinearResponse:
     """Forces or travel over boxes: value + slopes . s and a remainder (E37), shapes (boxes, lines, ...).
 
     Attributes
@@ -186,7 +186,7 @@ def rest_of(even: ComplexArray, most: Array, hit: Array) -> Array:
     return np.asarray(np.where(second > 0.0, rest, np.where(most < 1.0, 0.0, np.inf)))
 
 
-def mapped(at: Expansion, value: Any, turned: Any = None) -> Answer:
+def mapped(at: Expansion, value: Any, turned: Any = None) -> LinearResponse:
     """Return forces or travel of a motion (E37).
 
     Parameters
@@ -214,7 +214,7 @@ def mapped(at: Expansion, value: Any, turned: Any = None) -> Answer:
     whole = np.linalg.norm(value, axis=(-2, -1)) * np.linalg.norm(at.motion, axis=-1)
     scores = np.where(np.isfinite(at.rest)[..., None], bends, DIVERGENT * whole[..., None] * at.pull)
     middle = np.matmul(value, at.motion[..., None])[..., 0] + 0.5 * squares.sum(axis=-1)
-    return Answer(middle, first, bends.sum(axis=-1) + beyond, scores)
+    return LinearResponse(middle, first, bends.sum(axis=-1) + beyond, scores)
 
 
 def norm_over(matrices: Any) -> Array:

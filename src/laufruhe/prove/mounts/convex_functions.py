@@ -39,7 +39,7 @@ class ConvexFunction(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Matrices:
+class StiffnessMatrices:
     """A(x) = base + sum_j x_j slopes_j, shapes (6, 6) and (n, 6, 6) (E16)."""
 
     base: Array
@@ -55,8 +55,8 @@ class Matrices:
 
 
 @dataclass(frozen=True, eq=False)
-class Linear:
-    """Linear function constant + gradient . x."""
+class LinearFunction:
+    """LinearFunction function constant + gradient . x."""
 
     constant: float
     gradient: Array
@@ -74,7 +74,7 @@ class Linear:
 class Compliance:
     """Compliance factor w' A(x)^-1 w (E16)."""
 
-    matrices: Matrices
+    matrices: StiffnessMatrices
     load: Array
     factor: float
 
@@ -96,7 +96,7 @@ class Compliance:
 class Eigenvalue:
     """Largest eigenvalue of sign A(x) (E17, E18): the highest one for sign 1, the negated lowest one for sign -1."""
 
-    matrices: Matrices
+    matrices: StiffnessMatrices
     sign: float
 
     def value(self, x: Array) -> float:
@@ -121,7 +121,7 @@ class Eigenvalue:
 class Residual:
     """Torque-roll residual: distance of a turn about the torque-roll axis from a mode (E19, E46)."""
 
-    matrices: Matrices
+    matrices: StiffnessMatrices
     axis: AxisResidual
 
     def value(self, x: Array) -> float:
@@ -150,7 +150,7 @@ class ConvexLimit:
 class ConvexProgram:
     """Minimise a weighted sum of convex functions in a box, under limits on such functions."""
 
-    matrices: Matrices
+    matrices: StiffnessMatrices
     lower: Array
     upper: Array
     terms: tuple[tuple[float, ConvexFunction], ...]

@@ -12,9 +12,9 @@ from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.spectrum import orders_equal
 from laufruhe.problem import channels
 from laufruhe.problem.measure import Measure
-from laufruhe.prove.mounts.box_norms import Under, root_under
+from laufruhe.prove.mounts.box_norms import LinearBound, root_under
 from laufruhe.prove.mounts.box_response import LoadedOrders
-from laufruhe.prove.mounts.box_series import Answer
+from laufruhe.prove.mounts.box_series import LinearResponse
 
 HALVINGS = 45
 RATIOS = frozenset({channels.TRANSMISSIBILITY})
@@ -36,7 +36,7 @@ def groups_of(quantity: Measure, points: Sequence[OperatingPoint], lines: Loaded
     return [group for group in out if group.any()]
 
 
-def ratio_under(over: Answer, firm: Answer, groups: Sequence[Mask]) -> tuple[Array, Array]:
+def ratio_under(over: LinearResponse, firm: LinearResponse, groups: Sequence[Mask]) -> tuple[Array, Array]:
     """Return lower bounds of the largest ratio, shape (boxes,), and branching scores, shape (boxes, n).
 
     Parameters
@@ -59,7 +59,7 @@ def ratio_under(over: Answer, firm: Answer, groups: Sequence[Mask]) -> tuple[Arr
     return best, scores
 
 
-def _least_ratio(top: Under, bottom: Under) -> Array:
+def _least_ratio(top: LinearBound, bottom: LinearBound) -> Array:
     """Return the largest t with top - t bottom >= 0 all over the box (E40)."""
     low = np.zeros(len(top.value))
     high = top.value / np.where(bottom.value > 0.0, bottom.value, 1.0)

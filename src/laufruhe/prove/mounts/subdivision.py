@@ -25,8 +25,8 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import NEARLY, Divided, divided_on
-from laufruhe.prove.mounts.box_lines import BoxLines
-from laufruhe.prove.mounts.box_norms import Under, under
+from laufruhe.prove.mounts.box_lines import LinearRelaxation
+from laufruhe.prove.mounts.box_norms import LinearBound, under
 from laufruhe.prove.mounts.box_numbers import RANGES, SAID, UNDER, breaks
 from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders
 from laufruhe.prove.mounts.named import named_part
@@ -88,7 +88,7 @@ class SimulatedBoxes(Protocol):
     def cost(self) -> int:
         """Work of one box, in numbers."""
 
-    def under(self, measure: Measure, lower: Array, upper: Array, asked: Mask | None = None, /) -> Under:
+    def under(self, measure: Measure, lower: Array, upper: Array, asked: Mask | None = None, /) -> LinearBound:
         """Return linear lower bounds of a measure on boxes, shape (boxes, open numbers), or on some of them."""
 
 
@@ -182,7 +182,7 @@ class StiffnessBoxes:
             return self._bounds(lower, upper)
 
     def _bounds(self, lower: Array, upper: Array) -> tuple[Array, NDArray[np.intp]]:
-        boxes, scores, size = BoxLines.zero(lower), np.zeros_like(lower), np.full(len(lower), self.constant)
+        boxes, scores, size = LinearRelaxation.zero(lower), np.zeros_like(lower), np.full(len(lower), self.constant)
         for weight, quantity, lines, left_out in self._terms:
             at = self.model.expanded(lines, lower, upper)
             least = under(self.model, quantity, lines, at)
@@ -207,7 +207,7 @@ class StiffnessBoxes:
         sides = np.argmax(np.nan_to_num(scores) + EVEN * (upper - lower) / upper.max(), axis=1)
         return np.where(violated, np.inf, bounds), np.asarray(sides)
 
-    def _add_limits(self, boxes: BoxLines, lower: Array, upper: Array) -> None:
+    def _add_limits(self, boxes: LinearRelaxation, lower: Array, upper: Array) -> None:
         """Add limits with linear lower bounds, except simulated ones."""
         for maximum, quantity, lines, left_out in self._limits:
             least = under(self.model, quantity, lines, self.model.expanded(lines, lower, upper))
@@ -216,7 +216,7 @@ class StiffnessBoxes:
             least = UNDER[limit.measure.channel](self.model, limit.measure, lower, upper)
             boxes.add_limit(least, 0.0, limit.maximum * (1.0 + SLACK))
 
-    def _add_simulated(self, boxes: BoxLines, lower: Array, upper: Array) -> Array:
+    def _add_simulated(self, boxes: LinearRelaxation, lower: Array, upper: Array) -> Array:
         """Add bounds of simulated measures (E65), and return branching scores, shape (boxes, n)."""
         assert self.simulated is not None
         scores, problem = np.zeros_like(lower), self.problem

@@ -18,7 +18,7 @@ from laufruhe.prove.mounts.convex_functions import (
     ConvexFunction,
     ConvexProgram,
     Eigenvalue,
-    Linear,
+    LinearFunction,
     Residual,
     excludes,
 )
@@ -101,7 +101,7 @@ class _Program:
 
     def _over(self, function: ConvexFunction) -> tuple[Any, Any]:
         """Return an expression of the function, and the cone whose dual vector it needs."""
-        if isinstance(function, Linear):
+        if isinstance(function, LinearFunction):
             return function.constant + (function.gradient * self.scale) @ self.y, None
         if isinstance(function, Compliance):
             return (function.factor / self.unit) * cp.matrix_frac(function.load, self.matrix), None

@@ -28,9 +28,9 @@ from laufruhe.prove.mounts.convex_functions import (
     ConvexLimit,
     ConvexProgram,
     Eigenvalue,
-    Linear,
-    Matrices,
+    LinearFunction,
     Residual,
+    StiffnessMatrices,
     dual_bound,
 )
 from laufruhe.solvers.conclusion import Shown, better, concluded, given_design, judged, none_within
@@ -69,7 +69,7 @@ def convex_program(problem: Problem) -> ConvexProgram:
     root = mass_root(mounting.block)
     slopes = np.array([root @ _slope(mounting, decision) @ root.T for decision in decisions]).reshape(-1, 6, 6)
     base = root @ mounting.stiffness @ root.T - np.tensordot(start, slopes, axes=1)
-    matrices = Matrices(base, slopes)
+    matrices = StiffnessMatrices(base, slopes)
     terms = tuple((term.weight, _function(term.measure, matrices, mounting, problem)) for term in problem.objective)
     limits = [part for k, limit in enumerate(problem.limits) for part in _limits(limit, k, matrices, mounting, problem)]
     return ConvexProgram(matrices, lower, upper, terms, tuple(limits))
@@ -85,7 +85,9 @@ def _slope(mounting: ElasticMounting, decision: Decision) -> Array:
     return total
 
 
-def _function(quantity: Measure, matrices: Matrices, mounting: ElasticMounting, problem: Problem) -> ConvexFunction:
+def _function(
+    quantity: Measure, matrices: StiffnessMatrices, mounting: ElasticMounting, problem: Problem
+) -> ConvexFunction:
     if quantity.channel is channels.SAG:
         weight = weight_wrench(mounting.block)
         return Compliance(matrices, mass_root(mounting.block) @ weight, 1.0 / -weight[2])
@@ -93,10 +95,12 @@ def _function(quantity: Measure, matrices: Matrices, mounting: ElasticMounting, 
         return Residual(matrices, quantity.channel.of_axis(mounting.block, quantity.frequency))
     gradient = np.array([sum(drive.gain for drive in d.mount_drives) for d in problem.decisions])
     start = sum(sum(row[STIFFNESS]) for row in problem.mount_numbers)
-    return Linear(start - float(gradient @ [d.start_number for d in problem.decisions]), gradient)
+    return LinearFunction(start - float(gradient @ [d.start_number for d in problem.decisions]), gradient)
 
 
-def _limits(limit: Limit, k: int, matrices: Matrices, mounting: ElasticMounting, problem: Problem) -> list[ConvexLimit]:
+def _limits(
+    limit: Limit, k: int, matrices: StiffnessMatrices, mounting: ElasticMounting, problem: Problem
+) -> list[ConvexLimit]:
     found = []
     if limit.measure.channel is channels.FREQUENCIES:
         if limit.maximum < math.inf:
@@ -107,8 +111,8 @@ def _limits(limit: Limit, k: int, matrices: Matrices, mounting: ElasticMounting,
     function = _function(limit.measure, matrices, mounting, problem)
     if limit.maximum < math.inf:
         found.append(ConvexLimit(function, limit.maximum, k))
-    if limit.minimum > -math.inf and isinstance(function, Linear):
-        found.append(ConvexLimit(Linear(-function.constant, -function.gradient), -limit.minimum, k, "at least"))
+    if limit.minimum > -math.inf and isinstance(function, LinearFunction):
+        found.append(ConvexLimit(LinearFunction(-function.constant, -function.gradient), -limit.minimum, k, "at least"))
     return found
 
 
