@@ -98,7 +98,7 @@ def test_more_surging_allowed_never_hammers_more(solved: Result) -> None:
 
 def test_turned_to_the_other_side_of_the_track() -> None:
     """Both cylinders to the right with throws turned alike: the same blows, a mirror image of the weights."""
-    tables = dict(laufruhe.files.reader.given(PROBLEMS / "locomotive-two-cylinder.toml")[0])
+    tables = dict(laufruhe.files.reader.tables_and_path(PROBLEMS / "locomotive-two-cylinder.toml")[0])
     for part in tables["engine"]["slider_cranks"]:
         part["bank_angle"], part["throw"] = -90, part["throw"] - 180
     turned, given = laufruhe.evaluate(tables), laufruhe.evaluate(PROBLEMS / "locomotive-two-cylinder.toml")
