@@ -37,12 +37,11 @@ def error_of(problem: Problem, evaluation: Evaluation) -> float:
 
 
 def largest_error(results: Sequence[Result]) -> float:
-    """Of several results that make one."""
+    """Return the largest relative error of several results."""
     return max(result.error_estimate for result in results)
 
 
 def _error_of_loads(problem: Problem, evaluation: Evaluation) -> float:
-    """Relative error of the terms that are loads alone."""
     if not problem.load_terms:
         return 0.0
     if problem.fidelity.tolerance is None:

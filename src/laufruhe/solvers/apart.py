@@ -29,14 +29,14 @@ Kinds = frozenset[Kind]
 
 
 def _groups(problem: Problem) -> list[Kinds]:
-    """Kinds of what is open that belong together, what moves everything else the last of them."""
+    # the last group affects all measures
     kinds = frozenset(decision.kind for decision in problem.decisions)
     alone = sorted(kind for kind in kinds if kind.is_alone)
     return [*(frozenset({kind}) for kind in alone), kinds.difference(alone)]
 
 
 def is_apart(problem: Problem) -> bool:
-    """Whether a flywheel or the crankshaft is open beside other numbers, and nothing asked is moved by two of them."""
+    """Tell if decisions include a flywheel or crankshaft beside others, and each measure depends on one group alone."""
     groups = [group for group in _groups(problem) if group]
     return len(groups) > 1 and all(len(_movers(measure, groups, problem)) <= 1 for measure in problem.measures)
 
@@ -46,7 +46,7 @@ def _movers(measure: Measure, groups: list[Kinds], problem: Problem) -> list[Kin
 
 
 def solve_apart(problem: Problem, solve: Solve) -> Result:
-    """Each group by its own method.
+    """Solve each group of decisions by its own method, and return one joint result.
 
     Raises
     ------
@@ -87,7 +87,6 @@ def solve_apart(problem: Problem, solve: Solve) -> Result:
 
 
 def _parts(problem: Problem, groups: list[Kinds]) -> dict[Kinds, Problem]:
-    """Problems of the groups that have any."""
     parts = {group: _part(problem, groups, group) for group in groups}
     for part in parts.values():
         if part.decisions and not part.objective:
@@ -97,7 +96,7 @@ def _parts(problem: Problem, groups: list[Kinds]) -> dict[Kinds, Problem]:
 
 
 def _part(problem: Problem, groups: list[Kinds], group: Kinds) -> Problem:
-    """What is open, wanted and forbidden of one group; what none moves belongs to the last."""
+    # measures that depend on no group belong to the last one
 
     def is_own(measure: Measure) -> bool:
         return (_movers(measure, groups, problem) or [groups[-1]])[0] == group

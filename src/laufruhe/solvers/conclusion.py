@@ -69,7 +69,7 @@ class Design:
 
     @property
     def rank(self) -> tuple[bool, float]:
-        """By what breaks limits least, then by what is least."""
+        """Sort key: smallest violation of limits first, then smallest objective."""
         broken = self.excess > KEPT
         return broken, self.excess if broken else self.value
 
@@ -123,7 +123,7 @@ def given_design(problem: Problem, initial: Evaluation) -> Design | None:
 
 
 def better(design: Design, other: Design | None) -> Design:
-    """Of two designs the one that breaks limits least, then the one with less."""
+    """Return the design with the smaller violation of limits; at equal violation, with the smaller objective."""
     if other is None:
         return design
     return min((design, other), key=lambda each: (max(each.excess, KEPT), each.value))
@@ -192,7 +192,7 @@ def is_sampled(measure: Measure) -> bool:
 
 
 def _doubt(problem: Problem, evaluation: Evaluation, prices: Mapping[Side, Price] | None) -> float:
-    """Return by how much a value may be read too low; infinite where its design breaks limits at many angles (P7)."""
+    # P7: possible underestimate of the objective; infinite if the design breaks limits at many angles
     many = with_fine_sampling(evaluation) if problem.limits else evaluation
     if many.excess(problem.limits) > FEASIBLE:
         return math.inf
@@ -247,7 +247,7 @@ def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[st
 
 
 def broken_message(problem: Problem, evaluation: Evaluation) -> str:
-    """That the best design found is none."""
+    """Return a message that the best design found breaks limits."""
     broken = quoted(broken_limits(problem.limits, evaluation)) or "a limit"
     return f"the best design found breaks {broken}; relax it, or open more"
 
@@ -284,14 +284,14 @@ def quoted(names: Iterable[str]) -> str:
 
 
 def contradiction(conflict: Sequence[str]) -> str:
-    """That no design keeps limits of these names together."""
+    """Return a message that no design keeps the named limits together."""
     names = quoted(conflict) or "the bounds"
     verb = "contradict each other" if len(conflict) > 1 else "cannot be met by any design within the bounds"
     return f"no design exists: {names} {verb}"
 
 
 def none_within(problem: Problem, initial: Evaluation, conflict: tuple[str, ...], timing: dict[str, float]) -> Result:
-    """No design exists: which limits cannot be met together, and how the one given stands to them."""
+    """Return an infeasible result with the conflicting limits and the limit values of the initial design."""
     return Result(
         problem=problem,
         status=Status.INFEASIBLE,
@@ -305,7 +305,7 @@ def none_within(problem: Problem, initial: Evaluation, conflict: tuple[str, ...]
 
 
 def not_found(problem: Problem, initial: Evaluation, names: Sequence[str], timing: dict[str, float]) -> Result:
-    """No design was found within limits that nothing excludes."""
+    """Return a failed result: the search found no feasible design, and nothing proves that none exists."""
     why = f"no design was found that keeps {quoted(tuple(names))}, and none is excluded; relax it, or give more time"
     return replace(none_within(problem, initial, (), timing), status=Status.FAILED, message=why)
 
@@ -332,7 +332,7 @@ def limit_values(
     value: float = 0.0,
     unfelt: float = _FELT,
 ) -> tuple[LimitValue, ...]:
-    """How a design stands to the limits (E15); a price that moves the objective by an `unfelt` share is none."""
+    """Return value and price of each limit at a design (E15); a price below an `unfelt` share of the objective is zero."""
     return tuple(_limit_value(problem, limit, evaluation, prices, value, unfelt) for limit in problem.limits)
 
 
@@ -405,7 +405,7 @@ def unbalances_of(problem: Problem, result: Result) -> list[complex]:
 
 
 def values_of(problem: Problem, result: Result) -> list[Value]:
-    """Of every decision, from the sizes and angles of a result; as given where it tells none."""
+    """Return the value of every decision in a result; the start value if the result has none."""
     found = {decision.name: decision.value for decision in result.decisions}
 
     def value(decision: Decision) -> Value:

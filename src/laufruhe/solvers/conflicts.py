@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 
 def smallest(conflicting: Iterable[T], excluded: Callable[[Sequence[T]], bool]) -> list[T]:
-    """What conflicts, without all that the rest of it conflicts without."""
+    """Return a smallest subset that still conflicts: leaving out any element ends the conflict."""
     kept = list(conflicting)
     for one in tuple(kept):
         without = [other for other in kept if other is not one]

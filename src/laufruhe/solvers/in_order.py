@@ -58,7 +58,7 @@ def solve_in_order(problem: Problem, solve: Solve) -> Result:
 
 
 def _edge(found: Result, within: float) -> float:
-    """What later objectives may make of this one: of what cancels nothing."""
+    # bound on this objective for later ones; zero if it cancels
     value = found.objective.value if found.objective else math.inf
     weight = found.problem.objective[0].weight
     if value <= numerical_zero(found.problem, found.final.engine):
@@ -67,7 +67,7 @@ def _edge(found: Result, within: float) -> float:
 
 
 def _found(stage: Problem, limits: tuple[Limit, ...], held: list[Limit], solve: Solve) -> Result:
-    """The best design of one objective; with a little more room where the solver needs it."""
+    # limits on earlier objectives widen until the solver finds a design
     for more in WIDER:
         held[:] = [replace(limit, maximum=limit.maximum * (1.0 + more)) for limit in held]
         found = solve(stage.changed(limits=(*limits, *held)))
@@ -126,7 +126,7 @@ def _together(
 def _rank(
     stage: Result, final: Evaluation, limit: Limit, last: Result, k: int, count: int, designs: tuple[DecisionRange, ...]
 ) -> RankValue:
-    """What was found of one objective, and what the design of the last makes of it."""
+    """Return the rank of one objective: its own optimum, and its value at the final design."""
     assert stage.objective is not None
     certificate = stage.certificate
     is_last = stage is last
@@ -146,7 +146,7 @@ def _rank(
 
 
 def _certificate(first: Result, ranks: tuple[RankValue, ...], weakest: Proof) -> Certificate | None:
-    """Return the bound of the first objective with the largest gap of any: what later ones may take is none (P12)."""
+    # P12
     own = first.certificate
     if own is None:
         return None

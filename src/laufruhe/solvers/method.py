@@ -99,7 +99,7 @@ class Method:
         )
 
     def _names(self, measure: Measure, kinds: Collection[Kind], problem: Problem) -> bool:
-        """Return whether a measure depends on these kinds in a way that the method allows."""
+        # the measure depends on these kinds in a way that the method allows
         if measure in problem.known_rows:
             return all(Dependence.AFFINE in self.needs[kind] for kind in kinds)
         if measure.is_load and not self.norms(measure.norm):

@@ -72,7 +72,6 @@ def solve_with_places(problem: Problem) -> Result:
 
 
 def _closes_without_places(problem: Problem) -> bool:
-    """Tell if a method with a closing bound decides what is open beside places."""
     return Kind.PLACE in kinds_of(problem) and _method(without_places(problem)).reach is Reach.WHOLE
 
 
@@ -86,7 +85,7 @@ def _is_rigid(problem: Problem) -> bool:
 
 
 def _tells_stars_apart(problem: Problem) -> bool:
-    """Return whether all that is asked tells stars on open mounts apart; how evenly they turn while they are even."""
+    # measures that are numbers tell stars apart only at even steps
     moves = problem.phasing is not None and problem.phasing.continuous
     numbers = (m.channel.is_number and not m.is_mounting for m in problem.measures)
     return problem.engine.block is not None and not (moves and any(numbers))
@@ -203,7 +202,7 @@ def solve(
 
 
 def _cut_short(problem: Problem, found: Result | None) -> Result:
-    """What there is when time is over: the best of the search, or the design as given where that is allowed."""
+    """Return the result when time is over: the best design found, or the initial design if it is feasible."""
     if found is None or found.status is Status.FAILED:
         with suppress(ModelError):
             given = judged(problem, problem.start)
@@ -221,7 +220,7 @@ def _cut_short(problem: Problem, found: Result | None) -> Result:
 
 
 def _method(problem: Problem) -> Method:
-    """The first that suits a problem; the last suits all."""
+    # the last method suits every problem
     return next(method for method in METHODS if method.suits(problem))
 
 
@@ -250,7 +249,6 @@ def refuse(problem: Problem) -> None:
 
 
 def _decided(problem: Problem, left: Sequence[Reduction] | None = None) -> Result:
-    """Decide a problem by the first of some reductions that applies, or by the first method that suits it."""
     left = reductions() if left is None else left
     for k, reduction in enumerate(left):
         if reduction.applies(problem):
@@ -297,7 +295,6 @@ def _without_fixed_limits(problem: Problem, decide: Decide, _: Decide) -> Result
 
 
 def _is_settled(problem: Problem) -> bool:
-    """Tell if nothing open changes what is minimised."""
     kinds = kinds_of(problem)
     if not kinds or not problem.objective or problem.phasing is not None:
         return False

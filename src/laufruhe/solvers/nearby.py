@@ -37,7 +37,7 @@ STEPS = 96
 
 
 def is_convex(problem: Problem) -> bool:
-    """Whether unbalances alone are open, and loads alone are asked about."""
+    """Tell if all decisions are unbalances, phasing is fixed, and no measure needs a simulation."""
     return (
         problem.phasing is None
         and len(problem.unbalances) == len(problem.decisions)
@@ -46,7 +46,7 @@ def is_convex(problem: Problem) -> bool:
 
 
 def compares_stars(problem: Problem) -> bool:
-    """Whether what else is open of each star is quickly decided, so that all are compared."""
+    """Tell if all stars are compared: phasing is open, but throws and mounts are fixed."""
     return problem.phasing is not None and not (problem.phasing.continuous or problem.mount_decisions)
 
 
@@ -88,7 +88,7 @@ def next_to(problem: Problem, known: Result) -> Engine | None:
 
 
 def _is_like(problem: Problem, known: Result) -> bool:
-    """Whether the design known is worth about the same here; else the best may be anywhere."""
+    # the known design is worth about the same for this problem
     value = objective_value(problem, evaluate(problem, known.final.engine))
     return known.objective is not None and abs(value - known.objective.value) <= LIKE * known.objective.value
 
@@ -121,7 +121,6 @@ def _coarse(fidelity: Fidelity) -> Fidelity:
 
 
 def _moved(phasing: Phasing, star: Candidate, known: Result) -> Engine | None:
-    """The best engine with throws that move from a star."""
     problem = replace(phasing.realise(star), phasing=None)
     if problem.mount_decisions:
         from laufruhe.solvers.mounts.nonlinear import solve_moved
@@ -135,12 +134,12 @@ def _moved(phasing: Phasing, star: Candidate, known: Result) -> Engine | None:
 
 
 def _from(problem: Problem, known: Result) -> Engine | None:
-    """The best numbers: of a convex problem from anywhere, else from those known."""
+    # a convex problem needs no start
     return by_cones(problem) if is_convex(problem) else _engine(solve(_begun(problem, known)))
 
 
 def _begun(problem: Problem, known: Result) -> Problem:
-    """The problem as it would stand with known values, to be searched from there alone."""
+    # the problem with known values as its only start
     values = values_of(problem, known)
     pairs = list(zip(problem.decisions, values, strict=True))
     numbers = [(decision, value) for decision, value in pairs if decision.address_drives]
@@ -151,7 +150,7 @@ def _begun(problem: Problem, known: Result) -> Problem:
 
 
 def _unproven(problem: Problem, starts: int, few: int) -> Search:
-    """With so many starts at most, and a few boxes where these find designs."""
+    # search settings with few starts and boxes, without proof
     boxes = min(problem.search.boxes_or(few), few) if kinds_of(problem) & {Kind.PLACE, Kind.LEAD} else 0
     return replace(problem.search, starts=min(problem.search.starts, starts), boxes=boxes, proves=False)
 

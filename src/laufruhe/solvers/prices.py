@@ -73,7 +73,7 @@ class Price:
 
 @dataclass(frozen=True, eq=False)
 class Slopes:
-    """All slopes of a convex number at a design: those of a hull, and segments about them (P19).
+    """Subgradients of a convex function at a design: a convex hull, and segments added to it (P19).
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ def prices_of(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Arra
 
 
 def _unique(rows: Array, slope: Array) -> list[float] | None:
-    """The only multipliers of independent slopes, None where slopes hang together or do not balance."""
+    # None for dependent slopes, or slopes that do not balance
     lengths = np.linalg.norm(rows, axis=1)
     if not lengths.all():
         return None
@@ -239,7 +239,7 @@ def edges_at(decision: Decision, column: Array) -> dict[str, Array]:
 
 
 def _at_nothing(decision: Decision, column: Array) -> list[Array]:
-    """Outward normals of the edges of an angle at a size of nothing, shape (2,) each."""
+    # outward normals of the edges of an angle, at a size of zero, shape (2,) each
     own = decision.set
     if own.width == 1 or own.free_angle or float(np.hypot(*column)) > own.scale * ACTIVE:
         return []
@@ -320,7 +320,7 @@ def _slopes(norm: AffineNorm, x: Array, z: Array | None, weight: float = 1.0) ->
 
 
 def _disc(slope: Array) -> list[Array]:
-    """Segments that add up to what the unit ball of a row becomes, shape (n,) each."""
+    # segments whose sum is the image of the unit ball, shape (n,) each
     sizes, ways = np.linalg.svd(slope, full_matrices=False)[1:]
     strong = sizes > EDGE * sizes.max(initial=0.0)
     axes = sizes[strong, None] * ways[strong]

@@ -47,7 +47,7 @@ LONG = "there was no time left for it; give more by a time limit"
 
 @dataclass(frozen=True, eq=False)
 class _Answer:
-    """What is told of one limit, the result that it is told of, and whether none keeps the others either."""
+    """Reached value of one limit, its result, and a flag set if no design keeps the other limits."""
 
     told: Reached
     result: Result | None = None
@@ -102,7 +102,7 @@ def with_reachable(found: Result, problem: Problem, kinds: Collection[Kind], too
 
 
 def _surely(solve: Solve, problem: Problem, asked: Problem) -> Result:
-    """Solved, and read at many angles where its own tell otherwise of a problem's limits: means at few are off (P7)."""
+    # P7: means at few angles are inexact, so a disagreement is settled at many
     result = solve(asked)
     if not result.status.has_design or result.objective is None:
         return result
@@ -114,7 +114,6 @@ def _surely(solve: Solve, problem: Problem, asked: Problem) -> Result:
 
 
 def _wanted(found: Result, problem: Problem) -> Collection[str]:
-    """Names of the limits to look at: those that conflict, or that the best design breaks, else all of them."""
     if found.status is Status.INFEASIBLE:
         return found.conflict
     broken = broken_limits(problem.limits, found.final) if found.decisions else found.nearest and found.nearest.broken
@@ -122,7 +121,7 @@ def _wanted(found: Result, problem: Problem) -> Collection[str]:
 
 
 def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], found: Result, solve: Solve) -> _Answer:
-    """What one limit can reach while the others hold; of two sides the second where the first is not to blame."""
+    """Return the value that a limit can reach under the others; of two sides, the second if the first can be met."""
     measure, nothing = limit.measure, Reached(limit.name, "at most", limit.maximum, limit.measure.unit)
     if limit.outside is not None:
         return _Answer(replace(nothing, why="a band is kept or not; no single value can be reached"))
@@ -159,7 +158,7 @@ def _in_time(answer: _Answer) -> _Answer:
 
 
 def _asking(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, ...]) -> Problem:
-    """Another question to the same engine, without what is open that nothing in it depends on."""
+    # decisions that affect nothing here are left out
     asked = problem.changed(objective=objective, limits=limits, ranks=(), sharply=False)
     if problem.phasing is not None:
         return asked
@@ -169,7 +168,7 @@ def _asking(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, 
 
 
 def _least(told: Reached, asked: Problem, solve: Solve) -> _Answer:
-    """By the problem that minimises what is limited."""
+    """Return the reached value of a measure by minimising it under the other limits."""
     result = solve(asked)
     if not result.status.has_design or result.objective is None:
         return _none(told, result)
@@ -187,7 +186,7 @@ def _least(told: Reached, asked: Problem, solve: Solve) -> _Answer:
 
 
 def _none(told: Reached, result: Result) -> _Answer:
-    """Why nothing is told where the other limits found no design."""
+    # the other limits have no design either
     if result.status is Status.INFEASIBLE:
         names = quoted(result.conflict)
         why = f"the other limits cannot be met together either{names and ': no design keeps '}{names}"
@@ -196,7 +195,7 @@ def _none(told: Reached, result: Result) -> _Answer:
 
 
 def _narrowed(found: Result, problem: Problem, solve: Solve) -> Result:
-    """With a smallest set of limits that conflict, where a method names more: what one star breaks another may keep."""
+    # the conflict becomes a smallest set: what breaks a limit on one star may keep it on another
     limits = [limit for limit in problem.limits if limit.name in found.conflict]
 
     def excluded(kept: Sequence[Limit]) -> bool:
@@ -210,7 +209,7 @@ def _narrowed(found: Result, problem: Problem, solve: Solve) -> Result:
 def _at_edges(
     told: Reached, limit: Limit, problem: Problem, others: tuple[Limit, ...], status: Status, solve: Solve
 ) -> _Answer:
-    """By edges between the one asked for and what a design without the limit has, halved."""
+    """Return the reached value of a limit by bisection between its edge and the value of a design without it."""
     high = told.side == "at most"
     first = solve(_asking(problem, problem.objective, others))
     if not first.status.has_design:
@@ -263,7 +262,7 @@ def _recovered(found: Result, problem: Problem, result: Result) -> Result:
 
 
 def _excluded(found: Result, problem: Problem) -> Result:
-    """Infeasible where no design that keeps the other limits comes down to one of them."""
+    # infeasible if the bound of one limit exceeds it
     for told in found.reached:
         if told.side == "at most" and told.bound > told.limit * (1.0 + KEPT):
             names = tuple(limit.name for limit in problem.limits)
@@ -275,7 +274,7 @@ def _excluded(found: Result, problem: Problem) -> Result:
 
 
 def _nearest(found: Result, problem: Problem, designs: Sequence[Result]) -> Nearest | None:
-    """Of the best design found, and of those that are least in one limit, the one that breaks limits least."""
+    # known design with the smallest violation of limits
     known = [found.nearest] if found.nearest is not None else []
     known += [nearest_of(problem, r.final, r.decisions) for r in (*designs, found) if not r.final.resonance]
     return min(known, key=lambda each: each.excess, default=None)

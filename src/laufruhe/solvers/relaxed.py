@@ -50,7 +50,7 @@ def solve_relaxed(problem: Problem, fewer: Problem, prove: Solve, solve: Solve) 
 
 
 def _under_all(known: Result, problem: Problem) -> Result:
-    """Return an optimum under fewer limits as one under all: a limit that it does not need has no price."""
+    # limits left out of the relaxed problem have no price
     own = dict(zip(known.problem.limits, known.limits, strict=True))
     free = {(limit, side): Price(0.0, math.nan) for limit in problem.limits for side in ("at most", "at least")}
     shown = limit_values(problem, known.final, free)

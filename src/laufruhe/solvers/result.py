@@ -37,7 +37,7 @@ AS_GIVEN, AS_DECIDED = "as given", "as decided"
 
 
 class Status(StrEnum):
-    """How a solve ended."""
+    """Outcome of a solve."""
 
     OPTIMAL = "optimal"
     FEASIBLE = "feasible"
@@ -46,13 +46,13 @@ class Status(StrEnum):
 
     @property
     def has_design(self) -> bool:
-        """Whether there is a design within its limits."""
+        """Tell if the result has a design within its limits."""
         return self in (Status.OPTIMAL, Status.FEASIBLE)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Told:
-    """What a result says of its design, whether it was solved now or read back, as `Result` names it."""
+    """Content of a result, solved now or read from a file; the fields are named as in `Result`."""
 
     status: Status
     objective: ObjectiveValue | None = None
@@ -64,11 +64,11 @@ class Told:
 
     @property
     def name(self) -> str:
-        """Of the problem: that of its file without the ending."""
+        """Name of the problem; for a file, its name without the extension."""
         raise NotImplementedError
 
     def to_dataframe(self) -> pd.DataFrame:
-        """What was decided: a row a decision, in SI [pandas]."""
+        """Return the decisions as a table [SI], one row per decision [pandas]."""
         import pandas as pd
 
         names = [field.name for field in fields(DecisionValue)]
@@ -94,7 +94,7 @@ class Told:
 
 
 class Details:
-    """What an extension tells of a result beside the design."""
+    """Additional data of a result that an extension provides."""
 
     @property
     def measured(self) -> Evaluation | None:
@@ -152,7 +152,7 @@ class Result(Told):
 
     @property
     def name(self) -> str:
-        """Of the problem."""
+        """Name of the problem."""
         return self.problem.name
 
     @property
@@ -168,7 +168,7 @@ class Result(Told):
 
     @property
     def designs(self) -> dict[str, Evaluation]:
-        """As given and as decided, by these names; one where nothing was decided."""
+        """Evaluations of the initial and the decided design by name; the initial one alone if nothing was decided."""
         given = {AS_GIVEN: self.initial}
         return given if self.final is self.initial else given | {AS_DECIDED: self.final}
 
@@ -186,7 +186,7 @@ class Result(Told):
 
     @property
     def _with_loads(self) -> dict[str, Evaluation]:
-        """Designs that have loads: one on an undamped resonance has none."""
+        # a design on an undamped resonance has no loads
         found = {name: design for name, design in self.designs.items() if not design.resonance}
         if not found:
             raise ModelError(f"there are no finite loads: {self.final.resonance}; add damping")

@@ -50,7 +50,7 @@ def solve_told(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
 
 
 def _told_otherwise(result: Result) -> float:
-    """By how much many angles tell otherwise, in what counts as kept or as proven."""
+    # disagreement at many angles, relative to the tolerances
     return max(_untold(result) / KEPT, _misproven(result))
 
 
@@ -87,13 +87,13 @@ def told_excess(problem: Problem, evaluation: Evaluation) -> float:
 
 
 def _told_by_few(problem: Problem, evaluation: Evaluation) -> list[Limit]:
-    """Limits on loads that are read at few angles."""
+    # load limits evaluated at few angles
     loads = [limit for limit in problem.load_limits if limit.measure.is_load]
     return [limit for limit in loads if is_coarsely_sampled(limit.measure, evaluation.samples)]
 
 
 def _untold(result: Result) -> float:
-    """Share of a limit by which many angles break one that a design keeps, or tell it otherwise where there is none."""
+    # relative violation at many angles; without a design, the difference between few and many
     problem, own = result.problem, result.final
     if result.status is Status.INFEASIBLE or own.resonance:
         return 0.0
@@ -107,7 +107,7 @@ def _untold(result: Result) -> float:
 
 
 def _misread(problem: Problem, evaluation: Evaluation) -> float:
-    """By how much few angles read an objective of loads too large; negative where they read too little."""
+    # objective at few angles less that at many
     terms = [term for term in problem.load_terms if is_coarsely_sampled(term.measure, evaluation.samples)]
     if not terms or evaluation.resonance:
         return 0.0
@@ -116,7 +116,7 @@ def _misread(problem: Problem, evaluation: Evaluation) -> float:
 
 
 def over_read(problem: Problem, evaluation: Evaluation) -> float:
-    """By how much few angles read an objective of loads too large, where that is more than the tolerance; else zero."""
+    """Return the excess of an objective at few angles over that at many; zero within the tolerance."""
     over = _misread(problem, evaluation)
     return over if over > problem.tolerance * objective_value(problem, evaluation) else 0.0
 

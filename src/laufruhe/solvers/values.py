@@ -19,7 +19,7 @@ APART = 0.05
 
 @dataclass(frozen=True)
 class DecisionValue:
-    """One open number and what was decided of it [SI].
+    """Value of one decision [SI].
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class DecisionValue:
 
     @property
     def is_nothing(self) -> bool:
-        """Whether its size is a rounding of what it may be."""
+        """Tell if the value is zero up to rounding, relative to its bounds."""
         return abs(self.value) <= NEXT_TO_NOTHING * max(abs(self.lower), abs(self.upper))
 
 
@@ -69,7 +69,7 @@ class DecisionRange:
 
 @dataclass(frozen=True)
 class RankValue:
-    """One of several objectives in order [SI].
+    """Result of one objective in a lexicographic order [SI].
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ class RankValue:
 
 @dataclass(frozen=True)
 class LimitValue:
-    """One limit and how the design stands to it [SI].
+    """Value of one limit at a design [SI].
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ class LimitValue:
 
 @dataclass(frozen=True)
 class Reached:
-    """What a limit that no design keeps could be met by while the other limits hold [SI].
+    """Closest value that a broken limit can reach while the other limits hold [SI].
 
     Attributes
     ----------
@@ -203,12 +203,12 @@ class ObjectiveValue:
 
     @classmethod
     def of(cls, problem: Problem, value: float, initial: float) -> ObjectiveValue:
-        """What a problem minimises, of a design and of the one given [SI]."""
+        """Return the objective value of a design and of the initial design [SI]."""
         return cls(problem.objective_name, value, problem.objective_unit or "", initial)
 
     @classmethod
     def given(cls, problem: Problem, design: Evaluation) -> ObjectiveValue | None:
-        """Of a design that is the one given; None where nothing is minimised."""
+        """Return the objective value of the initial design; None without an objective."""
         value = objective_value(problem, design)
         return cls.of(problem, value, value) if problem.objective else None
 

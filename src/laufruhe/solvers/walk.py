@@ -121,7 +121,7 @@ def walked(problem: Problem, found: Result, spent: float) -> Result:
 
 
 def _start(found: Result) -> Stand:
-    """The decided design, or the one given where none was decided."""
+    # the initial design if none was decided
     problem = found.problem
     values = tuple(values_of(problem, found))
     if problem.phasing is not None and found.phasing is not None:
@@ -206,7 +206,6 @@ class _Walk:
                     yield _along(self.random.normal(size=columns) / math.sqrt(max(columns, 1))), size
 
     def _angles(self) -> list[Move]:
-        """Throws, bank angle and split pins that may leave the even steps."""
         phasing, candidate = self.phasing, self.start.candidate
         if phasing is None or candidate is None or not phasing.continuous:
             return []
@@ -214,7 +213,7 @@ class _Walk:
         return [*moves, *(_angle(phasing, name) for name in ("bank_angle", "split_pin"))]
 
     def _choices(self) -> Generator[tuple[Move, float], bool, None]:
-        """Neighbours of what is chosen from finitely many, until none of them is better."""
+        # ends when no neighbour is better
         moves = self._stars()
         failed = 0
         for k in itertools.cycle(self.random.permutation(len(moves))):
@@ -345,7 +344,6 @@ def _swapped(phasing: Phasing, pairs: Sequence[tuple[int, int]]) -> Move:
 
 
 def _fired(phasing: Phasing, k: int) -> Move:
-    """Take another firing order of the same star."""
 
     def move(stand: Stand, _: float) -> Stand | None:
         candidate = stand.candidate
@@ -358,7 +356,6 @@ def _fired(phasing: Phasing, k: int) -> Move:
 
 
 def _built(phasing: Phasing, built: Sequence[int]) -> Move:
-    """Take another choice of the optional shafts."""
 
     def move(stand: Stand, _: float) -> Stand | None:
         assert stand.candidate is not None
@@ -441,7 +438,6 @@ def _withheld(problem: Problem, found: Result, witness: Visit, bound: float) -> 
 
 
 def _reached(found: Result, witness: Visit) -> tuple[RankValue, ...]:
-    """Several objectives in order, each of the design of the walk."""
     own = found.problem
     values = [objective_value(replace(own, objective=rank.terms), witness.evaluation) for rank in own.ranks]
     return tuple(

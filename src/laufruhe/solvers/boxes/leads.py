@@ -124,7 +124,7 @@ class LeadSearch(RebalancedSearch[_Box]):
     def _excluded(
         self, middle: Array, half: Array, program: AffineProblem, norms: tuple[LedNorm, ...], limits: tuple[Array, ...]
     ) -> LeadBound | None:  # fmt: skip
-        """Return an infinite bound if dual rows of limits prove that a box has no feasible design, else None."""
+        # an infinite bound proves that the box has no feasible design
         stripped = replace(program, terms=())
         bound = self.boxes.bound(middle, half, stripped, norms, Multipliers((), limits))
         if not math.isinf(bound.value):
@@ -186,7 +186,6 @@ class LeadSearch(RebalancedSearch[_Box]):
         return replace(self.problem, engine=engine, decisions=tuple(turned(d) for d in self.problem.unbalances))
 
     def _penalised(self, leads: Array) -> float:
-        """Return the objective with a penalty on violated limits."""
         inside = np.clip(leads, self.model.lower, self.model.upper)
         program, _ = self.model.at(inside, self.samples)
         (swing, broken), x = self.boxes.degrees(inside, np.zeros_like(inside)), np.zeros(0)

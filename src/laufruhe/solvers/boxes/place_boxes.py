@@ -70,7 +70,7 @@ class Relaxation:
         self._kinks = [self._kinks_of(place) for place in self.places]
 
     def _kinks_of(self, place: Decision) -> Array:
-        """Return positions of kinks in bearing forces [m]: all bearings of the shaft but the outermost."""
+        # positions of inner bearings [m]
         dependences = {dependence(measure.channel, Kind.PLACE, self.problem) for measure in self.problem.measures}
         if Dependence.BENT not in dependences:
             return np.zeros(0)
@@ -80,7 +80,6 @@ class Relaxation:
         ])  # fmt: skip
 
     def _nodes(self, lower: Array, upper: Array) -> list[Array]:
-        """Return the coordinates of the vertices along every side of a box [m]."""
         sides = zip(self._kinks, lower, upper, strict=True)
         return [np.array([low, *kinks[(kinks > low) & (kinks < high)], high]) for kinks, low, high in sides]
 
@@ -148,7 +147,7 @@ class Relaxation:
         return rotors, decisions
 
     def _placed_at(self, name: str, places: dict[int, float], new: str) -> Rotor:
-        """Return a rotor at another position; under a new name it has no unbalance."""
+        # a rotor under a new name has no unbalance
         rotor = self._rotors[name]
         where = list(rotor.place)
         for k, at in places.items():
@@ -196,7 +195,6 @@ class Relaxation:
         return tuple(values[decision.name] for decision in self.problem.decisions)
 
     def _axes(self, decision: Decision) -> list[int]:
-        """Return the indices of the positions of an unbalance."""
         return sorted({k for drive in decision.rotor_drives for k in self._placed.get(drive.rotor, ())})
 
 
@@ -211,7 +209,7 @@ def _vertices(nodes: Sequence[Array], axes: Sequence[int]) -> tuple[dict[int, fl
 
 
 def _spread(sizes: NDArray[np.complex128], at: Array, middle: float, kinks: Array) -> float:
-    """Return the distance by which unbalances pull a position from its middle [m], times their size."""
+    # moment of the unbalances about the middle
     weights = np.abs(sizes)
     used = at[weights > UNUSED * weights.max(initial=0.0)]
     if used.size and ((kinks > used.min()) & (kinks < used.max())).any():
@@ -236,7 +234,7 @@ def _smallest(values: Set) -> Value:
 
 
 def _from_zero(values: Set) -> Set:
-    """Return a set of unbalances less its smallest one."""
+    # difference to the smallest unbalance
     if isinstance(values, Interval):
         smallest = min(max(values.lower, 0.0), values.upper)
         return replace(values, lower=min(values.lower - smallest, 0.0), upper=max(values.upper - smallest, 0.0))

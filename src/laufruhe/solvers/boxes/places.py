@@ -69,7 +69,7 @@ class _Box:
 
     @property
     def is_exact(self) -> bool:
-        """Whether the relaxation is exact."""
+        """Tell if the relaxation is exact."""
         return bool(self.spread.max() <= EXACT)
 
 
@@ -171,7 +171,6 @@ class PlaceSearch(RebalancedSearch[_Box]):
         return result
 
     def _spans(self, lower: Array, upper: Array) -> Iterator[tuple[Limit, float, float]]:
-        """Yield the range of each limited distance [m] over a box."""
         if not self._envelope:
             return
         low = self.problem.design(lower.tolist(), self.places)
@@ -181,7 +180,6 @@ class PlaceSearch(RebalancedSearch[_Box]):
                 yield limit, least, most
 
     def _violated(self, lower: Array, upper: Array) -> tuple[str, ...]:
-        """Return the name of a limit on distances that is violated all over a box, if any."""
         for limit, least, most in self._spans(lower, upper):
             if least > limit.maximum + REACH or most < limit.minimum - REACH:
                 return (limit.name,)

@@ -34,7 +34,7 @@ class Box(Protocol):
 
     @property
     def is_exact(self) -> bool:
-        """Whether the bound has no relaxation error: no part of the box has a better one."""
+        """Tell if the bound has no relaxation error; splitting the box cannot improve it."""
 
 
 class BoxDesign(Protocol):

@@ -124,7 +124,6 @@ def _drop_negligible(affine: AffineProblem, x: Array) -> Array:
 
 
 def _cancel_exactly(affine: AffineProblem, x: Array) -> Array:
-    """Solve for an objective of zero to the last digit, where a solver left little of it."""
     norms = [norm for _, norm in affine.terms]
     parts = sum(weight * replace(norm, constant=0.0 * norm.constant).value(x) for weight, norm in affine.terms)
     if not 0.0 < affine.objective(x) <= NEGLIGIBLE * parts:

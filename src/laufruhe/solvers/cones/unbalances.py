@@ -113,10 +113,7 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
 
 
 def _fixed_limits(problem: Problem, model: AffineModel) -> tuple[list[Limit], tuple[str, ...]]:
-    """Return limits that nothing open acts on, and the first of them that is broken.
-
-    They are judged like any design, and are in no program: there a rounding would have an infinite price.
-    """
+    # limits without open decisions are checked directly: in a program, rounding would give them an infinite price
     fixed = [limit for limit in problem.load_limits if not model.norm(limit.measure, model.full_samples).slope.any()]
     # a whole number of times as fine
     samples = model.full_samples * max(2, math.ceil(FINE_SAMPLES / model.full_samples))

@@ -100,7 +100,7 @@ class _Program:
         return ConvexDuals(vectors, tuple(price for price, _ in limits), tuple(dual for _, dual in limits))
 
     def _over(self, function: ConvexFunction) -> tuple[Any, Any]:
-        """Return an expression of the function, and the cone whose dual vector it needs."""
+        # expression, and the cone of its dual vector
         if isinstance(function, LinearFunction):
             return function.constant + (function.gradient * self.scale) @ self.y, None
         if isinstance(function, Compliance):
@@ -124,7 +124,7 @@ class _Program:
         return unit * top, cone
 
     def _limited(self, function: ConvexFunction, maximum: float, missed: Any) -> tuple[Any, float]:
-        """Return the constraint, and the factor from its dual to the units of the program."""
+        # constraint, and the factor from its dual to program units
         whole = abs(maximum) or 1.0
         if isinstance(function, Eigenvalue):
             room = (maximum + missed * whole) / self.unit
@@ -136,7 +136,6 @@ class _Program:
 
 
 def _dual(constraint: Any, factor: float, size: float) -> tuple[float, Array | None]:
-    """Return the price of a constraint in the unit of the program, and its dual matrix if it has one."""
     if constraint.dual_value is None:
         return 0.0, None
     array = np.asarray(constraint.dual_value, dtype=float)

@@ -76,7 +76,7 @@ def convex_program(problem: Problem) -> ConvexProgram:
 
 
 def _slope(mounting: ElasticMounting, decision: Decision) -> Array:
-    """Return the exact derivative of K by one decision (E3), shape (6, 6)."""
+    # E3: derivative of K, shape (6, 6)
     total, springs = np.zeros((6, 6)), every_spring(mounting.mounts)
     for drive in decision.mount_drives:
         place, spring = springs[drive.mount]
@@ -153,7 +153,7 @@ def solve_convex_mounts(problem: Problem) -> Result:
 
 
 def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> dict[Side, Price]:
-    """Return the fall of the objective per unit by which each side of a limit is relaxed."""
+    # fall of the objective per unit of relaxation
     prices: dict[Side, Price] = {}
     for limit, price in zip(program.limits, duals.prices, strict=True):
         source = problem.limits[limit.source]
@@ -166,7 +166,7 @@ def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> dic
 
 
 def _residual(program: ConvexProgram, x: Array, duals: ConvexDuals, gradient: Array) -> float:
-    """Return the largest relative violation of stationarity, feasibility and complementarity."""
+    # largest relative violation of the KKT conditions
     width = np.where(program.upper > program.lower, program.upper - program.lower, 1.0)
     whole = abs(program.objective(x)) or 1.0
     moved = np.clip(x - gradient * width**2 / whole, program.lower, program.upper)

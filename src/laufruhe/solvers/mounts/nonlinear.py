@@ -147,7 +147,6 @@ def _balance(share: tuple[Problem, Sequence[float]]) -> tuple[list[complex], flo
 
 
 def _rebalanced(design: Design, unbalances: Sequence[complex], gap: float) -> tuple[Design, float] | None:
-    """Return a design with other unbalances, or None if these violate a limit."""
     mounts, columns = iter(_mounts(design)), iter(unbalances)
     values = [next(columns) if d.is_affine else next(mounts) for d in design.problem.decisions]
     again = judged_at(design.problem, values)
@@ -155,7 +154,6 @@ def _rebalanced(design: Design, unbalances: Sequence[complex], gap: float) -> tu
 
 
 def _convex_part(problem: Problem) -> Problem | None:
-    """Return the part of a problem that is convex in its stiffnesses, or None if other numbers of mounts are open."""
     decisions = problem.mount_decisions
     if not decisions or not all(decision.is_stiffness for decision in decisions):
         return None

@@ -214,7 +214,7 @@ class MountSearch:
         return SmoothProgram(problem, self._size, margin, self.moves, coarser=self._coarser)
 
     def _limits_with_room(self) -> set[Limit]:
-        """Return limits on loads that all starts keep by far; each would add hundreds of rows to the program."""
+        # each load limit would add hundreds of rows to the program
         if self.moves is not None:
             return set()
         limits = [x for x in self.problem.load_limits if not x.measure.is_mass and not x.measure.channel.simulation]
@@ -224,7 +224,6 @@ class MountSearch:
         return set(limits)
 
     def _repeat_with_active_limits(self, search: Callable[[], None]) -> None:
-        """Search, and repeat with ignored limits that the best ends come close to."""
         search()
         while self._active_again and not (passed() and self._is_feasible):
             self._ignored = self._ignored - self._active_again
@@ -261,7 +260,6 @@ class MountSearch:
         }
 
     def _comes_close(self, design: Design, limit: Limit) -> bool:
-        """Return whether a design that competes with the best one comes close to an ignored limit."""
         if self.best is not None and self._is_feasible and design.value > self.best.design.value:
             return False
         limits = [other for other in self.problem.limits if other not in self._ignored]
@@ -284,7 +282,7 @@ class MountSearch:
         return judged_at(problem, values)
 
     def _nudged(self, generator: np.random.Generator, k: int) -> Array:
-        """Return start throws: first the star itself, then random ones, since a symmetric star may be a saddle."""
+        # a symmetric star may be a saddle, so later starts are random
         if self.moves is None or k == 0:
             return self.joint.turns(np.zeros(self.joint.program.x.numel()))
         nudge = NUDGE * generator.normal(size=self.moves.size)
@@ -320,7 +318,6 @@ class MountSearch:
 
 
 def _split(joint: SmoothProgram, x: Array) -> tuple[list[float], Array]:
-    """Return mounts and columns of unbalances of a point of a program."""
     mounts, _ = joint.split(x)
     return list(mounts), x[len(mounts) : len(mounts) + joint.columns]
 

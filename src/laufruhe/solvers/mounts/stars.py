@@ -53,12 +53,11 @@ Star: TypeAlias = tuple[Candidate, tuple[int, ...] | None]
 
 
 def _rank(design: StarDesign) -> tuple[bool, float]:
-    """Sort key: feasible designs first, then by objective."""
+    # sort key: feasible designs first, then by objective
     return not design.result.status.has_design, design.value
 
 
 def _least(found: list[StarDesign]) -> float:
-    """Return the objective of the best feasible design; infinite without one."""
     return min((value for broken, value in map(_rank, found) if not broken), default=math.inf)
 
 
@@ -137,14 +136,13 @@ def _ranked(problem: Problem, phasing: Phasing, family: Family, count: int) -> t
 
 
 def _on_given_mounts(problem: Problem) -> Problem:
-    """Return the problem that ranks stars: objective or RMS mount force, under limits on masses alone."""
+    # stars are ranked by loads, or by RMS mount force without load terms
     terms = problem.load_terms or (Term(Measure(channels.MOUNT_FORCE, RMS)),)
     masses = tuple(limit for limit in problem.limits if limit.measure.is_mass)
     return replace(problem.balance, objective=terms, limits=masses)
 
 
 def _problem_of(problem: Problem, phasing: Phasing, candidate: Candidate, starts: int) -> Problem:
-    """Return the problem of one star, without open phasing."""
     realised = phasing.realise(candidate)
     search = replace(problem.search, starts=starts)
     return replace(realised, phasing=None, tolerance=problem.tolerance, fidelity=problem.fidelity, search=search)
@@ -257,7 +255,6 @@ def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs
 
 
 def _divided(problem: Problem, phasing: Phasing, best: StarDesign) -> Divided:
-    """Bound mounts and throws between bounds together by provers."""
     if phasing.throw_bounds is None or not best.is_met or not problem.search.proves or passed():
         return Divided(0.0, 0)
     realised = with_default_sampling(replace(phasing.realise(best.candidate), phasing=None))
@@ -291,7 +288,7 @@ def _entry(phasing: Phasing, found: StarDesign, proven: bool) -> RankedStar:
 
 
 def _only(phasing: Phasing, star: Candidate, steps: tuple[int, ...] | None) -> Phasing:
-    """Return the phasing of a star: open firing orders of even steps, or its own firing order."""
+    # with even steps, firing orders stay open
     return phasing if steps else replace(phasing, firing_order=star.firing_order or phasing.firing_order)
 
 

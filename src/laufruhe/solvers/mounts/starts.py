@@ -65,7 +65,6 @@ def place_of(problem: Problem, result: Result) -> tuple[list[float], Array]:
 
 
 def _balance_on_baseline(problem: Problem) -> list[complex] | None:
-    """Return the best unbalances on the baseline mounts, or None without open unbalances or load terms."""
     if not problem.unbalances or not problem.load_terms:
         return None
     result = solve_unbalances(replace(off_resonance(problem).balance, tolerance=max(problem.tolerance, ROUGHLY)))
@@ -100,7 +99,7 @@ def start_points(problem: Problem) -> tuple[list[tuple[list[float], Array]], flo
 
 
 def _spread_over(problem: Problem) -> Array:
-    """Return points over all bounds, shape (points, mounts and columns of unbalances)."""
+    # shape (points, mounts and columns of unbalances)
     domains, decisions = domains_of(problem.unbalances), problem.mount_decisions
     ratio = np.array([d.is_stiffness and d.lower > 0.0 for d in decisions], dtype=bool)
     low, high = sides_of(decisions)
@@ -114,7 +113,7 @@ def _spread_over(problem: Problem) -> Array:
 
 
 def _promising(problem: Problem, initial: Evaluation, pool: Array, scored: Array, wanted: int) -> tuple[Array, float]:
-    """Return the best points of the pool and as they come a third more, and the least positive objective."""
+    # two thirds are the best of the pool, the others its first
     misses, values = scored.T
     known = values[np.isfinite(values)]
     middle = float(np.median(known)) if len(known) else 0.0
@@ -173,7 +172,7 @@ def _scores(share: tuple[Problem, Evaluation, Array]) -> Array:
 
 
 def _of_peaks(problem: Problem, peaks: Peaks, row: Array) -> tuple[float, float]:
-    """Return the relative excess of simulated measures over their limits, and their share of the objective."""
+    # relative excess over limits, and share of the objective
     parts = np.split(peaks.values(row), np.cumsum(peaks.counts)[:-1])
     most = dict(zip(simulated_measures(problem), map(np.max, parts), strict=True))
     over = (float(most[x.measure]) / (x.maximum or 1.0) - 1.0 for x in problem.limits if x.measure in most)

@@ -31,7 +31,7 @@ class Held:
 
 
 class StaticCases:
-    """Where the block settles; with bump stops as further variables, held to be in balance.
+    """Static positions of the block; with bump stops, their forces are variables under an equilibrium constraint.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class StaticCases:
 
 
 def _beyond(travel: Any, gaps: Array) -> Any:
-    """What of a travel is beyond a gap on one side, from under and with a slope everywhere."""
+    # travel beyond a one-sided gap: a lower estimate with a continuous derivative
     soft, over = ca.DM(SOFT * gaps), travel - ca.DM(gaps)
     within = ca.fmin(ca.fmax(over, 0.0), soft)
     return within * within / (2.0 * soft) + ca.fmax(over - soft, 0.0)

@@ -39,7 +39,7 @@ class Gathered:
     def add(
         self, expression: Any, lower: float, upper: float, name: str, least: Slope = None, most: Slope = None
     ) -> None:
-        """One constraint, or a column of them; what its sides are of which limit where that has a price."""
+        """Add a scalar or column constraint, and the limits that its lower and upper sides give a price to."""
         expression = ca.MX(expression)
         count = expression.numel()
         self.expressions.append(expression.reshape((count, 1)))
@@ -49,7 +49,7 @@ class Gathered:
         self.slopes += [(least, most)] * count
 
     def named(self, name: str, symbol: Any = ca.MX) -> Named:
-        """What a norm adds to, under the name of its measure."""
+        """Return a collector that a norm adds its variables and constraints to, under the name of its measure."""
         return Named(self, name, symbol)
 
 
@@ -76,5 +76,5 @@ class Named:
         return found
 
     def hold(self, expression: Any) -> None:
-        """Every entry at most zero."""
+        """Constrain every entry of an expression to at most zero."""
         self.into.add(expression, -math.inf, 0.0, self.name)

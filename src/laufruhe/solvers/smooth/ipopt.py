@@ -60,10 +60,10 @@ class Teller(Protocol):
     """A model outside a program, that another process can read."""
 
     def values(self, asked: Array) -> Array:
-        """What it is asked for; no numbers where there are none."""
+        """Return the values at the arguments; not a number where the evaluation fails."""
 
     def slopes(self, asked: Array) -> Array:
-        """Of these numbers over what is asked, shape (values, asked)."""
+        """Return the derivatives of the values by the arguments, shape (values, asked)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,15 +113,15 @@ class _Clock(ca.Callback):
         self.construct("clock", {})
 
     def start(self, seconds: float) -> None:
-        """So much time from now on."""
+        """Set the deadline to a number of seconds [s] from now."""
         self._until = time.monotonic() + seconds
 
     def get_n_in(self) -> int:
-        """As many as IPOPT tells."""
+        """Return the number of inputs, equal to the number of outputs of a CasADi NLP solver."""
         return int(ca.nlpsol_n_out())
 
     def get_n_out(self) -> int:
-        """One number: not zero ends the search."""
+        """Return 1: the single output ends the search if it is not zero."""
         return 1
 
     def get_sparsity_in(self, k: int) -> Any:
@@ -129,7 +129,7 @@ class _Clock(ca.Callback):
         return ca.Sparsity.dense(self._sizes[ca.nlpsol_out(k)], 1)
 
     def eval(self, _: Any) -> list[float]:
-        """Whether time is over."""
+        """Return 1.0 if time is over, else 0.0."""
         return [float(time.monotonic() > self._until)]
 
 
@@ -147,23 +147,23 @@ class _Told(ca.Callback):
         return len(self._sizes)
 
     def get_n_out(self) -> int:
-        """One matrix."""
+        """Return 1: the single output is a matrix."""
         return 1
 
     def get_sparsity_in(self, k: int) -> Any:
-        """All of a column."""
+        """Return the sparsity of an input: a dense column."""
         return ca.Sparsity.dense(self._sizes[k], 1)
 
     def get_sparsity_out(self, _: int) -> Any:
-        """All of the matrix."""
+        """Return the sparsity of the output: a dense matrix."""
         return ca.Sparsity.dense(*self._shape)
 
     def eval(self, told: Any) -> list[Any]:
-        """Of the first column; a derivative is given the values too."""
+        """Return the answer at the first input; a derivative also receives the values, and ignores them."""
         return [ca.DM(self._answer(_flat(told[0])))]
 
     def has_jacobian(self, *_: Any) -> bool:
-        """Where slopes are told."""
+        """Tell if derivatives are available."""
         return self._slopes is not None
 
     def get_jacobian(self, name: str, *_: Any) -> Any:
@@ -212,7 +212,6 @@ def _built(oracle: str, expand: bool, max_iterations: int, outside: Outside | No
 
 
 def _with_outside(function: Any, outside: Outside) -> tuple[Any, _Told]:
-    """An oracle with what it is told from outside in it, and who tells it."""
     asked, teller, count = ca.Function.deserialize(outside.asked), outside.teller, outside.count
     told = _Told("told", (asked.size1_out(0),), (count, 1), teller.values, teller.slopes)
     x, p = (ca.MX.sym(name, function.size1_in(name)) for name in ("x", "p"))
@@ -262,7 +261,7 @@ def _from_start(task: Task, built: _Program, k: int, point: Array) -> LocalOptim
 
 @dataclass(frozen=True, eq=False)
 class _End:
-    """Where a stage ended, and its multipliers of constraints and bounds."""
+    """End point of a stage, with its multipliers of constraints and bounds."""
 
     y: Array
     m: Array
@@ -276,7 +275,7 @@ def _of_task(task: Task, near: bool = False) -> _Program:
 
 
 def _ended(task: Task, built: _Program, y: Array, stage: Sequence[float]) -> _End:
-    """One stage from a point."""
+    # run one stage from a point
     built.clock.start(min(task.max_seconds, max(left(), SHORTEST)))
     found = built.solver(
         x0=y, p=list(stage), lbx=task.lower, ubx=task.upper, lbg=task.constraint_lower, ubg=task.constraint_upper
@@ -288,7 +287,7 @@ def _ended(task: Task, built: _Program, y: Array, stage: Sequence[float]) -> _En
 
 
 def _strayed(task: Task, built: _Program, start: Array, end: _End, stage: Sequence[float]) -> bool:
-    """Whether a start that keeps every side is better than where it ended: a barrier led it away from what was near.
+    """Tell if a feasible start is better than the end point: the barrier led the search away.
 
     Programs that are told numbers from outside are taken as they are, for each look costs.
     """
@@ -306,7 +305,7 @@ def _flat(value: Any) -> Array:
 def _judged(
     task: Task, y: Array, g: Array, gradient: Array, jacobian: Array, m: Array, b: Array
 ) -> tuple[float, float]:
-    """KKT residual and violation of the limits (N2), everything of size one."""
+    # N2: relative KKT residual, and violation of the limits
     balance = gradient + jacobian.T @ m + b
     reach = max(1.0, float((np.abs(gradient) + np.abs(jacobian).T @ np.abs(m) + np.abs(b)).max(initial=0.0)))
     violation = max(_outside(g, task.constraint_lower, task.constraint_upper), _outside(y, task.lower, task.upper))
@@ -319,7 +318,7 @@ def _outside(value: Array, lower: Array, upper: Array) -> float:
 
 
 def _slack(multiplier: Array, value: Array, lower: Array, upper: Array) -> float:
-    """Largest multiplier times distance from the side that it speaks of."""
+    # largest product of multiplier and distance to its side
     size = np.abs(multiplier)
     distance = np.abs(np.where(multiplier > 0.0, upper - value, value - lower))
     # a side at infinity can carry nothing: its multiplier itself is the violation

@@ -16,7 +16,7 @@ _MISSED = 1.0 / 36.0
 
 
 class Ending(StrEnum):
-    """How one start of a nonlinear program ended."""
+    """Outcome of one start of a nonlinear program."""
 
     CONVERGED = "converged"
     ACCEPTABLE = "converged to a looser tolerance"
@@ -27,7 +27,7 @@ class Ending(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class LocalOptimum:
-    """Where one start ended.
+    """End point of one start.
 
     Attributes
     ----------
@@ -67,12 +67,12 @@ class LocalOptimum:
 
     @property
     def usable(self) -> bool:
-        """Whether this is a local optimum to trust."""
+        """Tell if the solver converged and the limits are kept."""
         return self.ending in (Ending.CONVERGED, Ending.ACCEPTABLE) and self.violation <= _NEAR
 
 
 def distinct(optima: Sequence[LocalOptimum], scale: float, tolerance: float = _SAME) -> tuple[LocalOptimum, ...]:
-    """One of every group of usable optima whose values agree to `tolerance` of `scale`, best first."""
+    """Return usable optima of distinct values, best first; values within `tolerance` times `scale` count as one."""
     kept: list[LocalOptimum] = []
     for optimum in sorted((o for o in optima if o.usable), key=lambda o: o.value):
         if not kept or optimum.value - kept[-1].value > tolerance * scale:
@@ -81,7 +81,7 @@ def distinct(optima: Sequence[LocalOptimum], scale: float, tolerance: float = _S
 
 
 def ends_in_words(optima: Sequence[LocalOptimum], apart: int) -> str:
-    """From how many starts IPOPT searched, and at how many optima apart these ended."""
+    """Return a text on the number of IPOPT starts and of different optima found."""
     if not optima:
         return "a design to start from"
     starts, usable = (sum(o.starts for o in some) for some in (optima, [o for o in optima if o.usable]))
@@ -93,7 +93,7 @@ def ends_in_words(optima: Sequence[LocalOptimum], apart: int) -> str:
 
 
 def is_explored(optima: Sequence[LocalOptimum], scale: float) -> bool:
-    """Whether starts spread at random have very likely met the best optimum, and more than once (N5).
+    """Tell if random starts have very likely met the best optimum, and more than once (N5).
 
     Where n starts led to w different ones, the next one leads to another with a chance of w (w + 1) / (n (n - 1))
     (Boender and Rinnooy Kan, Math. Programming 37, 1987, 59-80); that is the best of w + 1 with a chance of one in so

@@ -49,16 +49,16 @@ class LocalProgram:
 
     @cached_property
     def domains(self) -> tuple[Domain, ...]:
-        """Of all decisions."""
+        """Domains of all decisions."""
         return domains_of(self.problem.decisions)
 
     def shares(self, values: Sequence[Value] | Array) -> Array:
-        """Of the bounds, where decisions have these values."""
+        """Return decision values as shares of their bounds, from 0 to 1."""
         own = vector_of(self.domains, values)
         return np.asarray(np.clip((own - self.lower) / (self.upper - self.lower), 0.0, 1.0))
 
     def columns(self, shares: Array) -> Array:
-        """Of all decisions."""
+        """Return the columns of all decisions at these shares of their bounds."""
         return np.clip(self.lower + shares * (self.upper - self.lower), self.lower, self.upper)
 
     def values(self, shares: Array) -> list[Value]:
@@ -90,11 +90,11 @@ class LocalProgram:
         return self.shares(values)
 
     def by_decision(self, values: Array) -> dict[str, Array]:
-        """What stands for every share, by the name of its decision."""
+        """Return the entries of each decision by its name."""
         return {domain.decision.name: values[domain.columns] for domain in self.domains}
 
     def slopes(self, shares: Array) -> Array:
-        """Of these numbers, by central differences inside the bounds, shape (1 + limits, n)."""
+        """Return derivatives of `numbers` by central differences within the bounds, shape (1 + limits, n)."""
         found = []
         for k in range(len(shares)):
             ends = [np.clip(shares + sign * STEP * np.eye(len(shares))[k], 0.0, 1.0) for sign in (-1.0, 1.0)]
@@ -173,7 +173,7 @@ class _OverError(Exception):
 
 
 def _rank(numbers: Array) -> tuple[float, float]:
-    """Designs within their limits by their objective, others by what they exceed these by."""
+    # sort key: feasible designs by objective, others by violation
     value, *rooms = numbers
     return max(-min(rooms, default=0.0), KEPT), float(value)
 
@@ -192,12 +192,12 @@ class Proven:
 
     @property
     def excludes_all(self) -> bool:
-        """Whether no design keeps the limits."""
+        """Tell if no design keeps the limits."""
         return self.design.excess > KEPT and self.divided.bound == math.inf
 
     @property
     def bound(self) -> float:
-        """Of the objective; of a design that breaks a limit nothing is proven."""
+        """Lower bound of the objective; zero if the design breaks a limit."""
         return self.divided.bound if self.design.excess <= KEPT else 0.0
 
 

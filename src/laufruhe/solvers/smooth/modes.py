@@ -66,7 +66,7 @@ class ModeVariables:
         return {channels.DECOUPLING: self._least_shares, channels.FREQUENCIES: self._frequencies}
 
     def _shares(self, measure: Measure) -> list[Any]:
-        """Of motion j in column j: the columns are set to their motions at the start (E24)."""
+        # E24: share of motion j in mode j; the columns start at their motions
         v = ca.reshape(self._vectors, 6, 6)
         shapes, momenta = ca.DM(self._root.T) @ v, ca.DM(np.linalg.inv(self._root)) @ v
         return [shapes[j, j] * momenta[j, j] for j in motion_indices(measure)]
@@ -87,7 +87,7 @@ class ModeVariables:
         return found
 
     def _frequencies(self, limit: Limit) -> None:
-        """Each side over its own square, whose slope over the edge is two over the edge; a band as E23."""
+        # E23 for bands; each side is relative to its squared edge, so its slope is 2 / edge
         for edge, side in ((limit.minimum, "at least"), (limit.maximum, "at most")):
             if math.isfinite(edge):
                 low, high = (1.0, np.inf) if side == "at least" else (-np.inf, 1.0)
@@ -99,7 +99,7 @@ class ModeVariables:
             self._held.add((self._squares - a) * (self._squares - b) / (b * b), 0.0, np.inf, limit.name)
 
     def _square(self, frequency: float) -> float:
-        """Of a frequency [Hz], as the program counts it."""
+        # from a frequency [Hz] to the unit of the program
         return float((math.tau * frequency) ** 2 / self._unit)
 
     def prices(self, values: Array, multipliers: Array) -> dict[Side, float]:

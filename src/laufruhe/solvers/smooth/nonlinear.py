@@ -184,7 +184,7 @@ def solve_nonlinear(
 def _first_ends(
     task: Task, points: Sequence[tuple[int, Array]], workers: int | None, enough: Enough | None, stack: ExitStack
 ) -> tuple[list[LocalOptimum], Several]:
-    """Where starts end, and who looked for that."""
+    """Return the optima that the starts end at, and the function that ran them."""
     rest = points[1:]
     count = min(len(rest), workers if workers is not None else worker_count())
     # threads would share a linear solver that knows of one alone
@@ -215,7 +215,7 @@ class _Shared:
         self._count, self._executor = count, stack.enter_context(executor_for(count))
 
     def __call__(self, share: Share) -> list[LocalOptimum]:
-        """As `run`."""
+        """Run a share of starts on all workers, as `run` does."""
         task, points = share
         shares = [(task, points[k :: self._count]) for k in range(min(self._count, len(points)))]
         with closing(unordered_map(run, shares, self._executor, patient=True)) as answers:
@@ -229,11 +229,11 @@ class _AtHand:
         self._count, self._ahead = count, stack.enter_context(speculation(run))
 
     def begin(self, share: Share) -> None:
-        """What is likely to be asked."""
+        """Submit starts that are likely to be needed."""
         self._ahead.prefetch(self._shares(share))
 
     def __call__(self, share: Share) -> list[LocalOptimum]:
-        """As `run`; one start goes on here, where the program is set up."""
+        """Run a share of starts as `run` does; a single start runs in this process."""
         if len(share[1]) == 1:
             return run(share)
         self.begin(share)
@@ -247,7 +247,7 @@ class _AtHand:
 
 
 def _grouped(found: Sequence[LocalOptimum], task: Task) -> list[LocalOptimum]:
-    """One of those that end at one point, which tells how many they are; every one that ends at none."""
+    """Return one optimum per end point with its number of starts; unusable optima stay separate."""
     groups: list[LocalOptimum] = []
     for end in sorted((o for o in found if o.usable), key=lambda o: (o.value, o.start)):
         number = next((k for k, known in enumerate(groups) if _is_same(end, known, task)), None)

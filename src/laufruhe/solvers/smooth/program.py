@@ -155,7 +155,7 @@ class SmoothProgram:
 
     @property
     def _stages(self) -> tuple[tuple[float, ...], ...]:
-        """All softness at once where it costs simulations and nothing that is minimised is softened (N4)."""
+        # N4: one stage if simulations are costly and no softened term is minimised
         plain = self._simulated.told is not None and not self.problem.load_terms
         return tuple((share,) for share in (*(() if plain else SOFTNESS), self._softest))
 
@@ -189,7 +189,7 @@ class SmoothProgram:
     # loads
 
     def _responses(self) -> list[PointResponse]:
-        """Response to the orders that matter (E4)."""
+        # E4
         moved = self._root @ moved_wrench(NUMBERS, self._mounting.block.centre_of_gravity)
         return [
             PointResponse(point.name, point.weight, w.base, w.orders,
@@ -204,7 +204,7 @@ class SmoothProgram:
         return self._loads.rows(measure)
 
     def _least(self, measure: Measure, unit: float) -> Any:
-        """A measure to be minimised, softened by a share of its unit (N3); a number where nothing moves it."""
+        # N3: softened by a share of its unit; a constant if no decision affects it
         kinds = {d.kind for d in self.problem.decisions} | ({Kind.STAR} if self.moves is not None else set())
         if not depends(measure.channel, kinds, self.problem):
             return evaluate(off_resonance(self.problem)).value(measure)
@@ -231,7 +231,7 @@ class SmoothProgram:
         self._held.add(value, -np.inf, most, limit.name, most=((limit, "at most"), slope / unit))
 
     def _hold_unbalances(self) -> None:
-        """Discs and sectors of the unbalances (P4)."""
+        # P4
         for domain in self.domains:
             if domain.width == 1:
                 continue
@@ -272,7 +272,7 @@ class SmoothProgram:
         return top
 
     def _residual(self, axis: AxisResidual) -> Any:
-        """Of turning about the torque-roll axis, in what the mounts as given answer to it; the best square is known."""
+        # residual of the torque-roll axis, relative to that of the mounts as given
         given = axis.answer(self._root @ self._mounting.stiffness @ self._root.T)
         unit = float(np.linalg.norm(given)) or 1.0
         answer, mass = ca.DM(axis.left) @ self._mounts.stiffness @ ca.DM(axis.right), ca.DM(axis.mass)
@@ -308,7 +308,7 @@ class SmoothProgram:
         return {side: Price.both(price) for side, price in found.items()}
 
     def _inner(self, mounts: Sequence[float]) -> Array:
-        """Decisions about mounts as the program has them: by ratio where bounds lie far apart."""
+        # logarithms for decisions with bounds far apart
         values = np.asarray(mounts, dtype=float)
         return np.where(self._by_ratio, np.log(np.where(self._by_ratio, values, 1.0)), values)
 

@@ -49,7 +49,7 @@ class SimulatedVariables:
 
     @property
     def told(self) -> Told | None:
-        """Who tells the peaks, if any are asked for."""
+        """Outside source of the peaks; None without simulated measures."""
         return None if self._peaks is None else Told(self.symbols, self._asked, self._peaks)
 
     def at(self, mounts: Sequence[float], columns: Array) -> Array:
@@ -65,7 +65,7 @@ class SimulatedVariables:
         return size * top
 
     def limit(self, limit: Limit, tight: float) -> None:
-        """No peak above a share of its limit."""
+        """Constrain every peak to at most a share of its limit."""
         unit = limit.maximum or 1.0
         side = ((limit, "at most"), tight / unit)
         self._held.add(self._own[limit.measure] / unit, -math.inf, tight * limit.maximum / unit, limit.name, most=side)

@@ -126,7 +126,7 @@ def coarse_value(model: StarModel, star: tuple[int, ...], built: tuple[int, ...]
 
 
 def _breaks_fixed_limit(model: StarModel, star: Sequence[int], affine: AffineProblem, fixed: Sequence[bool]) -> bool:
-    """Return True if a limit that nothing open acts on is broken, its mean averaged about many angles if need be."""
+    # a limit without open decisions; its mean is checked again at more angles
     x = np.zeros(affine.size)
     over = [
         k for k, (maximum, norm) in enumerate(affine.limits) if fixed[k] and norm.value(x) > maximum * (1.0 + FEASIBLE)

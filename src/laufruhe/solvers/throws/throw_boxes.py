@@ -305,7 +305,6 @@ class ThrowPrograms:
         return float(value + arcs.minimum), arcs
 
     def _is_excluded(self, program: Program, columns: BoxColumns, multipliers: Multipliers, arc_box: ArcBox) -> bool:
-        """Return True if the limits' own multipliers show that no design in a box keeps all of them."""
         limits = replace(program.rows, terms=())
         value, _ = self._bound(limits, columns, multipliers, arc_box)
         prices = [norm.dual_norm(z) for (_, norm), z in zip(limits.limits, multipliers.limits, strict=False)]

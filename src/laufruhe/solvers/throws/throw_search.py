@@ -297,7 +297,7 @@ class ThrowSearch(Search[_Part, _Best]):
         return partial(ThrowPrograms, waves, riders, firing_bounds(phasing)), loss
 
     def _first_crank(self, windows: Sequence[FiringWindow], left_out: tuple[str, ...]) -> tuple[Candidate, Problem]:
-        """Return the first crank in the middle of a window that can be evaluated: what fires all but at once cannot."""
+        # a crank with nearly simultaneous firings cannot be evaluated
         tried = windows[:_MOST_REALISED]
         for k, window in enumerate(tried):
             candidate = replace(self.candidate(window, middle_of(window)), left_out=left_out)
@@ -309,7 +309,6 @@ class ThrowSearch(Search[_Part, _Best]):
         raise ModelError("no crank fires")
 
     def _waves(self, problem: Problem, candidate: Candidate, rides: dict[str, int]) -> ThrowWaves:
-        """Return waves of the throws and of the shared angles."""
         phasing = self._phasing
         layout = phasing.layout_of(candidate)
         if not any(phasing.opened):

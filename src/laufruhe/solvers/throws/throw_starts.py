@@ -121,7 +121,6 @@ def _firing_patterns(phasing: Phasing) -> tuple[list[FiringPattern], bool]:
 
 
 def _best_cranks(phasing: Phasing, patterns: Sequence[FiringPattern]) -> list[Candidate]:
-    """Return the best few of the cranks that fire so, as they are before anything moves."""
     cranks: list[tuple[float, Candidate]] = []
     allowed = [pattern for pattern in patterns if pattern.broken <= _ROUNDING]
     for number, pattern in enumerate(allowed):

@@ -52,7 +52,7 @@ def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
 
 
 def _has_images(problem: Problem, phasing: Phasing) -> bool:
-    """Return True if swapping front and back, or turning the other way, changes nothing (S2)."""
+    # S2
     if phasing.throw_bounds is not None or phasing.firing_order is not None or phasing.bank is not None:
         return False
     layout = phasing.layout(None, None)

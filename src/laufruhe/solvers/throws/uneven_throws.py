@@ -115,7 +115,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
 
 
 def _search_boxes(problem: Problem, phasing: Phasing, first: StarDesign | None, floor: float) -> Searched | None:
-    """Bound boxes of throws, bank angle and split pins; None where they prove nothing."""
+    # None without a proof
 
     def improve(candidate: Candidate, moving: bool) -> StarDesign | None:
         if moving:
