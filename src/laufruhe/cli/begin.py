@@ -42,7 +42,7 @@ def _someone_answers() -> bool:
 
 
 def _requested_source(file: Path) -> str | None:
-    """Ask for an engine or a ready problem; None for an engine that the user describes."""
+    # None for an engine that the user describes
     if not _someone_answers():
         rule, remedy = "asks questions, and nobody is there to answer", "add --from with an engine or a ready problem"
         raise refused("init", "", rule, remedy)
@@ -70,7 +70,7 @@ def copy_ready(names: Sequence[str], folder: Path) -> str:
 
 
 def _write(texts: Mapping[Path, str]) -> None:
-    """Write all texts, or none if one would replace another file."""
+    # writes no text if one would replace another file
     for path, text in texts.items():
         above = next(above for above in (path, *path.parents) if above.exists())
         if path.is_dir():

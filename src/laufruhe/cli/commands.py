@@ -343,10 +343,8 @@ def _run() -> NoReturn:
 
 
 def _leave(status: int) -> NoReturn:
-    """End at once: taking imported solvers apart would cost a fifth of the whole run.
-
-    After an interrupted import Python would end by the signal, and lose the status.
-    """
+    # ends at once: taking imported solvers apart would cost a fifth of the whole run;
+    # after an interrupted import Python would end by the signal, and lose the status
     try:
         sys.stdout.flush()
         sys.stderr.flush()

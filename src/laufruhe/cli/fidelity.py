@@ -42,7 +42,7 @@ def explained(path: Path, tolerance: float) -> tuple[str, Callable[[], str]]:
 
 
 def _load_times(problem: Problem, choice: Choice) -> tuple[float, float]:
-    """Return the milliseconds of one design at the chosen fidelity, and exactly over the whole cycle."""
+    # milliseconds of one design at the chosen fidelity, and exactly over the whole cycle
     whole = Fidelity(samples=problem.fidelity.samples, crank_inertia=problem.fidelity.crank_inertia)
     times = []
     for fidelity, prune in ((choice.fidelity, True), (whole, False)):
@@ -120,7 +120,7 @@ def _measured(
 
 
 def _measured_by_worker(piece: tuple[Path, dict[str, Any]]) -> tuple[Trade, Pages] | None:
-    """Return measurements without functions, which have no pickle, and pages; None if time is over."""
+    # leaves out functions, which have no pickle; None if time is over
     path, tables = piece
     try:
         one = trade(load_tables(tables, path))
@@ -132,7 +132,7 @@ def _measured_by_worker(piece: tuple[Path, dict[str, Any]]) -> tuple[Trade, Page
 
 
 def _pages(path: Path, one: Trade) -> Pages:
-    """Return the page of a problem as Markdown and HTML, and its picture if there is one."""
+    # Markdown, HTML, and the picture if there is one
     from laufruhe.plots.style import as_png, as_svg
     from laufruhe.plots.trade import figure, has_picture
 

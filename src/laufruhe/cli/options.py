@@ -16,8 +16,6 @@ def examples(*lines: str) -> str:
 
 
 def _completed(kinds: str) -> Callable[[str], list[str]]:
-    """Return a function that completes names of engines, ready problems, or both."""
-
     def names(incomplete: str) -> list[str]:
         from laufruhe.files.catalogue import engines
         from laufruhe.files.ready import ready

@@ -84,7 +84,7 @@ def bearings_of(tables: Sequence[MainBearingTable], parts: Sequence[SliderCrank]
 
 
 def _check_carried(shaft: Shaft, bearings: Sequence[float], parts: Sequence[SliderCrank]) -> None:
-    """Refuse throws that are not between two bearings; a single one may hang over, and one at each end of an axle."""
+    # throws lie between two bearings; a single one may hang over, and one at each end of an axle
     if len(bearings) < 2:
         rule = f"leaves {shaft.name} on {['no', 'one'][len(bearings)]} bearing, which does not carry its throws"
         raise Refused("main_bearings", None, rule, "give it two at least")

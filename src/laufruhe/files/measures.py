@@ -260,7 +260,7 @@ def objectives_of(tables: Sequence[ObjectiveTable] | None, scene: Scene, single:
 
 
 def _terms(table: ObjectiveTable, scene: Scene, where: str) -> tuple[Term, ...]:
-    """Return the weighted measures of an objective, norms of loads before numbers of the mounts."""
+    # norms of loads come before numbers of the mounts
     one_of(table, where, "minimise", "terms", shown=table.minimise, named=f"[[{where.split('[')[0]}.terms]]")
     if table.minimise is not None:
         return (Term(_minimised(table.minimise, table, f"{where}.minimise", scene)),)
@@ -331,7 +331,7 @@ def _bound(text: str | float, measure: Measure, where: str) -> float:
 
 
 def _check_unique(limits: Sequence[Limit]) -> None:
-    """Refuse two limits on one side of one measure, unless their names differ; several bands are allowed."""
+    # refuses two limits on one side of one measure, unless their names differ; several bands are allowed
     first: dict[tuple[Any, ...], int] = {}
     for k, limit in enumerate(limits):
         sides = (("max", limit.maximum < math.inf), ("min", limit.minimum > -math.inf), ("outside", limit.outside))

@@ -256,7 +256,7 @@ def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsFound:
 
 
 def _laws(place: MountTable, folder: Path, where: str) -> tuple[Dynamic, ...]:
-    """Return the stiffness of a mount that depends on frequency (E50, E51)."""
+    # stiffness that depends on frequency (E50, E51)
     laws: list[Dynamic] = []
     if (track := place.fluid_track) is not None:
         if track.bulge_stiffness == 0.0:

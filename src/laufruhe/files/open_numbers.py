@@ -56,7 +56,7 @@ NOTE = Note("open numbers", without_open, _with_decisions)
 
 
 def _name(tables: Mapping[str, Any], place: Place) -> str:
-    """Return the path of a number in studies and `with_values`: entries of lists by name, or counted from 1."""
+    # path of a number in studies and `with_values`: entries of lists by name, or counted from 1
     parts = list[str]()
     here: Any = tables
     for key in place:

@@ -152,7 +152,7 @@ def _bounds(value: float | Open | None) -> tuple[float, float] | None:
 
 
 def _order_of(engine: EngineTable, cycle: Cycle, count: int) -> tuple[int, ...] | None:
-    """Return the given order, or that of the first dead centres of given throws."""
+    # given order, or that of the first dead centres of given throws
     if engine.given_order is not None:
         return tuple(engine.given_order)
     throws = engine.given_throws
@@ -272,7 +272,7 @@ def _first(phasing: Phasing) -> Candidate:
 
 
 def _most_even(phasing: Phasing, layout: Layout, throws: tuple[float, ...]) -> tuple[int, ...] | None:
-    """Return the given firing order, or that of the most even intervals; None if these throws cannot fire so."""
+    # given firing order, or that of the most even intervals; None if these throws cannot fire so
     given = phasing.firing_order
     orders = lap_orders(phasing.cycle, layout, throws) if given is None else [given]
     allowed = []

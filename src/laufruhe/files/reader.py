@@ -131,7 +131,7 @@ def _of_file(file: ProblemFile, path: Path) -> Problem:
 
 
 def _edited(origin: Origin, edit: str, *arguments: Any) -> Problem:
-    """Return the problem of a file after one of the functions of `edits`."""
+    # problem of a file after one of the functions of `edits`
     with in_file(origin.path):
         tables = getattr(edits, edit)(origin.tables, *plain(arguments, DEEPEST))
     return load_tables(tables, origin.path)
@@ -287,7 +287,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
 
 
 def _brake(file: ProblemFile, cylinders: Sequence[SliderCrank], cycle: Cycle, folder: Path) -> Brake | None:
-    """Return the conversion of loads at the brake; None without [friction]."""
+    # conversion of loads at the brake; None without [friction]
     if file.friction is None:
         return None
     if not any(point.bmep is not None or point.brake_torque is not None for point in file.operating_points):

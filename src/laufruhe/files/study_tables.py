@@ -108,7 +108,7 @@ def keys_of(tables: dict[str, Any], where: str) -> tuple[Any, ...]:
 
 
 def _remedy(tables: dict[str, Any], here: Any, parts: Sequence[str], k: int) -> str:
-    """Return the remedy for a path that fails at its part `k`."""
+    # remedy for a path that fails at its part `k`
     for path in _paths(tables):
         rest = iter(path)
         if path[-1] == parts[-1] and all(part in rest for part in parts):
@@ -135,7 +135,7 @@ def parts_of(where: str) -> list[str]:
 
 
 def _options(here: Any) -> dict[str, Any]:
-    """Return the keys of a table or a list by name; entries of a list also counted from one."""
+    # keys of a table or a list by name; entries of a list also counted from one
     if isinstance(here, dict):
         return {key: key for key in here}
     if isinstance(here, list):

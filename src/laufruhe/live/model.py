@@ -221,7 +221,7 @@ def _design(
 
 
 def _reference(result: Result) -> Reference | None:
-    """Return the design that the objective is compared with; None if another objective was bounded."""
+    # design that the objective is compared with; None if another objective was bounded
     if result.problem.extras or not result.decisions:
         return None
     certificate, objective = result.certificate, result.objective

@@ -90,7 +90,7 @@ class PointSignal:
 
 @dataclass(frozen=True, eq=False)
 class Signal:
-    """One load over one period, affine in the decision vector.
+    """Load over one period, affine in the decision vector.
 
     Attributes
     ----------

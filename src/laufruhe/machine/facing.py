@@ -159,7 +159,7 @@ def least_room(part: SliderCrank, other: SliderCrank) -> float:
 def _least_travel(
     radius: float, ratio: float, offset: float, far_radius: float, far_ratio: float, far_offset: float, ahead: float
 ) -> float:
-    """Least way of two pistons towards their cranks, together [m]."""
+    # least way of two pistons towards their cranks, together [m]
     return float(
         min(
             radius * kinematics.travel(math, at, ratio, offset)

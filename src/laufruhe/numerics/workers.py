@@ -232,7 +232,7 @@ class Answer(NamedTuple, Generic[A]):
 
 
 def _answer_of(until: float, work: Callable[[T], A], piece: T) -> Answer[A]:
-    """Do a piece until a time of day, in the worker, which starts no workers itself."""
+    # runs in the worker, which starts no workers itself
     with limited(until - time.time()), working_on(SERIAL), collected() as reports:
         answer = work(piece)
     return Answer(answer, tuple(reports))

@@ -136,7 +136,7 @@ def _of_rods(
 
 
 def _of_rotors(engine: Engine, speed: float, fidelity: Fidelity) -> Spectrum:
-    """Return the main bearing forces of webs, weights and throws, each of the order of its shaft."""
+    # main bearing forces of webs, weights and throws, each of the order of its shaft
     bearings = engine.bearings
     shafts = {bearing.shaft for bearing in bearings}
     rotors = [rotor for rotor in engine.rotors if rotor.shaft in shafts]
@@ -271,8 +271,7 @@ def _inertia_orders(part: SliderCrank, fidelity: Fidelity, felt: Felt) -> Comple
 
 @lru_cache(maxsize=256)
 def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fidelity, felt: Felt) -> Spectrum:
-    """Return the gas part over the crank angle of the engine, shape (n, d) (B1, B2)."""
-
+    # gas part over the crank angle of the engine, shape (n, d) (B1, B2)
     def loads(angles: Array) -> Array:
         total: Array | float = 0.0
         for since in (angles + lag for lag in part.swept.lags):
@@ -288,7 +287,7 @@ def _gas_orders(cycle: Cycle, part: SliderCrank, gas: GasModel, fidelity: Fideli
 def _side_by_side(
     of: OfPart, cycle: Cycle, parts: tuple[SliderCrank, ...], speed: float, gas: GasModel | None, fidelity: Fidelity
 ) -> Spectrum:
-    """A load (n, d) of every slider-crank as one signal (n, cylinders, d)."""
+    # (n, d) of every slider-crank to (n, cylinders, d)
     loads = [of(cycle, part, speed, gas, fidelity) for part in parts]
     width = loads[0].coefficients.shape[-1] if loads else 3
     total = Spectrum(cycle.base_order, np.zeros((1, len(loads), width), dtype=complex))

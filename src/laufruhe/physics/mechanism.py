@@ -166,7 +166,7 @@ def _highest(part: SliderCrank, fidelity: Fidelity) -> int:
 
 
 def _of_momentum(part: SliderCrank, fidelity: Fidelity) -> tuple[tuple[Effect, ...], tuple[Effect, ...]]:
-    """Any mechanism; of two orders as many of each load as a slider-crank then has."""
+    # any mechanism; of two orders it has as many of each load as a slider-crank
     table = momentum_orders(part)
     asked = fidelity.local_orders(part.shaft.ratio)
     shape = part, fidelity.kinematics, asked

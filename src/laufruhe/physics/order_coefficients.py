@@ -49,7 +49,7 @@ def _complement(rod_ratio: float, offset_ratio: float) -> float:
 
 
 def _power_series(power: float, q1: float, q2: float, difference: float, terms: int) -> Array:
-    """Coefficients of ((1 + q1 D)(1 - q2 D))^power (K8), D = i E, shape (terms,): they are real."""
+    # K8: coefficients of ((1 + q1 D)(1 - q2 D))^power, D = i E, shape (terms,); they are real
     square, before, last = -q1 * q2, 0.0, 1.0
     series = [last]
     for j in range(terms - 1):

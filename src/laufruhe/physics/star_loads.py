@@ -31,7 +31,7 @@ def star_loads(engine: Engine, speed: float, effects: Callable[[SliderCrank], It
 
 
 def _load_of_alike(engine: Engine, speed: float, members: Sequence[tuple[int, Effect]]) -> NDArray[np.complex128]:
-    """Return the load of equal effects of cylinders, by the orders of the cycle."""
+    # load of equal effects of cylinders, by the orders of the cycle
     series = members[0][1].series()
     parts = [engine.slider_cranks[k] for k, _ in members]
     sizes = np.array([own.size * square_of(part, speed) for part, (_, own) in zip(parts, members, strict=True)])

@@ -153,13 +153,13 @@ def gas_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spe
 
 
 def _alternating_torque(engine: Engine, point: OperatingPoint, fidelity: Fidelity) -> Spectrum:
-    """Torque of the gas less that of the load, which takes the mean of it (F2)."""
+    # F2: torque of the gas less that of the load, which takes its mean
     torque = gas_torque(engine, point, fidelity)
     return torque.holding(np.concatenate([[0.0], torque.coefficients[1:]]))
 
 
 def _inertia(engine: Engine, fidelity: Fidelity, phi: Array) -> tuple[Array, Array]:
-    """Inertia reduced to the crank, and its derivative by the crank angle (F3), shape of `phi`."""
+    # F3: inertia reduced to the crank, and its derivative by the crank angle, shape of `phi`
     total, slope = moving_inertia(engine, fidelity, phi)
     total = total + fidelity.crank_inertia
     if total.min() <= 0.0:
@@ -223,14 +223,14 @@ def _alpha(part: SliderCrank, phi: Array) -> Array:
 
 
 def _slider_loads(part: SliderCrank, motion: CrankMotion, fidelity: Fidelity) -> Array:
-    """Loads of one piston and its rods, shape (n, 6): L7 with d2/dt2 in full (F5)."""
+    # F5: L7 with d2/dt2 in full, shape (n, 6)
     square, turning = (part.shaft.ratio * motion.speed) ** 2, part.shaft.ratio * motion.acceleration
     moving, axis = part.motion(np, _alpha(part, motion.angle)), cis(as_turn(part.bank))
     return np.asarray(cylinder_wrench(part, moving, axis, square, turning, with_rods=fidelity.rod == "rigid").T)
 
 
 def _rotor_loads(rotors: Sequence[Rotor], motion: CrankMotion) -> Array:
-    """F = U (n^2 w^2 - i n dw/dt) e^{i n phi} of each rotor, with its moments (F5), shape (n, 6)."""
+    # F5: F = U (n^2 w^2 - i n dw/dt) e^{i n phi} of each rotor, with its moments, shape (n, 6)
     wrench = np.zeros((len(motion.angle), 6))
     for rotor in rotors:
         ratio = rotor.shaft.ratio

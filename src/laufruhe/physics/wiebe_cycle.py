@@ -82,14 +82,14 @@ def wiebe_heat(gas: Wiebe, part: SliderCrank, cycle: Cycle) -> float:
 
 
 def _burn_rate(gas: Wiebe, x: Array) -> Array:
-    """Derivative of the burnt fraction 1 - exp(-a x^(m+1)) by x, the elapsed part of the burn (G7)."""
+    # G7: derivative of 1 - exp(-a x^(m+1)) by x, the elapsed part of the burn
     order = gas.shape + 1.0
     efficiency = -math.log1p(-gas.completeness)
     return np.asarray(efficiency * order * x**gas.shape * np.exp(-efficiency * x**order))
 
 
 def _stored_heat(gas: Wiebe, cylinder: ChargedCylinder, elapsed: Array) -> Array:
-    """Integral of v^(kappa-1) over the burnt fraction up to each elapsed part of the burn (G9)."""
+    # G9: integral of v^(kappa-1) over the burnt fraction up to each elapsed part of the burn
     places, weights = _unit_quadrature()
     # every sample after the burn has the same integral
     ends, inverse = np.unique(elapsed, return_inverse=True)

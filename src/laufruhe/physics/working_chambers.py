@@ -102,12 +102,12 @@ def _expanded(diagram: Steam, pressure: float, begin: float, end: Array) -> Arra
 
 
 def _pump(diagram: Pump, _: Array, out: NDArray[np.bool_], __: Array) -> Array:
-    """Suction while the chamber grows, delivery while it shrinks (G17)."""
+    # G17: suction while the chamber grows, delivery while it shrinks
     return np.where(out, diagram.suction, diagram.delivery)
 
 
 def _trace(diagram: PressureTrace, _: Array, __: NDArray[np.bool_], local: Array) -> Array:
-    """A measured trace of one side, over the crank angle from where its chamber is smallest (G12)."""
+    # G12: trace over the crank angle from where the chamber of this side is smallest
     return trace_pressure(diagram, Cycle.TWO_STROKE, local)
 
 

@@ -194,7 +194,7 @@ def point_name(result: Result, k: int) -> str:
 
 @dataclass(frozen=True)
 class Series:
-    """One design of a result with its colour and name."""
+    """Design of a result with its colour and name."""
 
     design: Evaluation
     colour: str

@@ -85,7 +85,7 @@ Mark: TypeAlias = Line | Bars | Area | Words
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis of numbers, or of texts at their places (`ticks`).
+    """Axis of numbers, or of texts at their places (`ticks`).
 
     The end may be the smaller value; without ends the marks decide. A logarithmic axis is told the first figures
     of its ticks.

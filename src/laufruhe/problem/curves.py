@@ -193,7 +193,7 @@ def modes_of(designs: Mapping[str, Evaluation]) -> Fields:
 
 
 def _places(design: Evaluation) -> Iterator[tuple[str, str, str, LoadChannel]]:
-    """Yield loads with several places: name, words, name of the axis, channel."""
+    # name, words, name of the axis, channel of loads with several places
     if design.engine.mounts:
         yield "mount_force", "force on", "mount", MOUNT_FORCE
     if design.engine.mounts and design.engine.block is not None:

@@ -78,7 +78,7 @@ def _cached_zero(problem: Problem) -> float:
 
 
 def _sum_of_parts(problem: Problem) -> float:
-    """Return the sum of the objectives of every slider-crank and every rotor alone [SI]."""
+    # objectives of every slider-crank and every rotor alone [SI]
     engine, total = problem.engine, 0.0
     parts = [replace(engine, slider_cranks=(part,), rotors=()) for part in engine.slider_cranks]
     parts += [replace(engine, slider_cranks=(), rotors=(r,)) for r in engine.rotors if r.unbalance != 0.0]

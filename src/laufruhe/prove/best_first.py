@@ -108,7 +108,7 @@ class Division(Generic[P]):
         """Seek a design in a part whose turn it is."""
 
     def is_done(self, one: Waiting[P]) -> bool:
-        """Whether neither a part nor any with a higher bound need be divided."""
+        """Return True if neither this part nor any part with a higher bound need be divided."""
         raise NotImplementedError
 
     def parts(self, taken: Sequence[Waiting[P]]) -> Parts[P]:
@@ -116,7 +116,7 @@ class Division(Generic[P]):
         raise NotImplementedError
 
     def coming(self, count: int) -> Sequence[Waiting[P]]:
-        """So many of the parts that wait, those that come next first."""
+        """Return the next `count` waiting parts, or fewer, lowest bound first."""
         return heapq.nsmallest(count, self.waiting)
 
     def divide(self, root: tuple[float, P] | Over, most: int) -> float:
@@ -171,7 +171,6 @@ class Division(Generic[P]):
         return min(queue[0].bound if queue else math.inf, self._least, self.level)
 
     def _check(self, bound: float, part: P) -> None:
-        """Report a bound that lies over a known design of its part."""
         if self.known is not None and is_over(bound, self.known.value) and self.holds(part):
             self.known.check(self.what, bound)
 
@@ -234,7 +233,7 @@ class Halving(Division[Box]):
         return at is not None and bool(np.all(box.lower <= at) and np.all(at <= box.upper))
 
     def is_done(self, one: Waiting[Box]) -> bool:
-        """Whether no design in it is better by the room."""
+        """Return True if no design in the box beats the known value by more than the room."""
         return not one.bound < self.enough
 
     def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | Over]:
@@ -247,18 +246,18 @@ class Halving(Division[Box]):
             yield found if isinstance(found, Over) else (max(taken[k // 2].bound, found[0]), found[1])
 
     def run(self, root: tuple[float, Box] | Over, most: int) -> Divided:
-        """What is proven, and where the least of the boxes that are left are."""
+        """Divide the root box, and return the proven bound and the middles of the least boxes left."""
         return self.found(self.divide(root, most))
 
     def found(self, bound: float) -> Divided:
-        """With the least bound of what is left."""
+        """Return a result with this bound, the boxes seen, and the middles of the least boxes left."""
         least = [one.part for one in self.coming(MOST_PLACES) if one.bound < self.enough]
         places = tuple(0.5 * (box.lower + box.upper) for box in least)
         return Divided(bound, self.seen, places)
 
 
 class BoxBounds(Protocol):
-    """What bounds boxes from below, many at once."""
+    """Lower bounds of the objective on many boxes at once."""
 
     what: str
 
@@ -279,11 +278,11 @@ class Bounded(Halving):
         self._search, self.what, self.at_once = search, search.what, -(-search.at_once // 2)
 
     def halved(self, boxes: Sequence[Box]) -> list[tuple[float, Box] | Over]:
-        """Of all boxes together."""
+        """Halve all boxes, and return the halves with their lower bounds."""
         return [*self.bounded([half for box in boxes for half in halves(box)])]
 
     def bounded(self, boxes: Sequence[tuple[Array, Array]]) -> list[tuple[float, Box]]:
-        """With their bounds."""
+        """Return pairs of lower bound and box, the box with the side worth halving."""
         lower, upper = (np.array([box[k] for box in boxes]) for k in (0, 1))
         found = zip(boxes, *self._search.bounds(lower, upper), strict=True)
         return [(float(bound), Box(*box, int(side))) for box, bound, side in found]

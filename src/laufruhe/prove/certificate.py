@@ -35,12 +35,12 @@ LEVELLINGS, LEVEL = 2, 1e-6
 
 
 def room_of(value: float, tolerance: float, nothing: float) -> float:
-    """By how much another design has to be better than one of this value: less is a gap within the tolerance."""
+    """Return the improvement on `value` that still counts as a gap within the tolerance."""
     return tolerance * value + nothing
 
 
 class Proof(StrEnum):
-    """What has been proven of a design."""
+    """Degree of optimality proven of a design."""
 
     GLOBAL = "global"
     WITHIN_GAP = "global within gap"
@@ -53,7 +53,7 @@ STRENGTH = (Proof.NONE, Proof.LOCAL, Proof.WITHIN_GAP, Proof.GLOBAL).index
 
 
 class Reach(StrEnum):
-    """What the bound of a method can prove."""
+    """Degree of optimality that the bound of a method can prove."""
 
     WHOLE = "closes on the optimum, however long that takes"
     NEAR = "closes where it comes near"
@@ -104,7 +104,7 @@ def withheld(value: float, kkt_residual: float, method: str) -> Certificate:
 
 @dataclass(frozen=True)
 class Certificate:
-    """How good a design is.
+    """Proven quality of a design: lower bound, gap and optimality residual.
 
     Attributes
     ----------
@@ -172,7 +172,7 @@ class Minorant:
 
 
 def minorant(problem: AffineProblem, multipliers: Multipliers) -> Minorant:
-    """What these multipliers say of every decision vector, whatever set it lies in (P4).
+    """Return the affine lower bound by these multipliers, valid for every decision vector in any set (P4).
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def minorant(problem: AffineProblem, multipliers: Multipliers) -> Minorant:
 
 
 def is_moved(norm: AffineNorm) -> bool:
-    """Whether any decision acts on a norm; mostly its first row tells."""
+    """Return True if any decision changes a norm; the first row is tested first."""
     return bool(norm.slope[:1].any() or norm.slope.any())
 
 
@@ -220,7 +220,7 @@ def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
 
 
 def excludes(problem: AffineProblem, limits: tuple[Array, ...]) -> bool:
-    """Whether these dual rows of the limits show that no design keeps all of them (P4)."""
+    """Return True if these dual rows of the limits prove that no design keeps all limits (P4)."""
     proof = lower_bound(replace(problem, terms=()), Multipliers((), limits))
     sizes = [maximum + norm.value(np.zeros(problem.size)) for maximum, norm in problem.limits]
     whole = sum(price * size for price, size in zip(proof.multipliers.shadow_prices(problem), sizes, strict=True))
@@ -270,7 +270,7 @@ def check_dual(what: str, value: float, problem: AffineProblem, x: Array, bound:
 
 
 def _size(norm: AffineNorm, x: Array) -> float:
-    """Norm of rows of which no parts cancel."""
+    # norm of rows of which no parts cancel
     return norm.norm.value(norm.grid, np.abs(norm.constant) + np.abs(norm.slope) @ np.abs(x))
 
 
@@ -301,7 +301,7 @@ def levelled(problem: AffineProblem, x: Array, bound: Bound) -> Multipliers:
 
 
 def _inside(problem: AffineProblem, x: Array) -> Array:
-    """Directions in which every decision is inside its set, shape (n, m)."""
+    # directions in which every decision is inside its set, shape (n, m)
     columns = [np.zeros((problem.size, 0))]
     for domain in problem.domains:
         own = np.zeros((problem.size, domain.width))
@@ -358,7 +358,7 @@ def kkt_residual(problem: AffineProblem, x: Array, bound: Bound, whole: float | 
 
 
 def _gradient_size(problem: AffineProblem, bound: Bound) -> Array:
-    """Sum of the sizes of what adds up to the gradient, shape (n,)."""
+    # sum of the sizes of what adds up to the gradient, shape (n,)
     total = np.zeros(problem.size)
     for (weight, norm), z in zip(problem.terms, bound.multipliers.terms, strict=True):
         total += weight * np.einsum("kd,kdn->n", np.abs(z), np.abs(norm.slope))

@@ -44,7 +44,7 @@ class Known:
 
     @cached_property
     def most(self) -> float:
-        """No bound of a part that holds the design is over it."""
+        """Return the value of the known design; the bound of any part that holds it must not exceed this."""
         return self.value if self.read is None else self.read()
 
     def check(self, what: str, bound: float) -> None:

@@ -242,7 +242,7 @@ def _note(folder: Path, verb: str, names: list[str] | None) -> None:
 
 
 def _made(folder: Path) -> tuple[str, frozenset[str]]:
-    """Return the command that made the files in a folder, and their names; empty for a foreign folder."""
+    # command that made the files in a folder, and their names; empty for a foreign folder
     try:
         noted: Any = json.loads((folder / MADE).read_text(encoding="utf-8"))
         verb, names = noted["made_by"], noted["files"]

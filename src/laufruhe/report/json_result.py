@@ -166,7 +166,7 @@ def _places(result: Result, k: int, channel: LoadChannel) -> list[Record]:
 
 
 def _series(result: Result, k: int) -> Record:
-    """Return the loads of the design at its sample angles [rad], place by place, and the wrench (C7)."""
+    # loads at the sample angles [rad], place by place, and the wrench (C7)
     final, cycle = result.final, result.final.engine.cycle.angle
     angles = cycle * np.arange(final.samples) / final.samples
     wrench = over(final.engine.cycle.base_order, [final.loads[k].wrench])[0].sample(final.samples)

@@ -94,7 +94,7 @@ def _print_grid(console: Console, grid: Table) -> None:
 
 
 def _parts(grid: Table, width: int) -> Iterator[Sequence[int]]:
-    """Split the columns into tables that fit the screen; each begins with the leading text columns."""
+    # tables that fit the screen; each begins with the leading text columns
     least = [least for least, _ in _widths(grid)]
     lead = next(k for k in range(len(grid.head) + 1) if k not in grid.texts or k == len(grid.head) - 1)
     columns = list(range(lead))

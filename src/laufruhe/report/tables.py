@@ -157,7 +157,7 @@ def _torque(result: Result) -> Table:
 
 
 def _torques(engine: Engine, point: OperatingPoint, fidelity: Fidelity, angles: Array) -> dict[str, Array]:
-    """Return the columns of one design at one point; no speed for a crank that would stop."""
+    # no speed for a crank that would stop
     parts = torque_parts(engine, point, fidelity)
     work = parts["all"].integral.values(angles)
     columns = {f"torque of {part} [N m]": torque.values(angles) for part, torque in parts.items()}

@@ -53,7 +53,7 @@ class StudyFile(Table):
 
 
 def _merged(complaints: Sequence[Complaint], tables: Mapping[str, Any]) -> tuple[Complaint, ...]:
-    """Report an error of a key in `common` once, not for each part."""
+    # an error of a key in `common` is reported once, not for each part
     study = tables["study"]
     common = study.get("common") if isinstance(study, dict) else None
     keys = common if isinstance(common, dict) else {}

@@ -79,7 +79,7 @@ class Regions:
         return {VALUES: values, COLUMNS: self._columns}
 
     def _found(self, mark: str, region: Region) -> float | None:
-        """Return the seconds that a piece took; None if it is not done, or damaged."""
+        # seconds that a piece took; None if it is not done, or damaged
         try:
             noted = bytes(np.asarray(self._done[region.case, region.first // self._chunk]))
             packed = noted[_SUM:]

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Point:
-    """One piece of work: a scene, changed values by their paths, a metric in place of its objective.
+    """Piece of work: a scene, changed values by their paths, a metric in place of its objective.
 
     Of balancer shafts those named are kept, all when None; it starts from `base` in place of
     the tables of the case's problem file. A span is that of many draws, from one number to another.

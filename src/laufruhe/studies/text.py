@@ -29,7 +29,7 @@ ratio of 20.5 instead of 17 five, and the study prints neither."""
 
 @dataclass(frozen=True)
 class Verdict:
-    """One statement of a source beside the value found here, with the tolerance or reason that decides."""
+    """Statement of a source beside the value found here, with the tolerance or reason that decides."""
 
     statement: str
     paper: str

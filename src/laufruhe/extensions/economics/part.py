@@ -283,7 +283,7 @@ def _check_objectives(points: Sequence[Point], scenes: Scenes) -> None:
 
 
 def _efficient(data: xr.Dataset) -> tuple[tuple[str, str], np.ndarray, dict[str, str]]:
-    """Mark the points of the common front: no other has less force with no more shafts and mass."""
+    # points of the common front: no other has less force with no more shafts and mass
     force, shafts = data["force"].values, data["shafts"].values
     same = data["standing"].values != NEXT
     on_front = np.zeros(force.shape, dtype=bool)

@@ -107,7 +107,7 @@ class Worth:
 
 
 class _Engine(NamedTuple):
-    """One engine of an economics dataset: shafts, least force and its lower bound."""
+    """Engine of an economics dataset: shafts, least force and its lower bound."""
 
     name: str
     standing: str
@@ -170,7 +170,7 @@ def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
 
 
 def _judged(engines: Mapping[str, _Engine], engine: _Engine, against: _Engine, says: str) -> tuple[bool, str]:
-    """Return whether a judgement holds, and by which rule."""
+    # whether a judgement holds, and by which rule
     if says == "negligible":
         most = 1.0 - engine.bound / against.force
         return most < NEGLIGIBLE, f"W1: under {100.0 * NEGLIGIBLE:.0f} %; proven, none of these shafts does more"

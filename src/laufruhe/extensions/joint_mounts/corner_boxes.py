@@ -215,7 +215,7 @@ class DesignBoxes:
         return _LoadedLoop(loop, np.concatenate([fixed, loads[:, 1:]], axis=1))
 
     def _expanded(self, pairing: Pairing | None, loaded: _LoadedLoop, near: Array) -> tuple[Array, Array]:
-        """Return a bound by (1, s, s s') and columns, (1 + columns, p), and its remainder, (w, 1 + columns)."""
+        # bound by (1, s, s s') and columns, (1 + columns, p), and its remainder, (w, 1 + columns)
         powers, rest = np.zeros((1 + len(near), 1 + loaded.count + loaded.count**2)), np.zeros(loaded.loads.shape[:2])
         if pairing is None:
             return powers, rest
@@ -260,7 +260,7 @@ class _BalancedLoop:
 
     @property
     def incidence(self) -> Array:
-        """One where a channel belongs to a number, shape (m, n)."""
+        """Return the incidence of channels on numbers, 1 or 0, shape (m, n)."""
         return np.asarray((self.loop.numbers[:, None] == np.arange(self.count)).astype(float))
 
     @property
@@ -306,13 +306,13 @@ class _LoadedLoop:
 
 
 def _adjacent(places: Sequence[Array], known: Sequence[Corner | None], k: int) -> Corner:
-    """Return the known vertex with the most coordinates of vertex k."""
+    # known vertex with the most coordinates of vertex k
     pairs = [(corner, place) for corner, place in zip(known, places, strict=True) if corner is not None]
     return max(pairs, key=lambda pair: int(np.sum(pair[1] == places[k])))[0]
 
 
 def _concavity(values: Array) -> Array:
-    """Return the largest distance of coefficients below the chord along every side, shape (n,)."""
+    # largest distance of coefficients below the chord along every side, shape (n,)
     shares, out = np.arange(4) / 3.0, []
     for side in range(values.ndim):
         along = np.moveaxis(values, side, -1)

@@ -95,7 +95,7 @@ def load_bounds(
 
 
 def _is_affine(measure: Measure, problem: Problem) -> bool:
-    """Return whether the rows of a norm are constant or affine in all open numbers."""
+    # rows are constant or affine in all open numbers
     kinds = {decision.kind for decision in problem.decisions}
     dependences = {dependence(measure.channel, kind, problem) for kind in kinds}
     return not measure.channel.is_number and dependences <= {Dependence.NONE, Dependence.AFFINE}
@@ -160,12 +160,12 @@ class LoadBoxes:
 
     @property
     def is_sampled_fully(self) -> bool:
-        """Whether sums of squares over orders equal those over samples, as remainders suppose."""
+        """Return True if sums of squares over orders equal those over samples, as remainders suppose."""
         return self._orders.is_full
 
     @property
     def _cost(self) -> float:
-        """Estimated time of one box, in about microseconds of one core."""
+        # time of one box, in about microseconds of one core
         columns, rows = len(self.lower) - self._numbers, 3 * len(self.problem.engine.mounts)
         lifted, lines = len(self.lower) + self._numbers * columns, len(self._orders.orders)
         measures = 1 + len(self._limits) + len(self._terms) + 2 * self._ratios
@@ -215,7 +215,7 @@ class LoadBoxes:
         return np.where(self._violated(lower, upper), np.inf, lines.least), np.asarray(side, dtype=np.intp)
 
     def _violated(self, lower: Array, upper: Array) -> Mask:
-        """Return boxes outside of the sets of unbalances, or whose mounts violate a static limit, shape (boxes,)."""
+        # boxes outside of the sets of unbalances, or whose mounts violate a static limit, shape (boxes,)
         out = np.zeros(len(lower), dtype=bool)
         for domain in self.loads.domains:
             if domain.width == 2:
@@ -362,14 +362,14 @@ class _Boxes:
 
 
 def _shared(at: Expansion, answer: LinearResponse) -> LinearResponse:
-    """Return an answer whose branching scores include the whole remainder, by the gain of each side."""
+    # branching scores take in the whole remainder, by the gain of each side
     beyond = np.where(np.isfinite(answer.rest), answer.rest - answer.bends.sum(axis=-1), 0.0)
     pull = at.pull / np.maximum(at.pull.sum(axis=-1, keepdims=True), 1e-300)
     return replace(answer, bends=answer.bends + np.maximum(beyond, 0.0)[..., None] * pull)
 
 
 def _counted(answer: LinearResponse, which: Mask) -> LinearResponse:
-    """Return an answer with zero for all other orders."""
+    # zero for all other orders
     if which.all():
         return answer
     value, slopes = (
@@ -379,7 +379,7 @@ def _counted(answer: LinearResponse, which: Mask) -> LinearResponse:
 
 
 def _least_squares(gram: Array, pull: Array) -> Array:
-    """Minimise x' gram x / 2 + pull . x over numbers from -1 to 1 by coordinate descent."""
+    # minimises x' gram x / 2 + pull . x over numbers from -1 to 1 by coordinate descent
     x, curvature = np.zeros_like(pull), np.einsum("bkk->bk", gram)
     for _ in range(SWEEPS):
         for k in range(pull.shape[1]):

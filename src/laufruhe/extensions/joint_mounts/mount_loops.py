@@ -203,7 +203,7 @@ def is_looped(problem: Problem) -> bool:
 
 
 def _drives(problem: Problem, halves: Array) -> list[dict[int, list[tuple[int, float]]]]:
-    """Return for every spring, by its number, pairs of open number and change over half a side."""
+    # for every spring, by its number, pairs of open number and change over half a side
     drives: list[dict[int, list[tuple[int, float]]]] = [{} for _ in problem.mount_numbers]
     for j, decision in enumerate(problem.mount_decisions):
         for drive in decision.mount_drives:
@@ -212,7 +212,7 @@ def _drives(problem: Problem, halves: Array) -> list[dict[int, list[tuple[int, f
 
 
 class _Spring:
-    """One spring: numbers at the middle of a box, further static stiffness, and drives of open numbers."""
+    """Spring: numbers at the middle of a box, further static stiffness, and drives of open numbers."""
 
     def __init__(
         self, numbers: Array, static: Array, drives: dict[int, list[tuple[int, float]]], omegas: Array
@@ -220,11 +220,11 @@ class _Spring:
         self._numbers, self._static, self._drives, self._omegas = numbers, static, drives, omegas
 
     def _open(self, part: slice) -> list[tuple[int, int, float]]:
-        """Return open entries of a part: index in it, open number, and change over half a side."""
+        # open entries of a part: index in it, open number, and change over half a side
         return [(k - part.start, j, h) for k in range(part.start, part.stop) for j, h in self._drives.get(k, [])]
 
     def _across(self) -> list[tuple[int, Array, Array]]:
-        """Return for every open direction of the position its number, the axes across, and their arms."""
+        # for every open direction of the position: its number, the axes across, and their arms
         out = []
         for axis, j, h in self._open(POSITION):
             across = np.delete(np.eye(3), axis, axis=0)

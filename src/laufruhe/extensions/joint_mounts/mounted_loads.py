@@ -140,7 +140,7 @@ class MountedLoads:
         return AffineNorm(measure.norm, rows[0].vectors, slope, rows[0].grid)
 
     def _signals(self, response: ComplexArray, averaged: bool) -> list[Spectrum]:
-        """Return signals of all operating points from orders, shape (w, 3 mounts)."""
+        # signals of all operating points from orders, shape (w, 3 mounts)
         signals, mounts = [], response.shape[1] // 3
         for p in range(len(self.problem.points)):
             at = self.orders.points == p

@@ -38,7 +38,7 @@ def best_at(problem: AffineProblem) -> tuple[Array, Multipliers]:
 
 
 def _wider(problem: AffineProblem) -> tuple[tuple[float, AffineNorm], ...]:
-    """Return limits that some unbalances keep with slack, so that prices stay small."""
+    # limits that some unbalances keep with slack, so that prices stay small
     shares = tuple((1.0 / most, norm) for most, norm in problem.limits)
     coarse = coarser(replace(problem, terms=shares, limits=(), groups=tuple(range(len(shares)))), _times(problem)[0])
     x = solve_cones(coarse).x
@@ -69,7 +69,7 @@ def _solve(problem: AffineProblem) -> tuple[Array | None, Bound]:
 def _with_contradiction(
     problem: AffineProblem, multipliers: Multipliers, against: Sequence[Array], value: float
 ) -> Multipliers:  # fmt: skip
-    """Add multipliers of contradicting limits, scaled so that the bound of such mounts exceeds `value`."""
+    # scaled so that the bound of mounts with contradicting limits exceeds `value`
     proof = lower_bound(replace(problem, terms=()), Multipliers((), tuple(against)))
     prices = proof.multipliers.shadow_prices(problem)
     size = sum(price * most for price, (most, _) in zip(prices, problem.limits, strict=True))
@@ -81,7 +81,7 @@ def _with_contradiction(
 
 
 def _times(problem: AffineProblem) -> list[int]:
-    """Return factors of coarser sampling in the order of trials."""
+    # factors of coarser sampling in the order of trials
     rows = sum(len(norm.grid.weights) for _, norm in (*problem.terms, *problem.limits))
     divisors = [k for k in range(1, problem.samples // LEAST_SAMPLES + 1) if problem.samples % k == 0] or [1]
     factors = {min((k for k in divisors if rows <= most * k), default=divisors[-1]) for most in ROWS}
@@ -89,7 +89,7 @@ def _times(problem: AffineProblem) -> list[int]:
 
 
 def _depends_on_few_rows(problem: AffineProblem) -> bool:
-    """Return whether terms are peaks and limits have few rows."""
+    # terms are peaks, and limits have few rows
     rows = sum(len(norm.grid.weights) for _, norm in problem.limits)
     return all(norm.norm.is_largest for _, norm in problem.terms) and rows <= ROWS[-1]
 

@@ -66,7 +66,7 @@ def throw_answers(question: Question) -> Iterator[Divided]:
 
 
 def _known(question: Question) -> Known | None:
-    """Return the known design by its numbers of the mounts and columns of unbalances."""
+    # known design by its numbers of the mounts and columns of unbalances
     known, problem = question.known, question.problem
     if known is None:
         return None

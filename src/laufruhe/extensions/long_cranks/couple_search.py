@@ -194,7 +194,7 @@ def good_starts(space: StarSpace, objective: CoupleObjective) -> Stars:
 
 
 def _swapped(space: StarSpace, objective: CoupleObjective, star: Stars) -> Stars:
-    """Return the star that swaps of two throws lead to, the best swap each time."""
+    # takes the best swap of two throws each time
     value = float(objective.values(space, star[None])[0])
     while True:
         near = swaps(star)
@@ -248,7 +248,7 @@ def _mirrored(pattern: Sequence[int], rng: np.random.Generator) -> Iterator[Star
 def _in_blocks(
     space: StarSpace, pattern: Sequence[int], objective: CoupleObjective, rng: np.random.Generator
 ) -> Iterator[Stars]:
-    """Yield the best of many stars whose throws stand in even groups, where each step has one throw (S47)."""
+    # S47: best of many stars whose throws stand in even groups, where each step has one throw
     if set(pattern) != {1} or space.phases in (1, *_primes(space.phases)):
         return
     places = np.array([_blocks(space.phases, rng) for _ in range(IN_BLOCKS)])

@@ -145,7 +145,7 @@ def meeting(space: StarSpace, free: Free, share: Counts, window: Window) -> Iter
 
 
 def _pairs(first: Indices, counts: Indices) -> Iterator[tuple[Indices, Indices]]:
-    """Yield pairs of a left and a right number, of every right one `counts` left ones from `first`, in blocks."""
+    # for every right number, `counts` left numbers from `first`, in blocks
     ends, start = np.cumsum(counts), 0
     while start < len(counts):
         before = int(ends[start - 1]) if start else 0

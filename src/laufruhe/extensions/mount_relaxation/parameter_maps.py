@@ -241,7 +241,7 @@ class ParameterMaps:
         return self._in_plane(m, axes, turning, kind) if len(turning) == 2 else self._in_space(m, kind)
 
     def _along(self, m: int, axes: Array, chosen: Sequence[int]) -> tuple[Array, list[SpringTerm]]:
-        """Return stiffness along axes that stay."""
+        # stiffness along axes that stay
         middle, reach, springs, total = self.middle(m), self.reach(m), [], np.zeros((3, 3))
         for i in chosen:
             total += middle[i] * np.outer(axes[i], axes[i])
@@ -305,7 +305,7 @@ class ParameterMaps:
         return key, PlaneStiffness(self.low[m, number], self.high[m, number], (angles[0], angles[1]), near), sign
 
     def _in_space(self, m: int, kind: slice) -> tuple[Array, list[SpringTerm]]:
-        """Return a matrix of six numbers between the least and the largest of its own."""
+        # matrix of six numbers between the least and the largest of its own
         low, high = float(self.low[m, kind].min()), float(self.high[m, kind].max())
         half, decisions = 0.5 * (high - low), sorted({j for drives in self.drives[m].values() for j, _ in drives})
         terms = []

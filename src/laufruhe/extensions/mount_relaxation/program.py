@@ -271,7 +271,7 @@ def _split_price(price: float, chord: float, vectors: Sequence[Array]) -> tuple[
 
 
 def _mode_bound(mode: ModeConstraints, multipliers: ModeMultipliers, slope: Array) -> float:
-    """Return the least remainder over (1, w)(1, w)', every s_j with the worse sign (E56)."""
+    # E56: least remainder over (1, w)(1, w)', every s_j with the worse sign
     remainder = _mode_remainder(mode, multipliers)
     remainder[1:, 0, 0] += multipliers.corners
     remainder[0, 0, 1:] += 0.5 * slope
@@ -302,7 +302,7 @@ def mode_scores(mode: ModeConstraints, multipliers: ModeMultipliers, s: Array, m
 
 
 def _scaled_to_prices(program: Program, prices: Array, multipliers: Sequence[Array]) -> list[Array]:
-    """Scale multipliers of the quadratic bounds so that they take the price of each epigraph variable."""
+    # multipliers of the quadratic bounds take the price of each epigraph variable
     uppers = program.uppers
     positive = [_psd_part(multiplier) for multiplier in multipliers]
     sums = np.zeros(len(prices))

@@ -202,7 +202,7 @@ def _lengths(rows: ComplexArray) -> Array:
 
 
 def _product_bounds(mounts: OpenMounts, motion: float, deflections: Array) -> Array:
-    """Return upper bounds of the products from those of motion and deflections, shape (springs,)."""
+    # upper bounds of the products from those of motion and deflections, shape (springs,)
     turn = motion * float(np.linalg.norm(mounts.turns, 2))
     kinds = _largest(mounts, "elastic"), _largest(mounts, "viscous")
     bounds = [np.full(spring.axes.shape[1], spring.largest * deflections[spring.mount]) for spring in mounts.springs]

@@ -45,7 +45,7 @@ class GridTable(Table):
 
     @property
     def count(self) -> int:
-        """How many there are."""
+        """Number of values, or of points; zero without either."""
         return len(self.values or ()) or self.points or 0
 
 

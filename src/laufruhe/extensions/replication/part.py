@@ -58,7 +58,7 @@ class Replication(Part):
 
     @model_validator(mode="after")
     def _means_something(self) -> Replication:
-        """Check names, cases, functions and quantities before anything is computed."""
+        # checks names, cases, functions and quantities before anything is computed
         wrong = list[InitErrorDetails]()
         for at, entry, check_it in self._checks():
             try:
@@ -231,7 +231,7 @@ def _by_case(data: xr.Dataset, name: str) -> _Cases:
 
 
 def _along_points(records: Sequence[Mapping[str, Any]], name: str) -> xr.DataArray:
-    """Return one quantity of all points, padded with NaN for missing labels."""
+    # one quantity of all points, padded with NaN for missing labels
     import xarray as xr
 
     dims = list(records[0]["coords"])

@@ -186,7 +186,7 @@ def infeasible_result(
 def _limits_in_the_worst_case(
     problem: Problem, limits: Sequence[LimitValue], found: WorstEngines, prices: Mapping[Limit, float]
 ) -> tuple[LimitValue, ...]:
-    """Return limits of a drawing as its worst engines stand to them."""
+    # limits of a drawing as its worst engines stand to them
     worst, own = dict(found.limits), []
     for limit, value in zip(problem.limits, limits, strict=True):
         most = worst.get(limit, value.value)

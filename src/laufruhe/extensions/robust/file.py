@@ -296,7 +296,7 @@ def _names(path: Path, tables: Mapping[str, Any]) -> list[str]:
 
 
 def _file_tolerance(one: Mark) -> Tolerance:
-    """Return the tolerance of any other number: the engine is put together anew with it."""
+    # any other number: the engine is put together anew with it
     if one.number is None:
         raise one.refused("is open, and only masses and unbalances may be open and off", "fix it, or leave it out")
     if one.scope is Scope.PIECE and not any(isinstance(part, int) for part in one.path):

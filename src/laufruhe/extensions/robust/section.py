@@ -89,7 +89,7 @@ def _beside(found: AssemblyResult, unit: str) -> str:
 
 
 def _tolerance_record(result: Result) -> dict[str, Any]:
-    """Return two designs under tolerance, and the price of each tolerance [SI]."""
+    # two designs under tolerance, and the price of each tolerance [SI]
     found = result.details
     assert isinstance(found, RobustResult)
     names = "exact share scenarios divisions engines seed exceeding exceeding_at_most"

@@ -212,7 +212,7 @@ class _Look:
         return LinearBound(size, slopes, rest + bent.sum(axis=1), pull)
 
     def _gains(self, along: Array) -> Array:
-        """Return the largest signal of a motion of energy one along directions (boxes, places, d, times), without d."""
+        # largest signal of a motion of energy one along directions (boxes, places, d, times), without d
         maps, of = self._maps, self._of
         softest = np.swapaxes(np.linalg.inv(np.linalg.cholesky(of.softest)), 1, 2)
 
@@ -225,7 +225,7 @@ class _Look:
         return np.asarray(np.hypot(position, moving[..., None]))
 
     def _further(self, motion: Motion, by: Array) -> Array:
-        """Return the largest signal of both orders beyond the second, shape (boxes, places, times)."""
+        # largest signal of both orders beyond the second, shape (boxes, places, times)
         maps, n = self._maps, self._of.softest.shape[-1]
         if maps.is_constant:
             return np.zeros(1)

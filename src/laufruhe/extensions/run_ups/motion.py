@@ -223,7 +223,7 @@ def motion_of(steps: Steps, moments: Array, pushes: Array, highest: Array) -> Mo
 
 
 def _force(of: Equations, middle: Array, first: Array, second: Array) -> Array:
-    """Return a bound of |f| over the boxes at the ends of steps, shape (boxes, times)."""
+    # bound of |f| over the boxes at the ends of steps, shape (boxes, times)
     n = middle.shape[1] // 2
     total = np.zeros((of.count, middle.shape[-1]))
     for j in range(first.shape[1]):

@@ -226,7 +226,7 @@ def _squares(vectors: Array) -> Array:
 
 
 def _tops(parts: Sequence[Array]) -> list[tuple[Array, NDArray[np.intp]]]:
-    """Return for each part its squares, and the step of the largest by stretch and place, shape (stretches, places)."""
+    # for each part its squares, and the step of the largest by stretch and place, shape (stretches, places)
     tops_of_parts = []
     for vectors in parts:
         squares = _squares(vectors)

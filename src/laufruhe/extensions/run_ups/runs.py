@@ -203,8 +203,7 @@ def _most(model: TimeModel, y: Array, rate: Array) -> tuple[float, float, float]
 def _sweeping(
     loads: Sequence[tuple[Array, NDArray[np.complex128]]], first: float, gain: float
 ) -> Callable[[float], Array]:
-    """Loads at a crank speed that grows by `gain`; the first is inertia, which grows with its square (E28)."""
-
+    # E28: crank speed grows by `gain`; the first load is inertia, which grows with the square of the speed
     def load(t: float) -> Array:
         speed, angle = first + gain * t, first * t + 0.5 * gain * t * t
         parts = [(np.exp(1j * orders * angle) @ coefficients).real for orders, coefficients in loads]

@@ -20,7 +20,7 @@ HEAD = ("", "time", "largest force", "largest travel", "largest roll")
 
 
 def _tables(result: Result) -> list[Table]:
-    """Return run-up and shut-down, where the problem says how these go."""
+    # run-up and shut-down, where the problem says how these go
     if result.problem.engine.extra(Run) is None:
         return []
     run, (up, down) = run_of(result), shown_runs(result, result.final)

@@ -83,7 +83,7 @@ def as_json(controls: list[Control]) -> list[dict[str, Any]]:
 
 
 def _number(entry: Any) -> tuple[float, str] | None:
-    """Return number and unit of a text or a plain number; None for anything else."""
+    # number and unit of a text or a plain number; None for anything else
     if isinstance(entry, int | float) and not isinstance(entry, bool):
         return float(entry), ""
     if not isinstance(entry, str):

@@ -18,7 +18,7 @@ MOST_EDITS, LONGEST, MOST_ENTRIES = 300, 100, 96
 
 @dataclass(frozen=True)
 class Edit:
-    """One change of the problem's tables: kind of change, name of the number, value as in a file."""
+    """Change of the problem's tables: kind of change, name of the number, value as in a file."""
 
     what: str
     name: str

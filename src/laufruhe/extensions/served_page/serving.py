@@ -177,7 +177,7 @@ def _files() -> dict[str, str]:
 
 
 def _listening(port: int | None, texts: dict[str, str]) -> Server:
-    """Return a server at the port; by default at the usual port, or at a free one."""
+    # without a port at the usual one, or at a free one
     try:
         return Server(USUAL_PORT if port is None else port, texts)
     except OSError as error:

@@ -131,7 +131,7 @@ class _Incoming(io.RawIOBase):
 
 
 class Request(BaseHTTPRequestHandler):
-    """One connection, which carries one request."""
+    """Connection that carries a single request."""
 
     protocol_version = "HTTP/1.1"
     server_version = "laufruhe"

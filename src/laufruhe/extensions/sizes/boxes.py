@@ -254,7 +254,7 @@ class SizeBoxes:
 
 
 def _last_empty(empty: Callable[[float], bool], start: float, end: float) -> float:
-    """Return how far from its start a side is shown to be empty, by halving."""
+    # end of the stretch from `start` that is shown to be empty, by halving
     done, far = start, end
     for _ in range(HALVINGS if start != end else 0):
         middle = 0.5 * (done + far)

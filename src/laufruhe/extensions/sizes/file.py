@@ -88,7 +88,7 @@ class RunningGearTable(Table):
 def _weighed(
     table: RunningGearTable, parts: tuple[SliderCrank, ...], throws: tuple[Throw, ...], bearings: tuple[Bearing, ...]
 ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
-    """Return slider-cranks and throws with the masses of sizes, open ones at their start (Z2)."""
+    # Z2: slider-cranks and throws with the masses of sizes, open ones at their start
     others = tuple(throw for throw in throws if throw.shaft != CRANKSHAFT)
     throws = tuple(throw for throw in throws if throw.shaft == CRANKSHAFT)
     gear = _gear_of(table, parts, throws)

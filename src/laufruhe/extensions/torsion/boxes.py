@@ -284,7 +284,7 @@ class TwistBoxes:
         return False
 
     def _breaks(self, limit: Limit, resonance: Resonance, lower: Array, upper: Array) -> bool:
-        """Return whether modes break a limit all over a box: they rise with stiffness and fall with inertia (V15)."""
+        # V15: modes break a limit all over a box; they rise with stiffness and fall with inertia
         ends = self.coordinates.ends(lower, upper, resonance)
         if ends is None:
             return False

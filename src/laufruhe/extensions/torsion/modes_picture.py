@@ -87,7 +87,7 @@ def _speeds(axes: Axes, result: Result, facts: TorsionFacts, high: float) -> Non
 
 
 def _orders(axes: Axes, orders: list[float], high: float, reach: float) -> None:
-    """Orders by name where they leave the panel, above it or to its right, apart from each other."""
+    # names of orders where they leave the panel, above it or to its right, apart from each other
     above = [order for order in orders if order * high / math.tau > reach]
     right = [order for order in orders if order not in above]
     wide, tall = axes.bbox.width / axes.figure.dpi, axes.bbox.height / axes.figure.dpi

@@ -114,7 +114,7 @@ def _twist_response(result: Result) -> Table:
 
 
 def _twist_modes(result: Result) -> Table:
-    """Return the swing of every disc in every natural mode of the crankshaft."""
+    # swing of every disc in every natural mode of the crankshaft
     rows = []
     for name, design in result.designs.items():
         modes = facts_of(design, *speed_range(result)).modes

@@ -55,7 +55,6 @@ def _with_fluid(axes: Axes, facts: MountingFacts) -> list[Artist]:
 
 
 def _modes(axes: Axes, facts: MountingFacts) -> None:
-    """Draw named natural frequencies, and the critical speeds of the excited ones."""
     names = []
     for j, (name, frequency) in enumerate(zip(facts.modes.names, facts.modes.frequencies, strict=True)):
         excited = j in facts.excited

@@ -75,7 +75,7 @@ def _end_view(axes: Axes, star: RankedStar, colour: str) -> None:
 
 
 def _together(throws: Sequence[float]) -> list[tuple[float, list[int]]]:
-    """Group throws at equal angles, to a degree."""
+    # throws at equal angles, to a degree
     out: list[tuple[float, list[int]]] = []
     for k, angle in enumerate(throws):
         same = (members for other, members in out if abs(math.remainder(angle - other, math.tau)) < SAME)

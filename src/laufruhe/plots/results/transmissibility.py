@@ -56,7 +56,7 @@ def figure(result: Result) -> Figure:
 
 
 def _limits(axes: Axes, result: Result, top: float) -> list[Artist]:
-    """Draw the limits over the speeds that they hold at [rpm]."""
+    # over the speeds that the limits hold at [rpm]
     limits = limits_on(result, channels.TRANSMISSIBILITY)
     most = [(limit.maximum, limit.measure.points) for limit in limits]
     for maximum, named in most:

@@ -219,7 +219,7 @@ def least_on_arcs(
 
 
 def _bends(signal: Spectrum) -> list[tuple[Array, Array, Array]]:
-    """Return angles of kinks, and jumps of slope and value there, for every place of a signal."""
+    # per place: angles of kinks, jumps of slope, jumps of value
     places = signal.coefficients.shape[1]
     if signal.kinks is None:
         return [(np.zeros(0), np.zeros(0), np.zeros(0))] * places

@@ -144,7 +144,7 @@ def divided(
 
 
 def _cut(problem: MonotoneProblem, lower: Array, upper: Array) -> tuple[Array, Array] | None:
-    """Return a box without slices at its sides that violate a limit, or None if nothing is left."""
+    # cuts slices off the sides that violate a limit; None if nothing is left
     if any(function.minimum_over(lower, upper) > maximum for maximum, function in problem.limits):
         return None
     lower, upper = lower.copy(), upper.copy()
@@ -156,7 +156,7 @@ def _cut(problem: MonotoneProblem, lower: Array, upper: Array) -> tuple[Array, A
 
 
 def _violates(problem: MonotoneProblem, lower: Array, upper: Array, k: int, sign: float) -> Callable[[float], bool]:
-    """Return a test whether a limit with this slope along number k is violated all over a slice of a box."""
+    # tests whether the slice at a value of number k violates a limit everywhere
     limits = [(most, f, f.lowest_corner(lower, upper)) for most, f in problem.limits if f.signs[k] == sign]
 
     def violated(at: float) -> bool:
@@ -169,7 +169,6 @@ def _violates(problem: MonotoneProblem, lower: Array, upper: Array, k: int, sign
 
 
 def _cut_side(violated: Callable[[float], bool], start: float, end: float) -> float:
-    """Return how far a side may be cut from its start."""
     if start == end or not violated(start):
         return start
     return parted(violated, start, end, CUTS)[0]

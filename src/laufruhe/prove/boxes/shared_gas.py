@@ -110,7 +110,7 @@ def _size(other: Facing) -> tuple[float, float]:
 
 
 def _strokes(gamma: Array, top: float, bottom: float, margin: float, cycle: Cycle) -> tuple[NDArray[np.bool_], ...]:
-    """Return the cells in which a chamber may compress, expand, or be open."""
+    # cells in which a chamber may compress, expand, or be open
     since = np.mod(gamma - (bottom - math.tau) + margin, cycle.angle) - margin
     up, down = top - bottom + math.tau, math.tau
     ends = cycle.angle - margin
@@ -180,13 +180,13 @@ class SharedGasBoxes:
         return found
 
     def _moved(self, measure: Measure, shaft: int) -> float:
-        """Return an upper bound of the slope of a norm by the lead of the masses on a shaft [1/rad]."""
+        # upper bound of the slope of a norm by the lead of the masses on a shaft [1/rad]
         shares = measure.shares(self.problem.points)
         own = [signal.derivative for signal in self._model.counted(measure, shaft)]
         return float(measure.norm.above(own, shares[shares > 0.0]))
 
     def _gain(self, measure: Measure, point: OperatingPoint) -> Array:
-        """Return the load of a unit roll moment at every counted place, shape (places,)."""
+        # load of a unit roll moment at every counted place, shape (places,)
         engine, fidelity = self.problem.engine, self.problem.fidelity
         wrench, mounting = Spectrum(engine.cycle.base_order, np.stack([0.0 * ROLL, ROLL]).astype(complex)), None
         if engine.mounts:

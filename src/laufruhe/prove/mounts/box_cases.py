@@ -145,6 +145,6 @@ def _stop_errors(stops: Stops, at: Expansion, corner: Array, signs: Array, met: 
 
 
 def _along(root: Array, vectors: Array) -> Array:
-    """Return lengths of L^-1 v of vectors, (k, 6) or (boxes, k, 6), to (boxes, k)."""
+    # lengths of L^-1 v of vectors, (k, 6) or (boxes, k, 6), to (boxes, k)
     whole = np.broadcast_to(vectors, (len(root), *vectors.shape[-2:]))
     return np.asarray(np.linalg.norm(np.linalg.solve(root, whole.swapaxes(1, 2)), axis=1))

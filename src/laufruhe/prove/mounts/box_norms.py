@@ -160,7 +160,7 @@ def _sampled(quantity: Measure, answer: LinearResponse, lines: LoadedOrders, p: 
 
 
 def _lengths(rows: Array) -> Array:
-    """Return lengths of vectors, (boxes, samples, 3, mounts) to (boxes, samples, mounts)."""
+    # (boxes, samples, 3, mounts) to (boxes, samples, mounts)
     x, y, z = rows[:, :, 0], rows[:, :, 1], rows[:, :, 2]
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 

@@ -63,7 +63,7 @@ def stiffness_in_all(model: BoxModel, x: Array) -> Array:
 
 
 def _frequencies(model: BoxModel, x: Array) -> Array:
-    """Return natural frequencies of many designs [Hz], shape (boxes, 6)."""
+    # [Hz], shape (boxes, 6)
     return np.asarray(np.sqrt(np.maximum(np.linalg.eigvalsh(model.stiffness(x)), 0.0)) / math.tau)
 
 

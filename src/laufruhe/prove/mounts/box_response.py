@@ -63,7 +63,7 @@ class LoadedOrders:
 
     @property
     def is_full(self) -> bool:
-        """Whether every order has more than two samples, so that sums over samples equal those over the period."""
+        """Return True if sums over samples equal those over the period: every order has more than two samples."""
         return bool(2 * self.places.max(initial=0) < self.samples)
 
     def turns(self, which: Indices) -> ComplexArray:
@@ -258,6 +258,6 @@ class BoxModel:
 
 
 def _dynamic(lines: LoadedOrders, springs: Array, losses: Array, dampers: Array) -> ComplexArray:
-    """Return dynamic stiffnesses at the frequencies of lines, (..., i, j) to (..., lines, i, j)."""
+    # dynamic stiffnesses at the frequencies of lines, (..., i, j) to (..., lines, i, j)
     moving, omegas = (lines.omegas > 0.0)[:, None, None], lines.omegas[:, None, None]
     return np.asarray(springs + 1j * (moving * losses + omegas * dampers))

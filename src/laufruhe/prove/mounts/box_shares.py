@@ -169,7 +169,7 @@ def _shares(model: BoxModel, at: BoxModes, motion: int) -> _Shares:
 
 
 def _of_the_largest(shares: _Shares) -> tuple[Array, Array, Array]:
-    """Return a linear and a constant upper bound of the largest share: (boxes,), (boxes, n), (boxes,)."""
+    # upper bounds of the largest share: linear (value, slopes), and constant
     boxes = np.arange(len(shares.value))
     best = np.argmax(shares.value, axis=1)
     value, slope = shares.value[boxes, best], shares.slopes[boxes, best]
@@ -179,7 +179,7 @@ def _of_the_largest(shares: _Shares) -> tuple[Array, Array, Array]:
 
 
 def _most_along(along: Array, parts: Array) -> Array:
-    """Return upper bounds of |vector' v| by the parts of the vector in middle modes, shape (boxes, modes)."""
+    # upper bounds of |vector' v| by the parts of the vector in middle modes, shape (boxes, modes)
     sizes = np.abs(along)[:, None]
     near = parts > NEAR
     together = np.sqrt(np.sum(np.where(near, sizes, 0.0) ** 2, axis=2))

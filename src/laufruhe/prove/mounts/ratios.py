@@ -60,7 +60,7 @@ def ratio_under(over: LinearResponse, firm: LinearResponse, groups: Sequence[Mas
 
 
 def _least_ratio(top: LinearBound, bottom: LinearBound) -> Array:
-    """Return the largest t with top - t bottom >= 0 all over the box (E40)."""
+    # largest t with top - t bottom >= 0 all over the box (E40)
     low = np.zeros(len(top.value))
     high = top.value / np.where(bottom.value > 0.0, bottom.value, 1.0)
     for _ in range(HALVINGS):

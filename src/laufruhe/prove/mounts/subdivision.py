@@ -147,7 +147,7 @@ class StiffnessBoxes:
 
     @property
     def is_sampled_fully(self) -> bool:
-        """Whether sums of squares over orders equal those over samples, as remainders suppose."""
+        """Return True if sums of squares over orders equal those over samples, as remainders suppose."""
         return all(lines.is_full for _, _, lines, _ in (*self._terms, *self._limits))
 
     @property
@@ -208,7 +208,6 @@ class StiffnessBoxes:
         return np.where(violated, np.inf, bounds), np.asarray(sides)
 
     def _add_limits(self, boxes: LinearRelaxation, lower: Array, upper: Array) -> None:
-        """Add limits with linear lower bounds, except simulated ones."""
         for maximum, quantity, lines, left_out in self._limits:
             least = under(self.model, quantity, lines, self.model.expanded(lines, lower, upper))
             boxes.add_limit(least, left_out, maximum)
@@ -232,7 +231,7 @@ class StiffnessBoxes:
         return scores
 
     def _numbers(self, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Return lower bounds of mount numbers in the objective, and branching scores."""
+        # lower bounds of mount numbers in the objective, and branching scores
         bounds, scores = np.zeros(len(lower)), np.zeros_like(lower)
         for term in self.problem.mount_terms:
             if is_ratio(term.measure):
@@ -244,7 +243,7 @@ class StiffnessBoxes:
         return bounds, scores
 
     def _violated(self, lower: Array, upper: Array) -> Mask:
-        """Return boxes that violate a limit of a mount number everywhere, shape (boxes,)."""
+        # boxes that violate a limit of a mount number everywhere, shape (boxes,)
         out = np.zeros(len(lower), dtype=bool)
         for limit in self.problem.mount_limits:
             if is_ratio(limit.measure):
@@ -259,7 +258,7 @@ class StiffnessBoxes:
         return lines.subset(lines.omegas > 0.0)
 
     def _ratio(self, quantity: Measure, lower: Array, upper: Array) -> tuple[Array, Array]:
-        """Return lower bounds of a transmissibility, and branching scores (E40)."""
+        # lower bounds of a transmissibility, and branching scores (E40)
         lines = self._ratio_lines(quantity)
         rows = np.arange(3 * len(self.problem.engine.mounts), dtype=np.intp)
         at, still = (self.model.expanded(each, lower, upper) for each in (lines, lines.still()))
@@ -271,7 +270,7 @@ class StiffnessBoxes:
 
 
 def _relevant_lines(model: BoxModel, quantity: Measure, budget: float) -> tuple[LoadedOrders, float]:
-    """Return lines without small ones that sum to less than a budget, and the effect of these on the norm (E41)."""
+    # E41; leaves out small lines that sum to less than the budget, and returns their effect on the norm
     lines = model.lines(quantity)
     size = max(quantity.direction_weights or (1.0,)) * model.largest_response(lines, quantity.channel)
     order = np.argsort(size, kind="stable")

@@ -57,7 +57,7 @@ def _averaged(signal: Spectrum, count: int) -> Spectrum:
 
 
 def _is_alike(engine: Engine) -> bool:
-    """Return True if cylinders differ in place, bank and firing alone, and no rotor turns with the firing's orders."""
+    # cylinders differ in place, bank and firing alone, and no rotor turns with the firing's orders
     parts = {
         replace(part, name="", x=0.0, throw=part.fires_at, bank=0.0, firing_angle=0.0) for part in engine.slider_cranks
     }

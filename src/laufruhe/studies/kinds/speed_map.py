@@ -103,7 +103,7 @@ class SpeedMap(Part):
         return problem.points[0 if wanted is None else names.index(wanted)]
 
     def _measures(self, problem: Problem, case: CaseTable, scenes: Scenes) -> dict[Measure, float]:
-        """Return the mapped measures, at any speed, with the limits of this part."""
+        # mapped measures, at any speed, with the limits of this part
         scene, limits = Scene(problem.engine, problem.points), dict.fromkeys(problem.measures, math.inf)
         with scenes.named(case):
             if self.measures:
