@@ -61,7 +61,7 @@ def choose(problem: Problem, tolerance: float = DEFAULT_TOLERANCE, engine: Engin
 
 
 def chosen_by(scale: Scale, tolerance: float) -> Choice:
-    """As `choose`, beside a reference that is known."""
+    """Choose a fidelity like `choose`, from a known reference."""
     room = max(tolerance - scale.doubt, 0.0)
     chosen = replace(scale.best.fidelity, tolerance=tolerance, gas_samples=REFERENCE_SAMPLES)
     for knob in KNOBS:
@@ -88,7 +88,7 @@ def automatic(problem: Problem, tolerance: float, scale: Scale | None = None) ->
 
 
 def ladder(scale: Scale) -> list[tuple[str, Problem]]:
-    """Every fidelity that a trade sets side by side, those that differ on this problem (F13)."""
+    """Return the fidelities that a trade compares, where they differ on this problem (F13)."""
     problem = scale.problem
     rungs = [(name, problem.at(fidelity)) for knob in KNOBS for name, fidelity in knob.rungs(scale)]
     if not problem.load_terms and not any(term.measure.channel.simulation for term in problem.objective):
@@ -97,7 +97,6 @@ def ladder(scale: Scale) -> list[tuple[str, Problem]]:
 
 
 def _numbers(problem: Problem, scale: Scale, chosen: Fidelity) -> tuple[int, int]:
-    """Force components sampled in one evaluation, pruned and not."""
     pruned = whole = 0
     for term in scale.terms:
         found = signals(term.measure, scale.best)

@@ -41,7 +41,7 @@ def reference(problem: Problem, engine: Engine | None = None, samples: int = REF
 
 
 def signals(measure: Measure, evaluation: Evaluation) -> list[Spectrum]:
-    """What counts of a load at every operating point, (n, places, d), on a common lowest order."""
+    """Return the counted spectra of a load per operating point, (n, places, d), on a common lowest order."""
     found = [measure.signal(loads, evaluation.engine) for loads in evaluation.loads]
     return over(evaluation.engine.cycle.base_order, found)
 
@@ -52,7 +52,7 @@ def relative(bound: float, value: float) -> float:
 
 
 def missed(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
-    """What the samples of an evaluation miss of a measure at most [its unit] (F7, F8); nothing of what has none."""
+    """Return the most that the samples of an evaluation miss of a measure [its unit] (F7, F8)."""
     if measure.channel.simulation:
         return measure.channel.missed(evaluation.engine) * evaluation.value(measure)
     if measure.channel.of_torque:
@@ -64,7 +64,7 @@ def missed(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAM
 
 
 def _missed_of_torque(measure: Measure, evaluation: Evaluation, finest: int) -> float:
-    """Of how evenly the crank turns: what is left of the finest steps is no more than these change."""
+    # the remaining error is no more than the change by the finest steps
     own = evaluation.fidelity
     finer = replace(own, samples=max(2 * own.samples, finest), gas_samples=max(2 * own.gas_steps, finest))
     value, other = evaluation.value(measure), replace(evaluation, fidelity=finer).value(measure)
@@ -88,7 +88,7 @@ class Scale:
 
     @classmethod
     def of(cls, problem: Problem, engine: Engine | None = None) -> Scale:
-        """Of the design as given, or of another."""
+        """Build the scale of the design as given, or of another."""
         return cls(problem, reference(problem, engine))
 
     def evaluation(self, fidelity: Fidelity) -> Evaluation:
@@ -96,7 +96,7 @@ class Scale:
         return evaluate(replace(self.problem, fidelity=fidelity), self.best.engine)
 
     def lost(self, ours: Evaluation, theirs: Evaluation) -> float:
-        """What the objective can at most change by when their signals take the place of ours (F6)."""
+        """Return the largest change of the objective when their signals replace ours (F6)."""
         total = 0.0
         for term in self.terms:
             pairs = zip(signals(term.measure, ours), signals(term.measure, theirs), strict=True)
@@ -107,12 +107,12 @@ class Scale:
         return total
 
     def missed(self, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
-        """What the samples of an evaluation miss of the objective at most (F7, F8)."""
+        """Return the most that the samples of an evaluation miss of the objective (F7, F8)."""
         return sum(term.weight * missed(term.measure, evaluation, finest) for term in self.terms)
 
     @cached_property
     def doubted(self) -> float:
-        """What the reference itself may miss of gas torque between its steps (F9).
+        """Most that the reference misses of gas torque between its steps (F9).
 
         What corners in closed form leave falls off at least with the step: half the steps change no less than
         what is left.
@@ -124,28 +124,27 @@ class Scale:
 
     @property
     def doubt(self) -> float:
-        """What the reference itself may be off by, relative (F9)."""
+        """Relative error bound of the reference (F9)."""
         return relative(self.doubted, self.value) + ROUNDING
 
     def loses(self, fidelity: Fidelity, than: Evaluation | None = None) -> float:
-        """What a fidelity leaves out at most, relative, of the reference or of another evaluation (F6)."""
+        """Return the largest relative loss of a fidelity against the reference or another evaluation (F6)."""
         if than is not None:
             return relative(self.lost(self.evaluation(fidelity), than), self.value)
         return self._once("loses", fidelity, lambda own: self.lost(own, self.best))
 
     def misses(self, fidelity: Fidelity) -> float:
-        """What its samples miss at most, relative (F7, F8)."""
+        """Return the largest relative sampling error of a fidelity (F7, F8)."""
         return self._once("misses", fidelity, self.missed)
 
     def _once(self, what: str, fidelity: Fidelity, found: Callable[[Evaluation], float]) -> float:
-        """Relative, of the design at a fidelity: each tolerance asks for the same ones."""
         key = what, replace(fidelity, tolerance=None)
         if key not in self._known:
             self._known[key] = relative(found(self.evaluation(fidelity)), self.value)
         return self._known[key]
 
     def error_of(self, evaluation: Evaluation) -> float:
-        """Of the objective of the same design at another fidelity, as `error_bound`."""
+        """Return the relative error bound of an evaluation of the same design, as `error_bound` does."""
         value = value_of_loads(self.problem, evaluation)
         bound = self.lost(evaluation, self.best) + self.missed(evaluation, self.best.samples) + self.doubted
         return relative(bound + ROUNDING * value, value)
@@ -163,7 +162,7 @@ class Scale:
 
     @property
     def driving(self) -> list[Spectrum]:
-        """What loads the block or may, and what is asked of the inside of the crankcase, at every operating point."""
+        """Loads on the block, fixed or open, and the measured loads inside the crankcase, per operating point."""
         inside = [s for term in self.terms if term.measure.is_inside for s in signals(term.measure, self.best)]
         return [*(loads.wrench for loads in self.best.loads), *self.decided, *inside]
 
@@ -203,7 +202,7 @@ class Scale:
 
     @cached_property
     def strengths(self) -> dict[int, float]:
-        """What every excited mode adds at most to the objective, relative (F6)."""
+        """Largest relative contribution of each excited mode to the objective (F6)."""
         others = {mode: tuple(m for m in self.excited_modes if m != mode) for mode in self.excited_modes}
         return {mode: self.loses(replace(self.best.fidelity, modes=rest)) for mode, rest in others.items()}
 
@@ -262,7 +261,7 @@ def missed_of_gas(problem: Problem, evaluation: Evaluation) -> tuple[float, floa
 
 
 def _apart(measure: Measure, ours: Evaluation, theirs: Evaluation) -> float:
-    """The norm of what two evaluations of a design have apart, at many angles: a root mean square of a spike is not."""
+    # many angles: a root mean square would hide a spike
     pairs = zip(ours.loads, theirs.loads, strict=True)
     found = [measure.load.signal(a) + measure.load.signal(b).each(np.negative) for a, b in pairs]
     engine, points = ours.engine, [loads.point for loads in ours.loads]
@@ -271,7 +270,6 @@ def _apart(measure: Measure, ours: Evaluation, theirs: Evaluation) -> float:
 
 
 def _straight(gas: GasModel | None, cycle: Cycle) -> GasModel | None:
-    """A trace that goes straight from point to point."""
     if not isinstance(gas, PressureTrace):
         return gas
     angles, pressures = list(gas.angles), list(gas.pressures)

@@ -16,7 +16,7 @@ PART_SHARE = 0.1
 
 @dataclass(frozen=True)
 class LeftOut:
-    """One thing that is not computed.
+    """A part of the physics that is not computed.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ Rungs = list[tuple[str, Fidelity]]
 
 
 class Knob:
-    """One field of a fidelity.
+    """A field of a fidelity.
 
     Attributes
     ----------
@@ -57,15 +57,15 @@ class Knob:
         return None
 
     def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
-        """With the cheapest value of this field that is enough; `room` is the error allowed of everything (F10)."""
+        """Return the fidelity with the cheapest sufficient value; `room` is the error allowed in total (F10)."""
         return fidelity
 
     def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
-        """What it keeps, in words."""
+        """Describe the kept physics in words."""
         return []
 
     def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
-        """What it leaves out, and what that costs at most; what is exactly zero costs nothing."""
+        """Return the omitted parts and their largest cost; parts that are exactly zero cost nothing."""
         return []
 
     def rungs(self, scale: Scale) -> Rungs:
@@ -80,7 +80,7 @@ class Knob:
 def first_enough(
     fidelity: Fidelity, key: str, values: Sequence[int | None], enough: Callable[[Fidelity], bool]
 ) -> Fidelity:
-    """With the first value that is enough; the last one where none is."""
+    """Return the fidelity with the first sufficient value; with the last one where no value suffices."""
     found = fidelity
     for value in values:
         changed: dict[str, Any] = {key: value}

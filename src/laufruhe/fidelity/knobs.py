@@ -60,7 +60,7 @@ class _WholePart(Knob):
         raise NotImplementedError
 
     def is_kept(self, problem: Problem, fidelity: Fidelity) -> bool:
-        """Whether the problem has it and a fidelity keeps it."""
+        """Return True if the problem has this part and the fidelity keeps it."""
         return self.is_there(problem) and getattr(fidelity, self.key) == getattr(EXACT, self.key)
 
     def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
@@ -161,8 +161,7 @@ class _Orders(Knob):
 
 
 class _GasOrders(Knob):
-    """A choice by hand: it spares no step of the cycle that fewer orders of everything have not spared already."""
-
+    # a choice by hand: fewer orders of everything have already spared its steps
     key, kind = "gas_orders", int
     told: ClassVar = {"description": "Last order kept of the gas alone.", "ge": 1}
 

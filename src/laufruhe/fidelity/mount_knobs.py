@@ -20,7 +20,7 @@ RIGID = "rigid mounts, 720 steps"
 
 
 class _OfElasticMounts(Knob):
-    """How a block on elastic mounts answers: only one choice of it leaves mounts to be decided."""
+    """A choice for a block on elastic mounts: only one value leaves mounts to be decided."""
 
     def refused(self, problem: Problem, value: Any) -> tuple[str, str] | None:
         if value == getattr(EXACT, self.key):
@@ -32,7 +32,7 @@ class _OfElasticMounts(Knob):
         return None
 
     def is_open(self, scale: Scale) -> bool:
-        """Whether the automatic choice has one here."""
+        """Return True if the automatic choice may decide this field here."""
         return scale.mounting is not None and not scale.problem.mount_decisions
 
 

@@ -34,7 +34,7 @@ MORE = 1.1
 
 
 def needs(problem: Problem) -> Choice:
-    """What of the physics enters what an objective and its limits ask of mounts; what is left out changes nothing."""
+    """Return the physics that the questions about mounts depend on; the omitted parts change nothing."""
     whole, kept, left = _values(problem), [], []
     parts = [*_loads(problem)] if _moved(whole, _values(replace(problem, points=()))) else []
     if not parts:
@@ -53,19 +53,16 @@ def needs(problem: Problem) -> Choice:
 
 
 def _values(problem: Problem) -> Array:
-    """All numbers that are asked; of natural frequencies all six."""
     evaluation, wanted = evaluate(problem), [measure for measure in problem.measures if measure.channel.is_number]
     return np.array([value for measure in wanted for value in evaluation.values(measure)])
 
 
 def _moved(before: Array, after: Array) -> float:
-    """Largest relative change."""
     size = np.maximum(np.abs(before), np.abs(after))
     return float(np.max(np.abs(after - before) / np.where(size > 0.0, size, 1.0), initial=0.0))
 
 
 def _loads(problem: Problem) -> Iterator[tuple[str, Problem]]:
-    """Parts of the loads, each with the problem that lacks it."""
     quick = tuple(replace(point, speed=MORE * point.speed) for point in problem.points)
     yield "crank speed", replace(problem, points=quick)
     for knob in KNOBS:
@@ -98,7 +95,6 @@ def _turned_stiffer(spring: Mount) -> Mount:
 
 
 def _modes_of_the_sag(problem: Problem) -> list[LeftOut]:
-    """Modes that weight does not move, where sag alone is asked of mounts."""
     if {measure.channel for measure in problem.measures if measure.is_mounting} != {channels.SAG}:
         return []
     mounting = mounting_in(problem.engine)

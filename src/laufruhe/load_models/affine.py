@@ -70,7 +70,7 @@ class AffineNorm:
         return np.asarray(z.ravel() @ self.slope.reshape(z.size, -1))
 
     def dual_norm(self, z: Array) -> float:
-        """Of dual rows (P3)."""
+        """Return the dual norm of rows z, shape (k, d) (P3)."""
         return self.norm.dual_norm(self.grid, z)
 
     def dual_feasible(self, z: Array) -> Array:
@@ -141,7 +141,7 @@ class AffineProblem:
         return float(np.bincount(self.groups or [0] * len(values), values).max(initial=0.0))
 
     def shared(self, shares: Array) -> AffineProblem:
-        """One sum in place of the largest of several, each by its share: no more, where shares add up to one."""
+        """Return the problem with one sum, weighted by shares, in place of the largest; no more where shares add up to one."""
         kept = [k for k, group in enumerate(self.groups) if shares[group] > 0.0]
         terms = tuple((self.terms[k][0] * float(shares[self.groups[k]]), self.terms[k][1]) for k in kept)
         return replace(self, terms=terms, groups=())
@@ -198,7 +198,7 @@ class AffineModel:
         self.base = problem.engine.cycle.base_order if whole_cycle else self._shortest_base(bare, orders)
 
     def _shortest_base(self, bare: Evaluation, orders: Sequence[Fraction]) -> Fraction:
-        """Of the wrench, and of loads inside the crankcase: a bearing feels each cylinder beside it alone."""
+        # a bearing feels each cylinder beside it alone, so loads inside the crankcase count too
         inside = {measure.load for measure in self.problem.measures if measure.is_inside}
         signals = [*(loads.wrench for loads in bare.loads), *(s for channel in inside for s in bare.signals(channel))]
         return common_base([signal.repeats(tuple(orders)) for signal in signals] or [Fraction(1)])
@@ -278,7 +278,6 @@ class AffineModel:
         return _stacked(bare, slopes, self._keep_all)
 
     def _own_base(self, signals: Sequence[Spectrum], samples: int) -> Fraction:
-        """Lowest order of one load; that of all where its period holds no whole number of their steps."""
         own = common_base([signal.repeats() for signal in signals]) if self._once else self.base
         whole = all((steps * self.base / own).denominator == 1 for steps in (samples, self.full_samples))
         return own if whole else self.base
@@ -295,8 +294,7 @@ class AffineModel:
 
 @dataclass(frozen=True)
 class _Change:
-    """What one unit of one column adds: rotors, masses with a kilogram more, and geared shafts with all inertia."""
-
+    # one unit of a column: rotors, masses with one more kilogram, geared shafts with all inertia
     rotors: tuple[Rotor, ...]
     pistons: tuple[tuple[str, str], ...]
     shares: tuple[str, ...] = ()
@@ -317,7 +315,7 @@ def _only(engine: Engine, rotors: Sequence[Rotor]) -> tuple[Rotor, ...]:
 
 
 def _alone(engine: Engine, change: _Change) -> Engine:
-    """What these rotors and pistons load by themselves: the engine without any other mass."""
+    # the engine with the changed rotors and pistons as its only masses
     parts = (part.only({mass: 1.0 for name, mass in change.pistons if name == part.name})
              for part in engine.slider_cranks)  # fmt: skip
     return replace(engine, slider_cranks=tuple(parts), rotors=change.rotors)
@@ -326,7 +324,7 @@ def _alone(engine: Engine, change: _Change) -> Engine:
 def _loads(
     alone: Engine, shares: tuple[str, ...], point: OperatingPoint, problem: Problem, mounting: Mounting | None
 ) -> PointLoads:
-    """What these alone make at an operating point; torque and an uneven speed are those of the whole engine."""
+    """Return the loads of these parts at an operating point; torque and uneven speed are those of the whole engine."""
     without_gas = replace(problem.fidelity, gas=False, gas_orders=None)
     wrench = added_rotor_loads(alone.rotors, problem.engine, point, problem.fidelity)
     if any(part != part.only({}) for part in alone.slider_cranks):

@@ -51,17 +51,16 @@ class AmplitudeObjective:
     terms: tuple[AmplitudeTerm, ...]
 
     def values(self, space: StarSpace, stars: Stars, most: float = math.inf) -> Array:  # noqa: ARG002
-        """Of many stars, shape (n,); over `most` any number between it and the value would do."""
+        """Return the objective of many stars, shape (n,); above `most` any value over it will do."""
         return self._of_sums(star_sums(stars, space.phases, space.places, self.orders))
 
     def of_angles(self, places: Sequence[float], throws: Array) -> Array:
-        """Of many cranks with throws at any angles [rad], shapes (n,) and (n, throws)."""
+        """Return the objective of many cranks, shape (n,), from throw angles [rad], shape (n, throws)."""
         weights = np.stack([np.ones(len(places)), places], axis=-1)
         waves = np.exp(1j * throws[:, None, :] * np.array(self.orders)[:, None])
         return self._of_sums(waves @ weights)
 
     def _of_sums(self, sums: NDArray[np.complex128]) -> Array:
-        """Of F_h and C_h, shape (n, orders, 2)."""
         squares = np.square(sums.real) + np.square(sums.imag)
         out = np.zeros(len(sums))
         for term in self.terms:
@@ -114,7 +113,7 @@ def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> A
 
 
 def _limits_idle(problem: Problem, phasing: Phasing, layout: Layout) -> bool:
-    """Whether only forces are limited, and met: of even stars the counts on the steps fix them."""
+    # even stars share the limited forces where the counts on the steps are the same
     if not problem.limits:
         return True
     if (
@@ -134,7 +133,6 @@ def _is_amplitude(term: Term) -> bool:
 
 
 def _one_throw(engine: Engine, layout: Layout) -> Engine | None:
-    """The engine with its first throw alone; None where cylinders stand beside it, or more than its own are on it."""
     places, pins = layout.throw_positions, layout.pins
     if len(engine.slider_cranks) != len(pins):
         return None
@@ -155,7 +153,6 @@ def _orders(problem: Problem, highest: int) -> list[int]:
 
 
 def _factors(term: Term, alone: Evaluation, orders: Sequence[int], x: float) -> AmplitudeTerm:
-    """Value of one throw's load of every order; a couple for its lever."""
     counted = term.measure.orders
     values = []
     for h in orders:

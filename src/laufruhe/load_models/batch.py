@@ -29,7 +29,7 @@ class Designs:
         return self.of_columns(self._features(values), threads, cache_bytes)
 
     def within(self, values: Array) -> NDArray[np.bool_]:
-        """Whether every design keeps the limits on loads and masses, to the excess that counts as none."""
+        """Return which designs keep the limits on loads and masses, within the tolerance `FEASIBLE`."""
         features, kept = self._features(values), np.ones(len(values), dtype=bool)
         for maximum, norm in self.limits:
             kept &= norm.values(features) <= maximum + FEASIBLE * (maximum or 1.0)
@@ -99,7 +99,6 @@ def _batched(norm: AffineNorm, prune: bool) -> BatchNorm:
 
 
 def _merged(rows: Array, weights: Array) -> tuple[Array, Array]:
-    """Rows that are equal to the last bit, or each other's negative, as one row: symmetric mounts."""
     flat = rows.reshape(-1, rows.shape[2]).T
     lead = np.take_along_axis(flat, np.argmax(flat != 0.0, axis=1)[:, None], axis=1)
     _, first, inverse = np.unique(

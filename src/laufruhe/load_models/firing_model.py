@@ -31,7 +31,7 @@ def slot_space(cylinders: int, places: tuple[float, ...]) -> StarSpace:
 
 
 class FiringModel(StarModel):
-    """As `StarModel`, its steps the slots of the cycle.
+    """A `StarModel` whose steps are the slots of the cycle.
 
     What does not feel the firing order is that of the star alone. To what does, the gas of each cylinder is
     added, later by its slot; what twists the crankshaft is that of one cylinder after another.
@@ -97,7 +97,7 @@ class FiringModel(StarModel):
         return StarNorm(measure.norm, whole.vectors, moves, slope, None, whole.grid)
 
     def _alone(self, load: LoadChannel, k: int) -> list[Spectrum]:
-        """What one cylinder that fires in the first slot makes, at every operating point: all, or its gas alone."""
+        """Return the loads of a cylinder firing in the first slot, per operating point: all, or gas alone."""
         engine = self.problem.engine
         part = engine.slider_cranks[k]
         first = replace(part, throw=part.throw + part.shaft.ratio * part.firing_angle, firing_angle=0.0)
@@ -115,18 +115,15 @@ class FiringModel(StarModel):
 
 
 def _averaged(signals: Sequence[Spectrum], steps: int | None) -> Sequence[Spectrum]:
-    """About every one of so many angles; as they are where none are given."""
     return signals if steps is None else [signal.averaged(signal.period / steps) for signal in signals]
 
 
 def _by_slot(norm: StarNorm, steps: NDArray[np.int64]) -> StarNorm:
-    """Rows by the slot of each throw's cylinder in place of its step."""
     turns = None if norm.turns is None else norm.turns[:, steps]
     return replace(norm, moves=norm.moves[:, steps], turns=turns)
 
 
 def _of_star(problem: Problem) -> Problem:
-    """The problem without what is of cylinders one after another, and not of the star."""
     objective = tuple(term for term in problem.objective if _adds_up(term.measure))
     return replace(problem, objective=objective, limits=tuple(x for x in problem.limits if _adds_up(x.measure)))
 

@@ -27,7 +27,7 @@ FINE = 1440
 
 @dataclass(frozen=True, eq=False)
 class Share:
-    """What one shaft brings to a load, or what stands: per operating point, and of one unit of every column."""
+    """The spectra of one shaft, or of the fixed rest: per operating point, and per unit of every column."""
 
     own: list[Spectrum]
     columns: list[list[Spectrum]]
@@ -83,7 +83,7 @@ class LedModel:
         self._known: dict[Measure, tuple[Share, list[Share]]] = {}
 
     def shares(self, measure: Measure) -> tuple[Share, list[Share]]:
-        """Of a load what stands, and what each shaft brings, over one period that holds all of it."""
+        """Return the spectra of a load from the fixed rest and from each shaft, over a common period."""
         if measure not in self._known:
             engine = self.problem.engine
             found = [_share(model.spectra(measure.load)) for model in (self._still, *self._shafts)]
@@ -144,7 +144,7 @@ class LedModel:
         return program, tuple(led for _, led in (*terms, *limits))
 
     def counted(self, measure: Measure, shaft: int) -> list[Spectrum]:
-        """What a shaft brings to what a measure counts, at its start, of every operating point with a weight."""
+        """Return the counted spectra of a shaft at its starting lead, one per operating point with a weight."""
         shares = measure.shares(self.problem.points)
         own = self.shares(measure)[1][shaft].own
         return [selected(measure, each, self.problem.engine) for each, share in zip(own, shares, strict=True) if share]
@@ -165,12 +165,10 @@ def carried(problem: Problem, belongs: Callable[[str], bool]) -> Problem:
 
 
 def _share(spectra: Sequence[tuple[Spectrum, tuple[Spectrum, ...]]]) -> Share:
-    """From what every operating point has of the design, and of every column."""
     return Share([own for own, _ in spectra], [list(each) for each in zip(*(by for _, by in spectra), strict=True)])
 
 
 def _moved(share: Share, lead: float) -> Share:
-    """Earlier by a lead [rad]."""
     return _each(share, lambda signal: signal.later(-lead / signal.period, -lead)) if lead else share
 
 

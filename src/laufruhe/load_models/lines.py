@@ -46,12 +46,12 @@ class Lines:
         return Lines(self.orders[which], self.real[:, chosen], self.imaginary[:, chosen])
 
     def mapped(self, matrix: Array) -> Lines:
-        """All orders times a real matrix."""
+        """Multiply the components of all orders by a real matrix."""
         m = ca.DM(matrix.copy())
         return Lines(self.orders, m @ self.real, m @ self.imaginary)
 
     def mapped_each(self, matrices: Sequence[NDArray[np.complex128]]) -> Lines:
-        """Each order times a complex matrix of its own."""
+        """Multiply the components of each order by its own complex matrix."""
         pairs = [(ca.DM(m.real.copy()), ca.DM(m.imag.copy())) for m in matrices]
         columns = [(self.real[:, k], self.imaginary[:, k]) for k in range(len(pairs))]
         real = [a @ x - b @ y for (a, b), (x, y) in zip(pairs, columns, strict=True)]

@@ -42,7 +42,7 @@ def only_rotors(engine: Engine, rotors: Sequence[Rotor], beside: bool) -> Engine
 
 
 def leaning(upright: ComplexArray, across: ComplexArray, upside: ComplexArray) -> tuple[ComplexArray, ...]:
-    """What a cylinder loads times the cosine of its bank, times the sine, and at any, from the banks of `QUARTERS`."""
+    """Return the loads that go with cos(bank), with sin(bank) and with neither, from the banks of `QUARTERS`."""
     still = 0.5 * (upright + upside)
     return 0.5 * (upright - upside), across - still, still
 
@@ -58,7 +58,7 @@ def motored(problem: Problem) -> Problem:
 
 
 def gas_tells_apart(problem: Problem) -> bool:
-    """Whether gas that is felt drives some cylinders in another way than others."""
+    """Return True if gas that is felt drives some cylinders differently from others."""
     if not problem.feels_gas:
         return False
     gases = [gas for gas in map(problem.fidelity.gas_of, problem.points) if gas is not None]
@@ -66,7 +66,7 @@ def gas_tells_apart(problem: Problem) -> bool:
 
 
 def _driven(gas: GasModel, part: SliderCrank) -> Hashable:
-    """What tells of how gas drives a piston, roundings of the lead of the one that faces it left out."""
+    # roundings of the lead of the facing piston are left out
     other = part.facing
     plain = replace(part, facing=replace(other, ahead=round(other.ahead, SAME))) if isinstance(other, Facing) else part
     return alike_under(gas, plain)

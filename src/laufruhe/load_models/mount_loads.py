@@ -47,7 +47,6 @@ class FixedThrows:
         return Lines(np.asarray(kept, dtype=float) * float(base), real, imaginary)
 
     def _expression(self, loads: Array) -> Any:
-        """Loads (1 + columns, n, 6) as an expression of the unbalances, shape (6, n)."""
         count = loads.shape[1]
         total = ca.MX(ca.DM(loads[0].T.copy()))
         if len(self._reach):
@@ -82,7 +81,6 @@ class MovedThrows:
         return found.kept(_felt(self._sizes([found.real, found.imaginary]), found.orders))
 
     def _sizes(self, parts: Sequence[Any]) -> Array:
-        """Largest component of every order over designs drawn at random: a star that cancels shows nothing itself."""
         sized = ca.Function("sizes", [self._turns, self._u], list(parts))
         generator = np.random.default_rng(0)
         reach = np.concatenate([np.full(d.width, d.scale) for d in self._model.domains] or [np.zeros(0)])
@@ -94,7 +92,7 @@ class MovedThrows:
         return np.asarray(np.max(values, axis=(0, 1)))
 
     def rows(self, quantity: Measure) -> tuple[Any, Grid]:
-        """As `UnevenModel` has them."""
+        """Return the rows of a measure and their grid, as `UnevenModel.rows` does."""
         return self._model.rows(quantity, self._at)
 
 
@@ -103,6 +101,6 @@ Loads: TypeAlias = FixedThrows | MovedThrows
 
 
 def _felt(sizes: Array, orders: Array) -> NDArray[np.intp]:
-    """Orders that matter: above resonance one counts by its load over the square of its frequency."""
+    # above resonance an order counts by its load over the square of its frequency
     felt = sizes / np.maximum(orders, 1.0) ** 2
     return np.flatnonzero((sizes > KEPT_SHARE * sizes.max(initial=0.0)) & (felt > KEPT_SHARE * felt.max(initial=0.0)))

@@ -41,14 +41,14 @@ class PairTable:
     rounding: float
 
     def squares(self, stars: Stars) -> Array:
-        """Of whole stars, shape (n,)."""
+        """Return the squares of whole stars, shape (n,)."""
         total = np.full(len(stars), self.constant)
         for k in range(stars.shape[1]):
             total += self.placed(stars, stars[:, k], k)
         return total
 
     def placed(self, stars: Stars, steps: Stars, throw: int) -> Array:
-        """What one throw on these steps adds to stars whose throws before it are placed."""
+        """Return the increase of the squares by placing one throw, shape (n,); the throws before it are placed."""
         total = self.linear[throw, steps]
         count = self.linear.shape[1]
         for other in range(throw):
@@ -58,7 +58,7 @@ class PairTable:
 
 
 def pair_table(norm: StarNorm) -> PairTable:
-    """Of a root mean square without decisions."""
+    """Build the table of a root mean square without decisions."""
     weights = np.sqrt(norm.grid.weights)[:, None]
     first = (norm.constant * weights).reshape(-1)
     throws, steps = norm.moves.shape[:2]
@@ -86,7 +86,7 @@ class PairObjective:
 
     @classmethod
     def of(cls, problem: StarProblem) -> PairObjective:
-        """Of a problem that has nothing but root mean squares, and nothing to decide beside the star."""
+        """Build the objective of a problem with root mean squares only, and no decisions besides the star."""
         terms, limits = (
             tuple((number, pair_table(norm)) for number, norm in each) for each in (problem.terms, problem.limits)
         )
@@ -94,7 +94,7 @@ class PairObjective:
 
     @property
     def tables(self) -> list[PairTable]:
-        """Of terms and limits, in this order."""
+        """Tables of the terms, then of the limits."""
         return [table for _, table in (*self.terms, *self.limits)]
 
     def values(self, squares: Array) -> Array:
@@ -107,7 +107,7 @@ class PairObjective:
         return total
 
     def below(self, squares: Array) -> float:
-        """What rounding may hide of the least objective, of one row of squares."""
+        """Return the least objective that rounding allows, from one row of squares."""
         least = sum(
             weight * float(np.sqrt(max(squares[k] - table.rounding, 0.0)))
             for k, (weight, table) in enumerate(self.terms)

@@ -22,7 +22,7 @@ class Peaks(Protocol):
 
     @property
     def is_known(self) -> bool:
-        """Whether the simulation has them."""
+        """Return True if the simulation has the peaks."""
 
     @property
     def counts(self) -> tuple[int, ...]:

@@ -59,7 +59,6 @@ class StarNorm:
 
 
 def _cancelled(first: Array, moves: Array) -> Array:
-    """The sum of rows and of their moves; what is a rounding of the largest of them is zero."""
     whole = first + moves.sum(axis=0)
     reach = np.abs(first).max(initial=0.0) + np.abs(moves).max(initial=0.0, axis=tuple(range(1, moves.ndim))).sum()
     return np.where(np.abs(whole) <= _ROUNDING * reach, 0.0, whole)
@@ -132,7 +131,7 @@ class StarModel:
 
     @property
     def models(self) -> list[AffineModel]:
-        """Those of the stars that all others are made of."""
+        """Models of the stars from which all other stars are composed."""
         return [self._whole, self._still, *self._moved.values()]
 
     @property
@@ -181,7 +180,6 @@ class StarModel:
         return tuple(out)
 
     def _apart(self, rows: dict[tuple[int, int], Array], still: Array) -> Array:
-        """What every throw changes at every step, shape (throws, phases, ...); zero at those of the origin."""
         out = np.zeros((self.space.throws, self.space.phases, *still.shape))
         for place, own in rows.items():
             np.subtract(own, still, out=out[place])

@@ -25,7 +25,7 @@ APART = 1e-6
 
 
 class ThrowMoves:
-    """What of a star moves, how far, and what that does to its firing intervals.
+    """The open angles of a star, their bounds, and their effect on its firing intervals.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ PEAK_STEPS = 2
 
 @dataclass(frozen=True, eq=False)
 class Moving:
-    """What turns with one throw and fires once, or rides on it.
+    """A cylinder that turns with one throw, or the unbalances that ride on it.
 
     Attributes
     ----------
@@ -82,7 +82,7 @@ class WaveNorm:
 
 
 def averages(problem: Problem, measure: Measure) -> bool:
-    """Whether its rows are averages about angles: of means (P7), and of peaks that gas bends, which are no less."""
+    """Return True if the rows are averages about angles: of means (P7), or of peaks that gas bends."""
     bends = problem.has_gas and measure.feels_gas and measure.norm.refinement > 1
     return measure.is_load and (measure.norm.averages or bends)
 
@@ -144,7 +144,7 @@ class ThrowWaves:
         self.rest.base = self.base
 
     def _cylinders(self, inside: bool) -> Iterator[Moving]:
-        """Every cylinder with alpha = 0 when phi = 0, alone or, for loads inside the crankcase, beside idle ones."""
+        # alpha = 0 when phi = 0; for loads inside the crankcase each cylinder stands beside idle ones
         engine, layout = self.problem.engine, self.layout
         for k, (part, pin) in enumerate(zip(engine.slider_cranks, layout.pins, strict=True)):
             acting, late = working(self.problem, part.name), layout.late[k] if layout.late else 0.0
@@ -156,7 +156,7 @@ class ThrowWaves:
             yield Moving(pin, k, found, ahead + (0.0 if self._opened[1] else layout.pin_offsets[k]), {})
 
     def _riding(self, rides: dict[str, int], inside: bool) -> Iterator[Moving]:
-        """What rides on every throw."""
+        # unbalances that ride on every throw
         engine, layout = self.problem.engine, self.layout
         for pin in sorted(set(rides.values())):
             own = [rotor for rotor in engine.rotors if rides.get(rotor.name) == pin and rotor.unbalance]
@@ -167,7 +167,6 @@ class ThrowWaves:
                 yield Moving(pin, None, (found,), -angle, {rotor.name: rotor.unbalance for rotor in own})
 
     def _waves_of(self, part: Moving) -> Iterator[tuple[Wave, int, int]]:
-        """Waves of a part, each with the place of its order and its component."""
         side = Fraction(0 if part.cylinder is None else self.layout.side(part.cylinder))
         for j, step in enumerate((-1, 0, 1) if len(part.found) > 1 else (0,)):
             for h, order in enumerate(self.times):
@@ -177,7 +176,7 @@ class ThrowWaves:
 
     @property
     def followed(self) -> float:
-        """Of the heaviest order, that one is followed along an arc; others count as their size, more so in peaks."""
+        """Share of the heaviest order above which an order is followed along an arc; others count as their size."""
         return self._followed[any(map(self._is_bent_peak, self.problem.measures))]
 
     def _is_bent_peak(self, measure: Measure) -> bool:
@@ -188,7 +187,7 @@ class ThrowWaves:
         return [measure for measure in self.problem.measures if measure.is_load]
 
     def counted(self, measure: Measure, found: Evaluation) -> list[Spectrum]:
-        """What counts of loads at every operating point that counts."""
+        """Return the counted spectra of a load, one per operating point with a weight."""
         engine = self.problem.engine
         shares = measure.shares(self.problem.points)
         return [
@@ -219,11 +218,11 @@ class ThrowWaves:
         return tuple(sorted(kept))
 
     def left_out(self, measure: Measure, samples: int) -> float:
-        """What the orders that are left out amount to at most, wherever the throws stand."""
+        """Return the most that the omitted orders amount to, wherever the throws stand [SI]."""
         return sum(self._left_out(measure, part, samples) for part in self.parts) if measure.is_load else 0.0
 
     def _left_out(self, measure: Measure, part: Moving, samples: int) -> float:
-        """Of one part, wherever its bank: |A cos b + B sin b + C| is no more than all three."""
+        # |A cos b + B sin b + C| is no more than all three
         every = [self.counted(measure, found) for found in part.found]
         if len(every) == 1:
             return self.tail(measure, every[0], samples)
@@ -235,7 +234,7 @@ class ThrowWaves:
         return total
 
     def tail(self, measure: Measure, signals: Sequence[Spectrum], samples: int) -> float:
-        """What the orders that are left out of signals amount to at most, those beyond the last included."""
+        """Return the most that omitted orders of signals amount to, including those beyond the last [SI]."""
         total, kept = 0.0, np.array([float(order) for order in self.times])
         for one in signals:
             # of what bends at an angle so many orders are listed that those beyond are next to nothing
@@ -273,7 +272,6 @@ class ThrowWaves:
         return WaveNorm(fixed, waves, self.left_out(measure, samples))
 
     def _own_rows(self, measure: Measure, part: Moving, samples: int) -> list[ComplexArray]:
-        """Rows of every order of a part, of each of its components, shape (orders, k, d)."""
         times = np.array([float(order) for order in self.times])
         turned = np.exp(1j * times * part.ahead)[:, None, None]
         if measure.is_load:
@@ -284,14 +282,12 @@ class ThrowWaves:
 
     @staticmethod
     def _components(found: list[ComplexArray]) -> list[ComplexArray]:
-        """Of what leans with the bank, of what does not, and of what leans against it, from the banks of `QUARTERS`."""
         if len(found) == 1:
             return found
         a, b, still = leaning(*found)
         return [0.5 * (a - 1j * b), still, 0.5 * (a + 1j * b)]
 
     def _weights(self, measure: Measure, part: Moving) -> ComplexArray:
-        """Rows of the masses that ride on a throw, which turn with it."""
         engine = self.problem.engine
         rows = [
             mass_rows(
@@ -302,7 +298,6 @@ class ThrowWaves:
         return np.asarray(rows[0] - 1j * rows[1])
 
     def _coefficients(self, signal: Spectrum) -> ComplexArray:
-        """Of the orders that are kept, shape (orders, places, d)."""
         return np.array([signal.at(float(order)) for order in self.times])
 
     def _rows_of(self, measure: Measure, own: Sequence[ComplexArray], samples: int) -> ComplexArray:
@@ -334,7 +329,7 @@ class ThrowWaves:
 
 
 def _averaged(signal: Spectrum, out: Mask, steps: float) -> Array:
-    """What averages, about so many angles a turn, have at most of some orders and of those beyond all listed."""
+    # bound of averaged orders, including those beyond the listed ones
     sizes = np.linalg.norm(signal.coefficients[out], axis=-1)
     whole = np.sinc(signal.orders[out] / steps) ** 2 @ sizes
     if signal.kinks is None:

@@ -51,8 +51,6 @@ class Felt:
 
 @dataclass(frozen=True, eq=False)
 class _Leaning:
-    """Coefficients of a cylinder times cos b, times sin b and as they are, each of shape (orders, rows)."""
-
     along: ComplexArray
     across: ComplexArray
     still: ComplexArray
@@ -101,7 +99,7 @@ class TurnedLoads:
         self._cylinders = [_leaning([own[kept] for own in each]) for each in padded]
 
     def lines(self, stars: Sequence[Any], banks: Sequence[Any], unbalance: Callable[[Rotor], Any]) -> list[Lines]:
-        """Of every place, from angles s and b of every cylinder [rad] and U of every rotor as (re, im)."""
+        """Return the lines of every place, from cylinder angles s and b [rad] and rotor unbalances (re, im)."""
         parts = [self._turned(own, s, b) for own, s, b in zip(self._cylinders, stars, banks, strict=True)]
         for rotor, (by_real, by_imaginary) in zip(self._problem.engine.rotors, self._units, strict=True):
             acts = np.flatnonzero(np.abs(by_real).max(axis=1) + np.abs(by_imaginary).max(axis=1))
@@ -127,7 +125,6 @@ class TurnedLoads:
         return Lines(self._orders, real * cosine - imaginary * sine, real * sine + imaginary * cosine)
 
     def _of_cylinder(self, k: int, bank: float) -> Spectrum:
-        """Alone, at a bank, firing when phi = 0."""
         engine = self._problem.engine
         part = replace(engine.slider_cranks[k], bank=bank, throw=bank, firing_angle=0.0)
         return self._loaded(working(self._point, part.name), lone(engine, k, self._beside, part))
@@ -143,7 +140,6 @@ class TurnedLoads:
         return self._signal(PointLoads(point, wrench, None, moving=engine, fidelity=fidelity)).series
 
     def _rows(self, spectrum: Spectrum) -> ComplexArray:
-        """Coefficients of the orders of the cycle, shape (orders, places times components)."""
         own = spectrum.rebased(self._base).coefficients
         return np.asarray(own.reshape(len(own), -1))
 
@@ -153,7 +149,6 @@ def _padded(rows: ComplexArray, count: int) -> ComplexArray:
 
 
 def _kept(squares: Array, orders: Array, felt: Felt) -> Mask:
-    """The first orders, that hold all but a share of the root mean square."""
     squares = squares * np.square([felt.gain(float(order)) for order in orders])
     tail = np.cumsum(squares[::-1])[::-1]
     found = (tail > felt.left_out**2 * tail[0]) & (squares > _NOTHING**2 * tail[0])
@@ -167,5 +162,5 @@ def _leaning(rows: Sequence[ComplexArray]) -> _Leaning:
 
 
 def _dm(values: Array) -> Any:
-    """What gas does not load is left out: it has many orders, and forces few."""
+    # gas has many orders and few forces: zeros are dropped
     return ca.sparsify(ca.DM(np.ascontiguousarray(values)))

@@ -127,7 +127,7 @@ class UnevenModel:
         return ca.vertcat(*blocks), Grid(np.concatenate(weights), steps, points=len(chosen))
 
     def _signal(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[Lines]:
-        """What a channel has of each mount, of the block, or of each place inside the crankcase."""
+        # per mount, for the block, or per place inside the crankcase
         if quantity.is_inside:
             return self._inside(quantity, point, at)
         counted = self._counted(quantity, point, at)
@@ -137,7 +137,7 @@ class UnevenModel:
         return [counted.mapped_each([maps[m] for maps in by_order]) for m in range(len(by_order[0]))]
 
     def _inside(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> list[Lines]:
-        """Of places inside the crankcase (S37)."""
+        # S37
         engine = self.problem.engine
 
         def signal(loads: PointLoads) -> Spectrum:
@@ -156,7 +156,6 @@ class UnevenModel:
         return turned.lines(stars, [bank for _, bank in placed], lambda rotor: self._unbalance(rotor, at))
 
     def _counted(self, quantity: Measure, point: OperatingPoint, at: Symbols) -> Lines:
-        """Wrench of the orders that count."""
         # a block on soft mounts feels the first orders of its gas alone
         gain = self._gain(quantity, point) if quantity.on_mounts else None
         found = self.wrench(point, at, gain)
@@ -164,13 +163,11 @@ class UnevenModel:
         return found.kept(counted) if len(counted) else Lines(np.ones(1), ca.DM.zeros(6, 1), ca.DM.zeros(6, 1))
 
     def _maps(self, quantity: Measure, order: float, point: OperatingPoint) -> list[NDArray[np.complex128]]:
-        """Force per wrench of every mount that counts, its directions weighted."""
         weights = np.diag(quantity.direction_weights or (1.0, 1.0, 1.0))
         every = self._map(quantity, order, point.speed)
         return [weights @ every[k] for k in quantity.places([mount.name for mount in self.problem.engine.mounts])]
 
     def _map(self, quantity: Measure, order: float, speed: float) -> NDArray[np.complex128]:
-        """Forces or travels of all mounts per wrench, shape (mounts, 3, 6)."""
         if self._mounting is None:
             raise ValueError("an engine without mounts has no mount forces")
         if quantity.channel is channels.MOUNT_FORCE:
@@ -182,7 +179,6 @@ class UnevenModel:
         return np.stack([t.coefficients[-1] for t in travels if t is not None], axis=-1)
 
     def _gain(self, quantity: Measure, point: OperatingPoint) -> Callable[[float], float] | None:
-        """How much of a roll moment of an order mounts feel; None where that is the same for all."""
         if isinstance(self._mounting, RigidMounting):
             return None
         return lambda h: float(np.abs(self._map(quantity, h, point.speed)[:, :, 3]).max())
@@ -203,7 +199,6 @@ class UnevenModel:
         return found
 
     def _place(self, k: int, part: SliderCrank, at: Symbols) -> tuple[Any, Any]:
-        """Angle of a cylinder's own pin, and of its bank."""
         side = self.layout.side(k)
         bank = side * at.bank if at.bank is not None else part.bank
         offset = -side * at.split if at.split is not None else self.layout.pin_offsets[k]
@@ -239,7 +234,6 @@ def _throw_of(parts: Sequence[SliderCrank], layout: Layout, pin: int) -> float:
 
 
 def _turns_of(part: SliderCrank) -> int:
-    """Turns from the dead centre at -(theta + o - beta) to the one that fires."""
     return round((part.firing_angle + part.throw - part.bank) / math.tau)
 
 
@@ -260,7 +254,6 @@ def rides_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
 
 @lru_cache(maxsize=16)
 def _rides_of(phasing: Phasing, candidate: Candidate) -> dict[str, int]:
-    """The same of throws at even steps: what rides on a throw does so wherever it stands."""
     out = {}
     before = rotor_states(phasing.realise(candidate))
     for k in range(len(candidate.throws)):
