@@ -141,7 +141,10 @@ class AffineProblem:
         return float(np.bincount(self.groups or [0] * len(values), values).max(initial=0.0))
 
     def shared(self, shares: Array) -> AffineProblem:
-        """Return the problem with one sum, weighted by shares, in place of the largest; no more where shares add up to one."""
+        """Return the problem with the sums weighted by shares in place of the largest sum.
+
+        Its value is not larger where the shares add up to one.
+        """
         kept = [k for k, group in enumerate(self.groups) if shares[group] > 0.0]
         terms = tuple((self.terms[k][0] * float(shares[self.groups[k]]), self.terms[k][1]) for k in kept)
         return replace(self, terms=terms, groups=())

@@ -332,7 +332,10 @@ def limit_values(
     value: float = 0.0,
     unfelt: float = _FELT,
 ) -> tuple[LimitValue, ...]:
-    """Return value and price of each limit at a design (E15); a price below an `unfelt` share of the objective is zero."""
+    """Return value and price of each limit at a design (E15).
+
+    A price below an `unfelt` share of the objective is zero.
+    """
     return tuple(_limit_value(problem, limit, evaluation, prices, value, unfelt) for limit in problem.limits)
 
 
