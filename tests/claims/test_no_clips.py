@@ -24,7 +24,8 @@ ALLOWED = {
     "min(self._least, found.level)",
     "min(queue[0].bound if queue else math.inf, self._least, self.level)",
     # the least of the bounds of several stars
-    "min(known, float(star_bounds(costs, stars[[np.argmin(over)]])[0]))",
+    "min(known, float(star_bounds(costs, stars[[np.argmin(bounds)]])[0]))",
+    "min(known, float(bounds.min(initial=math.inf)))",
     # of an objective in ranks the least value that is known, when a walk finds a better one
     "min(rank.least, value)",
     # what springs do at most, and how much is worth looking at
