@@ -2,8 +2,9 @@
 
 Even stars of one pattern have the same forces, so that two of them differ by what couples load:
 V = V' + Re sum_h g_h (C_h - C'_h) e^{i h phi}, with g_h from two stars whose loads the exact model gives. Averages of V
-over shifts by s are no more, in a norm that no shift changes: with the weights 2 cos(h s), of mean size 4 / pi, one
-order V_h is left.
+over shifts by s are no more, in a norm that no shift changes. With the weights 2 cos(h s), of mean size 4 / pi, one
+order V_h is left. With 1 + cos(h s - psi) over firing intervals all that no couple changes is left, and half of that
+order at any phase.
 """
 
 from __future__ import annotations
@@ -31,9 +32,11 @@ from laufruhe.problem.problem import Problem
 
 ONE_ORDER = 4.0 / math.pi
 """Largest ratio of the norm of one order of a signal to that of the signal."""
-PHASES = 8
+PHASES, HALVINGS = 16, 24
 SMALL, SHORT = 0.01, 0.1
 """Share of what no couple changes, and lever [m], that planes touch the objective at."""
+ALIASES = 1.1
+"""Safety factor of orders that shifts by firing intervals do not separate from the one of the window."""
 _SAME, _NEGLIGIBLE = 1e-9, 1e-13
 _AT_ONCE = 1 << 22
 
@@ -138,7 +141,7 @@ class CoupleNorms:
     def _planes(self) -> tuple[Array, Array]:
         """Constants and slopes of linear functions under the objective (P2): few stars then need all rows."""
         shares = np.asarray(sum(term.shares for term in self.terms))
-        turns = np.exp(1j * np.arange(PHASES) * math.tau / PHASES)
+        turns = np.exp(1j * np.arange(PHASES // 2) * math.tau / (PHASES // 2))
         heavy = np.argsort(-shares, kind="stable")[:2]
         at = np.zeros((len(turns) ** len(heavy), len(self.orders)), dtype=complex)
         for row, chosen in zip(at, itertools.product(turns, repeat=len(heavy)), strict=True):
@@ -173,9 +176,28 @@ class CoupleNorms:
         place = int(np.argmax(shares))
         if len(self.terms) == 1 and self.terms[0].norm.is_euclidean:
             # squares of orders add up, so that what no couple changes leaves less room
-            value = math.sqrt((value - minimum) * (value + minimum))
-        most = value / float(shares[place])
+            most = math.sqrt((value - minimum) * (value + minimum)) / float(shares[place])
+        else:
+            most = self._reach(space, place, value, value / float(shares[place]))
         return Window(self.orders[place], complex(-most, -most), complex(most, most))
+
+    def _reach(self, space: StarSpace, place: int, value: float, most: float) -> float:
+        """Return the largest couple of an order whose half, at any phase, is worth no more than a value (S48)."""
+        order, levers = self.orders[place], float(np.abs(space.places).sum())
+        same = [
+            k for k, other in enumerate(self.orders)
+            if k != place and ((other - order) % space.phases == 0 or (other + order) % space.phases == 0)
+        ]  # fmt: skip
+        room = value + 0.5 * ALIASES * levers * sum(term.weight * float(term.alone[same].sum()) for term in self.terms)
+        turns = np.exp(1j * np.arange(PHASES) * math.tau / PHASES)
+        parts = np.zeros((PHASES, 2 * len(self.orders)))
+        parts[:, 2 * place], parts[:, 2 * place + 1] = turns.real, turns.imag
+        low = 0.0
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + most)
+            values = sum(term.values(0.5 * middle * parts) for term in self.terms)
+            low, most = (low, middle) if float(np.max(values)) > room else (middle, most)
+        return most
 
 
 def couple_norms(problem: Problem, space: StarSpace, stars: Sequence[Problem]) -> CoupleNorms | None:
