@@ -52,7 +52,7 @@ def relative(bound: float, value: float) -> float:
 
 
 def missed(measure: Measure, evaluation: Evaluation, finest: int = REFERENCE_SAMPLES) -> float:
-    """Return the most that the samples of an evaluation miss of a measure [its unit] (F7, F8)."""
+    """Return the most that the samples of an evaluation miss of a measure [its unit]; zero without samples (F7, F8)."""
     if measure.channel.simulation:
         return measure.channel.missed(evaluation.engine) * evaluation.value(measure)
     if measure.channel.of_torque:

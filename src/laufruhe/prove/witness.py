@@ -44,7 +44,7 @@ class Known:
 
     @cached_property
     def most(self) -> float:
-        """Return the value of the known design; the bound of any part that holds it must not exceed this."""
+        """Return the value, read finely where `read` is given, that no bound of a part with the design exceeds."""
         return self.value if self.read is None else self.read()
 
     def check(self, what: str, bound: float) -> None:

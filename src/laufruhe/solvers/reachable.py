@@ -121,7 +121,7 @@ def _wanted(found: Result, problem: Problem) -> Collection[str]:
 
 
 def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], found: Result, solve: Solve) -> _Answer:
-    """Return the value that a limit can reach under the others; of two sides, the second if the first can be met."""
+    """Return the value that a limit can reach under the others; of two sides the second if the first is no cause."""
     measure, nothing = limit.measure, Reached(limit.name, "at most", limit.maximum, limit.measure.unit)
     if limit.outside is not None:
         return _Answer(replace(nothing, why="a band is kept or not; no single value can be reached"))
