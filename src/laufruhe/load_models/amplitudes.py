@@ -51,7 +51,10 @@ class AmplitudeObjective:
     terms: tuple[AmplitudeTerm, ...]
 
     def values(self, space: StarSpace, stars: Stars, most: float = math.inf) -> Array:  # noqa: ARG002
-        """Return the objective of many stars, shape (n,); any number between `most` and a larger value may stand for it."""
+        """Return the objective of many stars, shape (n,).
+
+        Any number between `most` and a larger value may stand for it.
+        """
         return self._of_sums(star_sums(stars, space.phases, space.places, self.orders))
 
     def of_angles(self, places: Sequence[float], throws: Array) -> Array:

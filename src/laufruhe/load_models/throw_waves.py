@@ -82,7 +82,7 @@ class WaveNorm:
 
 
 def averages(problem: Problem, measure: Measure) -> bool:
-    """Return True if the rows are averages about angles: of means (P7), or of peaks that gas bends, which are no less."""
+    """Return True if the rows are averages about angles: of means (P7), or of peaks that gas bends (no less)."""
     bends = problem.has_gas and measure.feels_gas and measure.norm.refinement > 1
     return measure.is_load and (measure.norm.averages or bends)
 
