@@ -7,14 +7,14 @@ from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Reach
-from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, is_no_number
+from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, is_no_number, is_pointwise
 
 _HERE = "laufruhe.extensions.sizes"
 _ALONE = {Kind.SIZE: (Dependence.MASSES,), Kind.UNBALANCE: (Dependence.AFFINE,)}
 
 
 def _is_of_lengths(norm: Norm) -> bool:
-    return norm.is_convex and norm.of_row_lengths
+    return is_pointwise(norm) and norm.of_row_lengths
 
 
 def _minimises_loads(problem: Problem) -> bool:

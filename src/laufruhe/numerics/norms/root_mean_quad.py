@@ -26,7 +26,7 @@ class RootMeanQuad(Norm):
     """The fourth root of the mean of fourth powers."""
 
     name = "rmq"
-    is_convex = of_row_lengths = is_pointwise = True
+    is_convex = of_row_lengths = True
 
     def value(self, grid: Grid, rows: Array) -> float:
         """Return (sum_k w_k |v_k|^4)^(1/4)."""
