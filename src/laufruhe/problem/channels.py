@@ -31,7 +31,7 @@ from laufruhe.problem.decision import Kind
 from laufruhe.problem.loads import EvaluatedDesign, MeasureQuery, PointLoads
 
 Factor: TypeAlias = Callable[[Engine, OperatingPoint], NDArray[np.float64]]
-"""One over the sizes that bear a load, shape (places,) or (places, d)."""
+"""Inverse of the sizes that bear a load, shape (places,) or (places, d)."""
 OfWheel: TypeAlias = Callable[[Flywheel], float]
 OF_MOUNTS = frozenset({Kind.STIFFNESS, Kind.MOUNT})
 ON_BLOCK = ("operating_points", "orders", "alternating")
@@ -486,10 +486,8 @@ def _on_mounts(name: str, unit: str, needs: Need, signal: Callable[[PointLoads],
     return LoadChannel(name, unit, AT_MOUNTS, needs, signal=known, places=_names_of_mounts, of_wrench=True)
 
 
-def _resultant(loads: PointLoads) -> Spectrum:
-    if loads.mount_forces is None:
-        raise ValueError("this mounting has no resultant mount force")
-    return loads.mount_forces.each(lambda values: values.sum(axis=1, keepdims=True))
+def _summed(channel: LoadChannel) -> Callable[[PointLoads], Spectrum]:
+    return lambda loads: channel.signal(loads).each(lambda values: values.sum(axis=1, keepdims=True))
 
 
 _ON_CRANK: Where = (ON_BLOCK, Needs.NOTHING, lambda _: ("crankshaft",))
@@ -513,7 +511,9 @@ def _of_places(
 
 
 MOUNT_FORCE = _on_mounts("mount force", "N", Needs.MOUNTS, lambda loads: loads.mount_forces)
-RESULTANT_MOUNT_FORCE = LoadChannel("resultant mount force", "N", ON_BLOCK, Needs.MOUNTS, signal=_resultant)
+RESULTANT_MOUNT_FORCE = LoadChannel(
+    "resultant mount force", "N", needs=Needs.MOUNTS, signal=_summed(MOUNT_FORCE), of_wrench=True
+)
 MOUNT_TRAVEL = _on_mounts("mount travel", "m", Needs.ELASTIC, lambda loads: loads.mount_travel)
 AT_EACH_MOUNT = frozenset({MOUNT_FORCE, MOUNT_TRAVEL})
 """Loads for which bounds of mounts have formulas."""
