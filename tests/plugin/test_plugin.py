@@ -15,7 +15,7 @@ import pytest
 
 HERE = Path(__file__).parent
 UNBALANCE = (3.0 * 0.8 + 0.6) * 0.045
-"""Of half the reciprocating mass of six pistons and the rotating mass of the throw [kg m]."""
+"""Unbalance of half the reciprocating mass of six pistons and the rotating mass of the throw [kg m]."""
 SHAKING = UNBALANCE * (3000.0 * math.pi / 30.0) ** 2
 """Rotating force that it makes, the same all the cycle [N]."""
 PEAK = 0.5 * SHAKING

@@ -424,7 +424,7 @@ class _Reach:
 
 _Key: TypeAlias = tuple[int, tuple[float, float] | None]
 Reaches: TypeAlias = Sequence[dict[_Key, _Reach]]
-"""Of every term the reach of blocks, which does not change with the centre."""
+"""Reach of blocks of each term, which does not change with the centre."""
 
 
 def _reach(norm: AffineNorm, block: Block, cached: dict[_Key, _Reach]) -> _Reach:

@@ -1,4 +1,4 @@
-"""What a run-up and a shut-down through resonance reach (E28)."""
+"""Channels of the peaks of a run-up and a shut-down through resonance (E28)."""
 
 from __future__ import annotations
 

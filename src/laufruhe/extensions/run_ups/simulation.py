@@ -1,4 +1,4 @@
-"""What searches and bounds of mounts ask of run-ups: peaks with slopes, and bounds over boxes of stiffness."""
+"""Peaks of run-ups with slopes, and bounds over boxes of stiffness, for searches and bounds of mounts."""
 
 from __future__ import annotations
 
