@@ -90,7 +90,7 @@ class Search:
             return np.full(len(shares), 1e9), np.full((len(shares), 1), 1e9)
         return np.where(np.isfinite(value), value, 1e9), np.where(np.isfinite(over), over, 1e9)
 
-    def judged(self, shares: np.ndarray) -> tuple[float, float]:
+    def evaluate_design(self, shares: np.ndarray) -> tuple[float, float]:
         """Objective and largest excess with every order."""
         value, over = self.both(shares, self.own)
         return float(value[0]), float(over.max())
@@ -107,7 +107,7 @@ class Search:
         if limits:
             kept = min(ends, key=lambda z: float(self._excess(z)[0]))
             ends.append(self._least(kept, unit))
-        told = [(*self.judged(z), z) for z in ends]
+        told = [(*self.evaluate_design(z), z) for z in ends]
         least = min(over for _, over, _ in told)
         kept_all = [each for each in told if each[1] <= 0.0]
         best = min(kept_all, key=lambda each: each[0]) if kept_all else (math.inf, least, ends[0])
@@ -210,7 +210,7 @@ def judge(verdict: Any, table: Table, result: Any, rng: np.random.Generator, cal
         return
     x = vector(search.own, values)
     start = search.shares(x)
-    own, over = search.judged(start)
+    own, over = search.evaluate_design(start)
     floor = ROUNDED * abs(result.objective.initial or 1.0)
     asked = reading([term["quantity"] for term in terms_of(table)], table)
     told, bound = result.objective.value, result.certificate.lower_bound

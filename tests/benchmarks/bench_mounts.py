@@ -170,7 +170,7 @@ def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tup
     known: dict[bytes, tuple[float, np.ndarray]] = {}
     point = np.clip((np.concatenate([mounts, columns]) - low) / (high - low), 0.0, 1.0)
 
-    def judged(y: np.ndarray) -> tuple[float, np.ndarray]:
+    def evaluate_design(y: np.ndarray) -> tuple[float, np.ndarray]:
         """Objective, and the room under every limit."""
         x = low + y * (high - low)
         unbalances = [complex(a, b) for a, b in x[count:].reshape(-1, 2)]
@@ -187,7 +187,7 @@ def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tup
             if time.process_time() - began > SLSQP_SECONDS:
                 raise _LateError
             known.clear()
-            known[key] = judged(y)
+            known[key] = evaluate_design(y)
         return known[key]
 
     def remember(y: np.ndarray) -> None:
@@ -200,7 +200,7 @@ def _by_slsqp(problem: Problem, mounts: list[float], columns: np.ndarray) -> tup
             constraints={"type": "ineq", "fun": lambda y: seen(y)[1]}, options={"maxiter": 200, "ftol": 1e-9},
         ).x  # fmt: skip
     spent = time.process_time() - began
-    value, rooms = judged(np.clip(point, 0.0, 1.0))
+    value, rooms = evaluate_design(np.clip(point, 0.0, 1.0))
     return value, spent, bool(rooms.min() > -1e-5)
 
 

@@ -49,7 +49,7 @@ class Verdict:
     kind: str = ""
 
 
-def judged(cell: Any, folder: Path) -> Verdict:
+def evaluate_design(cell: Any, folder: Path) -> Verdict:
     """The verdict on a cell."""
     document = document_of(cell)
     path = folder / "problem.toml"

@@ -9,7 +9,7 @@ import pytest
 
 from lanes import first_fast
 from matrix.cells import Cell, cells
-from matrix.claims import judged
+from matrix.claims import evaluate_design
 
 SHARE, FAST, USUAL = 50, 10, 25
 # seconds, of a decision and a layout that other cells have
@@ -27,4 +27,4 @@ CELLS = _chosen()
 
 @pytest.mark.parametrize("cell", first_fast(CELLS, FAST, USUAL, [cell for cell in CELLS if str(cell) in LONG]), ids=str)
 def test_it_is_refused_in_one_line_or_every_claim_holds(cell: Cell, tmp_path: Path) -> None:
-    assert not judged(cell, tmp_path).broken
+    assert not evaluate_design(cell, tmp_path).broken

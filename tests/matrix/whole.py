@@ -15,7 +15,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from matrix.cells import Cell, cells, document_of, written
-from matrix.claims import Verdict, judged
+from matrix.claims import Verdict, evaluate_design
 
 OUT = Path(__file__).parents[2] / "results" / "matrix"
 
@@ -23,7 +23,7 @@ OUT = Path(__file__).parents[2] / "results" / "matrix"
 def _one(cell: Cell) -> tuple[Cell, Verdict, float]:
     started = time.perf_counter()
     with tempfile.TemporaryDirectory() as folder:
-        verdict = judged(cell, Path(folder))
+        verdict = evaluate_design(cell, Path(folder))
     return cell, verdict, time.perf_counter() - started
 
 

@@ -239,7 +239,7 @@ def load_text(drawn: Drawn, limits: list[str]) -> Problem:
 
 
 @dataclass(frozen=True)
-class Reached:
+class AttainableLimit:
     """What a search over the exact model reached: the least objective within all limits, and the least excess."""
 
     value: float
@@ -261,7 +261,7 @@ def values_at(problem: Problem, y: np.ndarray) -> list[Value]:
     return out
 
 
-def searched(problem: Problem, result: Result, seed: int, budget: int = 250) -> Reached:
+def searched(problem: Problem, result: Result, seed: int, budget: int = 250) -> AttainableLimit:
     """Differential evolution, and Nelder and Mead from what was found, by the exact model alone."""
     width = sum(decision.set.width for decision in problem.decisions)
     best = [np.inf, np.inf]
@@ -286,7 +286,7 @@ def searched(problem: Problem, result: Result, seed: int, budget: int = 250) -> 
             [start, *(start + 0.01 * e * (1 if s < 0.5 else -1) for s, e in zip(start, np.eye(width), strict=True))]
         )
         minimize(worth, start, method="Nelder-Mead", options={"maxfev": budget, "initial_simplex": simplex})
-    return Reached(best[0], best[1])
+    return AttainableLimit(best[0], best[1])
 
 
 def place_of(problem: Problem, result: Result) -> np.ndarray | None:

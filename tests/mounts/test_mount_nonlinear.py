@@ -19,10 +19,10 @@ from laufruhe.problem import channels
 from laufruhe.problem.channels import mounting_in
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Measure, Term
-from laufruhe.prove.best_first import Divided
+from laufruhe.prove.best_first import BoxResult
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import solve
-from laufruhe.solvers.conclusion import judged
+from laufruhe.solvers.conclusion import evaluate_design
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.mounts.bounds import divided_by
 from laufruhe.solvers.mounts.nonlinear import mounts_bound, solve_joint, solve_mounts
@@ -181,10 +181,10 @@ class ScriptedSearch:
 
     def __init__(self, problem, stiffness):
         self.problem = problem
-        self.best = self.chosen = SearchResult(judged(problem, stiffness), None)
+        self.best = self.chosen = SearchResult(evaluate_design(problem, stiffness), None)
 
     def again(self, places):
-        found = SearchResult(judged(self.problem, places[0][0]), None)
+        found = SearchResult(evaluate_design(self.problem, places[0][0]), None)
         is_better = found.rank < self.best.rank
         if is_better:
             self.best = self.chosen = found
@@ -204,7 +204,7 @@ def test_what_is_bounded_is_the_best_design_found_on_the_way(stiffness, asked, t
         value = question.value
         values.append(value)
         assert question.known.place == pytest.approx([number.real for number in question.near])
-        return Divided(0.9 * value, 3, (np.array(stiffness),) if len(values) == 1 else ())
+        return BoxResult(0.9 * value, 3, (np.array(stiffness),) if len(values) == 1 else ())
 
     monkeypatch.setattr("laufruhe.solvers.mounts.bounds.proven", by_provers)
     search = ScriptedSearch(problem, [2e5, 2e5])

@@ -9,13 +9,13 @@ import pytest
 
 from laufruhe.numerics.budget import limited
 from laufruhe.numerics.progress import Step, progress_listener
-from laufruhe.prove.best_first import EMPTY, Box, Division, Over, Parts, Waiting, divide, halves, widest
+from laufruhe.prove.best_first import EMPTY, Box, BranchAndBound, OpenNode, Over, Parts, divide, halves, widest
 
 # of random numbers in a row, those between two places bound a part from below
 Part = tuple[int, int]
 
 
-class Least(Division[Part]):
+class Least(BranchAndBound[Part]):
     """The least of numbers: a part's bound is the least of its own, less what its width leaves open."""
 
     what = "parts"
@@ -31,10 +31,10 @@ class Least(Division[Part]):
     def look(self, part: Part) -> None:
         self.value = min(self.value, float(self.numbers[part[0]]))
 
-    def is_done(self, one: Waiting[Part]) -> bool:
+    def is_fathomed(self, one: OpenNode[Part]) -> bool:
         return one.bound >= self.value
 
-    def parts(self, taken: list[Waiting[Part]]) -> Parts[Part]:
+    def parts(self, taken: list[OpenNode[Part]]) -> Parts[Part]:
         for bound, _, (first, last) in taken:
             self.looked.append(bound)
             if last - first == 1:

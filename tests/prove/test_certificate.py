@@ -18,7 +18,15 @@ from laufruhe.problem.decision import Decision, Domain, domains_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.numerical_zero import OF_ORDERS, ROUNDING, numerical_zero
 from laufruhe.problem.sets import Interval, Sector
-from laufruhe.prove.certificate import Multipliers, Proof, Reach, best_bound, certified, kkt_residual, lower_bound
+from laufruhe.prove.certificate import (
+    Multipliers,
+    Proof,
+    ProofStrength,
+    best_bound,
+    certified,
+    kkt_residual,
+    lower_bound,
+)
 from mounts.files import problem_of
 
 Array = NDArray[np.float64]
@@ -100,14 +108,14 @@ def random_multipliers(rng: np.random.Generator, problem: AffineProblem, x: Arra
 
 class TestGap:
     def test_is_a_share_of_the_value(self) -> None:
-        found = certified(2.0, 1.5, 1e-9, 1e-4, Reach.WHOLE, 0.0, "")
+        found = certified(2.0, 1.5, 1e-9, 1e-4, ProofStrength.WHOLE, 0.0, "")
         assert found.gap == pytest.approx(0.25)
         assert found.kind is Proof.WITHIN_GAP
 
     def test_what_is_nothing_beside_the_loads_counts_as_zero(self) -> None:
-        assert certified(1e-10, 0.0, 1e-9, 1e-4, Reach.ASIDE, 0.0, "").kind is Proof.GLOBAL
-        assert certified(0.0, 0.0, 0.0, 1e-4, Reach.ASIDE, 0.0, "").kind is Proof.GLOBAL
-        assert certified(1e-6, 0.0, 1e-9, 1e-4, Reach.ASIDE, 0.0, "").kind is Proof.LOCAL
+        assert certified(1e-10, 0.0, 1e-9, 1e-4, ProofStrength.ASIDE, 0.0, "").kind is Proof.GLOBAL
+        assert certified(0.0, 0.0, 0.0, 1e-4, ProofStrength.ASIDE, 0.0, "").kind is Proof.GLOBAL
+        assert certified(1e-6, 0.0, 1e-9, 1e-4, ProofStrength.ASIDE, 0.0, "").kind is Proof.LOCAL
 
     def test_nothing_is_a_rounding_of_the_parts_and_not_of_the_sum(self, tmp_path: Path) -> None:
         """A balanced six has the parts of a single cylinder six times; soft mounts have no resonance of their own."""

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from laufruhe.numerics.budget import limited
-from laufruhe.prove.best_first import Divided
+from laufruhe.prove.best_first import BoxResult
 from laufruhe.prove.mounts import provers
 from laufruhe.prove.mounts.provers import Prover, Question, proven
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
@@ -40,10 +40,10 @@ def test_each_has_its_turn_until_one_closes(
     asked = []
 
     def bounds_of(name: str, answers: list[tuple[float, int]]):
-        def bounds(question: Question) -> Iterator[Divided]:
+        def bounds(question: Question) -> Iterator[BoxResult]:
             for answer in answers:
                 asked.append((name, question.bound))
-                yield Divided(*answer, PLACE)
+                yield BoxResult(*answer, PLACE)
 
         return Prover(name, lambda _: True, bounds)
 

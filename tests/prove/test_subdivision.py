@@ -15,7 +15,7 @@ from laufruhe.errors import InputError
 from laufruhe.files.reader import load
 from laufruhe.problem.evaluation import evaluate, objective_value, remounted
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import Divided
+from laufruhe.prove.best_first import BoxResult
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.box_lines import LinearRelaxation
 from laufruhe.prove.mounts.box_norms import under
@@ -24,7 +24,7 @@ from laufruhe.prove.mounts.subdivision import StiffnessBoxes, divided_bounds, di
 from laufruhe.prove.witness import Known
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
-from laufruhe.solvers.mounts.places import judged_at
+from laufruhe.solvers.mounts.places import evaluate_design_at
 from mounts.files import BLOCK, ENGINE, MOUNTS, changed, problem_of
 from problem_files import PROBLEMS
 
@@ -47,9 +47,9 @@ orders = 24
 """
 
 
-def divided_bound(problem: Problem, value: float, room: float, known: Known | None = None) -> Divided:
+def divided_bound(problem: Problem, value: float, room: float, known: Known | None = None) -> BoxResult:
     """Return the bound by all boxes that are worth it; of no boxes zero."""
-    return next(divided_bounds(problem, value, room, (1.0,), known), Divided(0.0, 0))
+    return next(divided_bounds(problem, value, room, (1.0,), known), BoxResult(0.0, 0))
 
 
 ASKED = {
@@ -273,7 +273,7 @@ def test_where_boxes_are_least_is_a_design_too(tmp_path: Path) -> None:
     assert result.certificate is not None
     assert result.certificate.kind is Proof.GLOBAL
     low, high = problem.decisions[0].lower, problem.decisions[0].upper
-    found = [judged_at(problem, [x]) for x in np.geomspace(low, high, 60)]
+    found = [evaluate_design_at(problem, [x]) for x in np.geomspace(low, high, 60)]
     least = min(design.value for design in found if design is not None)
     assert result.objective is not None
     assert result.objective.value <= least * (1.0 + problem.tolerance)

@@ -17,10 +17,10 @@ from laufruhe.problem.evaluation import evaluate, with_fine_sampling
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers import Status, solve
+from laufruhe.solvers.attainable_limits import with_attainable_limits
 from laufruhe.solvers.conclusion import KEPT, broken_limits, state
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import is_infeasible
-from laufruhe.solvers.reachable import with_reachable
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.star_results import StarDesign
 
@@ -156,7 +156,7 @@ def test_a_design_that_few_angles_alone_allow_is_not_one_that_was_overlooked() -
         assert broken_limits(problem.limits, with_fine_sampling(result.final))
         return result
 
-    result = with_reachable(failed, problem, {Kind.UNBALANCE}, 1.0, decide)
+    result = with_attainable_limits(failed, problem, {Kind.UNBALANCE}, 1.0, decide)
     assert met == [True]
     assert not result.status.has_design
     assert result.nearest is not None

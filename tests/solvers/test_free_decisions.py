@@ -16,12 +16,12 @@ from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval
-from laufruhe.prove.certificate import Reach
+from laufruhe.prove.certificate import ProofStrength
 from laufruhe.report.json_result import as_dict
 from laufruhe.report.sections.decisions import tables
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
-from laufruhe.solvers.conclusion import Shown, concluded, judged
+from laufruhe.solvers.conclusion import ProofData, build_result, evaluate_design
 from laufruhe.solvers.cones.equal_designs import FREE, free_decisions, ranges_of
 from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
@@ -164,11 +164,13 @@ def test_nothing_is_told_where_it_is_not_looked_at() -> None:
 def test_prices_within_the_accuracy_are_none() -> None:
     """A slope that moves the objective by less than what is not proven has no price; one that is felt has."""
     problem = problem_of("mean mount force", [web("web")])
-    design = judged(problem, [0.0])
+    design = evaluate_design(problem, [0.0])
     scale = design.value / 2.0
     for slope, priced in ((1e-10, False), (5e-5, False), (1e-2, True)):
-        shown = Shown(design.value * (1.0 - 1e-4), Reach.WHOLE, 0.0, "", {}, {"web.mass": Price.both(slope * scale)})
-        (told,) = concluded(design, design.evaluation, shown, {}).decisions
+        shown = ProofData(
+            design.value * (1.0 - 1e-4), ProofStrength.WHOLE, 0.0, "", {}, {"web.mass": Price.both(slope * scale)}
+        )
+        (told,) = build_result(design, design.evaluation, shown, {}).decisions
         assert told.at_bound
         assert told.shadow_price == (pytest.approx(slope * scale) if priced else 0.0)
 

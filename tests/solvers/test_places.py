@@ -20,7 +20,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.boxes.places import PlaceSearch, _Box
-from laufruhe.solvers.conclusion import judged
+from laufruhe.solvers.conclusion import evaluate_design
 from laufruhe.studies.trade import trade
 from problem_files import READY
 
@@ -326,7 +326,7 @@ def test_a_limit_on_a_distance_costs_what_its_shaft_would_gain(limit: str, low: 
     slope = {z: (value(z + 1e-5) - value(z - 1e-5)) / 2e-5 for z in (0.06, -0.06)}
     z = min(slope, key=lambda z: slope[z] * z)
     assert slope[z] * z < 0.0
-    prices = PlaceSearch(problem).prices(judged(problem, [z]))
+    prices = PlaceSearch(problem).prices(evaluate_design(problem, [z]))
     assert list(prices) == [(problem.limits[0], "at most")]
     (price,) = prices.values()
     assert price.relaxed == pytest.approx(abs(slope[z]), rel=1e-3)

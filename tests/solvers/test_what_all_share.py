@@ -9,9 +9,9 @@ import pytest
 from laufruhe import load, solve
 from laufruhe.errors import ModelError
 from laufruhe.problem.evaluation import evaluate, objective_value
-from laufruhe.prove.certificate import Proof, Reach
+from laufruhe.prove.certificate import Proof, ProofStrength
 from laufruhe.solvers import Status
-from laufruhe.solvers.conclusion import Shown, concluded, judged
+from laufruhe.solvers.conclusion import ProofData, build_result, evaluate_design
 from problem_files import PROBLEMS, loaded
 
 BLOCK = """
@@ -108,11 +108,11 @@ def test_a_design_worse_than_the_one_given_is_not_proposed() -> None:
     """Whatever a method proposes: the design as given takes its place, with the bound that was proven."""
     problem = load(PROBLEMS / "tractor-four-lanchester.toml")
     given = evaluate(problem)
-    worse = judged(problem, [-decision.upper for decision in problem.decisions])
+    worse = evaluate_design(problem, [-decision.upper for decision in problem.decisions])
     value = objective_value(problem, given)
     assert worse.value > value
-    shown = Shown(0.5 * value, Reach.WHOLE, 0.0, "a guess")
-    result = concluded(worse, given, shown, {})
+    shown = ProofData(0.5 * value, ProofStrength.WHOLE, 0.0, "a guess")
+    result = build_result(worse, given, shown, {})
     assert result.objective is not None
     assert result.certificate is not None
     assert result.objective.value == value

@@ -21,7 +21,7 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.report.trade import INDEX, choices, index, trade_document
 from laufruhe.solvers.conclusion import decision_values, state
-from laufruhe.solvers.nearby import NEAR_BOXES, _begun, _is_like, first_of, next_to
+from laufruhe.solvers.warm_start import NEAR_BOXES, _begun, _is_like, first_of, next_to
 from laufruhe.studies.trade import Row, Trade, trade
 from problem_files import PROBLEMS
 

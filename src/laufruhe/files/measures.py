@@ -24,7 +24,7 @@ from laufruhe.problem.measure import (
     MEASURES,
     Limit,
     Measure,
-    Rank,
+    PriorityLevel,
     Term,
     counted_parts,
     counted_rotors,
@@ -228,7 +228,9 @@ def as_tuple(entries: Sequence[T] | None) -> tuple[T, ...] | None:
     return None if entries is None else tuple(entries)
 
 
-def objectives_of(tables: Sequence[ObjectiveTable] | None, scene: Scene, single: Sequence[str]) -> tuple[Rank, ...]:
+def objectives_of(
+    tables: Sequence[ObjectiveTable] | None, scene: Scene, single: Sequence[str]
+) -> tuple[PriorityLevel, ...]:
     """Return the objectives in order of priority; by default the mean mount force.
 
     Parameters
@@ -237,7 +239,7 @@ def objectives_of(tables: Sequence[ObjectiveTable] | None, scene: Scene, single:
         Keys of the file that require a single objective.
     """
     if tables is None:
-        return (Rank((Term(MEAN_MOUNT_FORCE),)),) if scene.engine.mounts else ()
+        return (PriorityLevel((Term(MEAN_MOUNT_FORCE),)),) if scene.engine.mounts else ()
     if not tables:
         raise Refused("objective", [], "is empty", "leave it out, or say what is to be minimised")
     if len(tables) > 1 and single:
@@ -255,7 +257,7 @@ def objectives_of(tables: Sequence[ObjectiveTable] | None, scene: Scene, single:
         if not is_last and "max" not in terms[0].measure.channel.sides:
             rule = "stands before other objectives, and has no largest value to limit"
             raise Refused(f"{where}.minimise", terms[0].measure.name, rule, "put it last")
-        ranks.append(Rank(terms, table.within or 0.0))
+        ranks.append(PriorityLevel(terms, table.within or 0.0))
     return tuple(ranks)
 
 

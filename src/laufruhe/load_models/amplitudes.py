@@ -94,7 +94,7 @@ def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> A
     single = _one_throw(engine, layout)
     if single is None or not all(_is_amplitude(term) for term in problem.objective):
         return None
-    if not _limits_idle(problem, phasing, layout):
+    if not _limits_massless(problem, phasing, layout):
         return None
     x = layout.throw_positions[0]
     silent = tuple(replace(point, gas=None) for point in problem.points)
@@ -115,7 +115,7 @@ def amplitude_objective(problem: Problem, phasing: Phasing, layout: Layout) -> A
     )
 
 
-def _limits_idle(problem: Problem, phasing: Phasing, layout: Layout) -> bool:
+def _limits_massless(problem: Problem, phasing: Phasing, layout: Layout) -> bool:
     # even stars share the limited forces where the counts on the steps are the same
     if not problem.limits:
         return True

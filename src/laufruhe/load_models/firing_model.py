@@ -14,7 +14,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from laufruhe.load_models.lone_parts import lone, working
+from laufruhe.load_models.isolated_cylinders import isolate, working
 from laufruhe.load_models.star_model import StarModel, StarNorm, StarProblem, normalised
 from laufruhe.machine.firing import even_patterns, firing_lattice, slot_order, slot_steps
 from laufruhe.numerics.spectrum import Spectrum
@@ -102,7 +102,7 @@ class FiringModel(StarModel):
         part = engine.slider_cranks[k]
         first = replace(part, throw=part.throw + part.shaft.ratio * part.firing_angle, firing_angle=0.0)
         # the others stand idle: one cylinder sends its torque through the journals of the next
-        alone = lone(engine, k, True, first)
+        alone = isolate(engine, k, True, first)
         found = []
         for at, point in zip(self._fired.loads, working(self.problem, part.name).points, strict=True):
             signal = load.signal(replace(at, point=point, moving=alone))

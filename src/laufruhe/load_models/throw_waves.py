@@ -20,7 +20,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import MOST_NUMBERS, AffineModel, AffineNorm
-from laufruhe.load_models.lone_parts import QUARTERS, leaning, lone, motored, only_rotors, working
+from laufruhe.load_models.isolated_cylinders import QUARTERS, isolate, leaning, motored, only_rotors, working
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.norms.norm import amplitudes, mean_square
@@ -150,7 +150,7 @@ class ThrowWaves:
             acting, late = working(self.problem, part.name), layout.late[k] if layout.late else 0.0
             banks = QUARTERS if self._opened[0] else (layout.banks[k],)
             turned = (replace(part, bank=bank, throw=bank, firing_angle=late) for bank in banks)
-            found = tuple(evaluate(acting, lone(engine, k, inside, each)) for each in turned)
+            found = tuple(evaluate(acting, isolate(engine, k, inside, each)) for each in turned)
             # what is not open makes the cylinder later, or sooner
             ahead = 0.0 if self._opened[0] else -layout.banks[k]
             yield Moving(pin, k, found, ahead + (0.0 if self._opened[1] else layout.pin_offsets[k]), {})

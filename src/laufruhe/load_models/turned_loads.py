@@ -18,8 +18,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from laufruhe.load_models.isolated_cylinders import QUARTERS, isolate, leaning, motored, only_rotors, working
 from laufruhe.load_models.lines import Lines, summed
-from laufruhe.load_models.lone_parts import QUARTERS, leaning, lone, motored, only_rotors, working
 from laufruhe.machine import Engine, Rotor
 from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.numerics.spectrum import Spectrum
@@ -127,7 +127,7 @@ class TurnedLoads:
     def _of_cylinder(self, k: int, bank: float) -> Spectrum:
         engine = self._problem.engine
         part = replace(engine.slider_cranks[k], bank=bank, throw=bank, firing_angle=0.0)
-        return self._loaded(working(self._point, part.name), lone(engine, k, self._beside, part))
+        return self._loaded(working(self._point, part.name), isolate(engine, k, self._beside, part))
 
     def _of_unit(self, rotor: Rotor) -> list[Spectrum]:
         engine = self._problem.engine

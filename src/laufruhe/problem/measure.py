@@ -132,7 +132,7 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Rank:
+class PriorityLevel:
     """An objective in order of priority, minimised among the optima of those before it.
 
     Attributes

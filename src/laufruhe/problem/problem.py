@@ -17,7 +17,7 @@ from laufruhe.machine import Engine, OperatingPoint
 from laufruhe.physics.fidelity import EXACT, Fidelity
 from laufruhe.physics.willans import FrictionTest
 from laufruhe.problem.decision import Decision, Numbers, moved_numbers
-from laufruhe.problem.measure import Limit, Measure, Rank, Term
+from laufruhe.problem.measure import Limit, Measure, PriorityLevel, Term
 from laufruhe.problem.phasing import PhasingOf
 from laufruhe.problem.plausibility import plausibility_warnings
 from laufruhe.problem.sets import Value
@@ -195,7 +195,7 @@ class Problem:
     extras: tuple[Extra, ...] = ()
     origin: Origin | None = field(default=None, compare=False, repr=False)
     sharply: bool = False
-    ranks: tuple[Rank, ...] = ()
+    ranks: tuple[PriorityLevel, ...] = ()
     fires_together: bool = False
     friction: tuple[FrictionTest, ...] = ()
     known_rows: Mapping[Measure, KnownRows] = field(default_factory=dict, compare=False, repr=False)

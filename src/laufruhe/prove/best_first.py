@@ -31,7 +31,7 @@ EDGE = 0.1
 MOST_PLACES = 3
 
 
-class Waiting(NamedTuple, Generic[P]):
+class OpenNode(NamedTuple, Generic[P]):
     """A part, what no design in it goes under, and the place in which it came: of two alike the earlier goes first."""
 
     bound: float
@@ -53,7 +53,7 @@ Parts: TypeAlias = Iterable[tuple[float, P] | Over]
 """Parts with their raw bounds, or what is proven of a part of which nothing is left to divide."""
 
 
-class Division(Generic[P]):
+class BranchAndBound(Generic[P]):
     """Parts of what is open; a method says what they are, and what bounds them.
 
     Attributes
@@ -86,7 +86,7 @@ class Division(Generic[P]):
     known: Known | None = None
     of_objective: bool = True
     seen: int
-    waiting: list[Waiting[P]]
+    waiting: list[OpenNode[P]]
     complete: bool
     _least: float
 
@@ -107,15 +107,15 @@ class Division(Generic[P]):
     def look(self, part: P) -> None:
         """Seek a design in a part whose turn it is."""
 
-    def is_done(self, one: Waiting[P]) -> bool:
+    def is_fathomed(self, one: OpenNode[P]) -> bool:
         """Return True if neither this part nor any part with a higher bound need be divided."""
         raise NotImplementedError
 
-    def parts(self, taken: Sequence[Waiting[P]]) -> Parts[P]:
+    def parts(self, taken: Sequence[OpenNode[P]]) -> Parts[P]:
         """Parts that cover those taken."""
         raise NotImplementedError
 
-    def coming(self, count: int) -> Sequence[Waiting[P]]:
+    def coming(self, count: int) -> Sequence[OpenNode[P]]:
         """Return the next `count` waiting parts, or fewer, lowest bound first."""
         return heapq.nsmallest(count, self.waiting)
 
@@ -138,7 +138,7 @@ class Division(Generic[P]):
             self._least = root.level
         else:
             self._check(*root)
-            self.waiting.append(Waiting(root[0], 0, root[1]))
+            self.waiting.append(OpenNode(root[0], 0, root[1]))
         return self.further(most)
 
     def further(self, most: int) -> float:
@@ -146,7 +146,7 @@ class Division(Generic[P]):
         queue, self.complete = self.waiting, True
         while queue:
             self.look(queue[0].part)
-            if self.is_done(queue[0]):
+            if self.is_fathomed(queue[0]):
                 break
             self.complete = self.seen < most and not passed()
             if not self.complete:
@@ -154,7 +154,7 @@ class Division(Generic[P]):
             known = (self.value, queue[0].bound) if self.of_objective else (math.inf, -math.inf)
             report_progress(self.what, self.seen, 0, *known)
             taken = [heapq.heappop(queue)]
-            while queue and len(taken) < self.at_once and not self.is_done(queue[0]):
+            while queue and len(taken) < self.at_once and not self.is_fathomed(queue[0]):
                 taken.append(heapq.heappop(queue))
             for found in self.parts(taken):
                 self.seen += 1
@@ -165,7 +165,7 @@ class Division(Generic[P]):
                 self._check(bound, part)
                 # the one place where parts are left out by what is known
                 if bound < self.enough:
-                    heapq.heappush(queue, Waiting(bound, self.seen, part))
+                    heapq.heappush(queue, OpenNode(bound, self.seen, part))
                 else:
                     self._least = min(self._least, bound)
         return min(queue[0].bound if queue else math.inf, self._least, self.level)
@@ -198,7 +198,7 @@ def widest(lower: Array, upper: Array, whole: Array) -> int:
 
 
 @dataclass(frozen=True, eq=False)
-class Divided:
+class BoxResult:
     """Outcome of dividing the bounds of open numbers.
 
     Attributes
@@ -216,7 +216,7 @@ class Divided:
     places: tuple[Array, ...] = ()
 
 
-class Halving(Division[Box]):
+class BoxBisection(BranchAndBound[Box]):
     """Boxes halved until none may hold a design that is `room` better than `value`."""
 
     def __init__(self, value: float, room: float, known: Known | None = None) -> None:
@@ -232,7 +232,7 @@ class Halving(Division[Box]):
         at = None if self.known is None else self.known.place
         return at is not None and bool(np.all(box.lower <= at) and np.all(at <= box.upper))
 
-    def is_done(self, one: Waiting[Box]) -> bool:
+    def is_fathomed(self, one: OpenNode[Box]) -> bool:
         """Return True if no design in the box beats the known value by more than the room."""
         return not one.bound < self.enough
 
@@ -240,20 +240,20 @@ class Halving(Division[Box]):
         """Halves of boxes and their own bounds, or what is proven of those of which nothing is left."""
         raise NotImplementedError
 
-    def parts(self, taken: Sequence[Waiting[Box]]) -> Parts[Box]:
+    def parts(self, taken: Sequence[OpenNode[Box]]) -> Parts[Box]:
         """Halves, of which none has a bound under that of the whole."""
         for k, found in enumerate(self.halved([one.part for one in taken])):
             yield found if isinstance(found, Over) else (max(taken[k // 2].bound, found[0]), found[1])
 
-    def run(self, root: tuple[float, Box] | Over, most: int) -> Divided:
+    def run(self, root: tuple[float, Box] | Over, most: int) -> BoxResult:
         """Divide the root box, and return the proven bound and the middles of the least boxes left."""
         return self.found(self.divide(root, most))
 
-    def found(self, bound: float) -> Divided:
+    def found(self, bound: float) -> BoxResult:
         """Return a result with this bound, the boxes seen, and the middles of the least boxes left."""
         least = [one.part for one in self.coming(MOST_PLACES) if one.bound < self.enough]
         places = tuple(0.5 * (box.lower + box.upper) for box in least)
-        return Divided(bound, self.seen, places)
+        return BoxResult(bound, self.seen, places)
 
 
 class BoxBounds(Protocol):
@@ -269,7 +269,7 @@ class BoxBounds(Protocol):
         """Least objective on every box, infinite where no design is allowed; and the side worth halving."""
 
 
-class Bounded(Halving):
+class BoxSearch(BoxBisection):
     """Boxes with bounds found by someone else."""
 
     def __init__(self, search: BoxBounds, value: float, room: float, known: Known | None = None) -> None:
@@ -313,17 +313,17 @@ class Around:
 
 def divide(
     search: BoxBounds, lower: Array, upper: Array, value: float, room: float, most: int, known: Known | None = None
-) -> Divided:  # fmt: skip
+) -> BoxResult:  # fmt: skip
     """Halve boxes, the least first, until none may hold a design that is `room` better than `value`."""
-    return next(divided_on(search, lower, upper, value, room, [most], known))
+    return next(divide_in_rounds(search, lower, upper, value, room, [most], known))
 
 
-def divided_on(
+def divide_in_rounds(
     search: BoxBounds, lower: Array, upper: Array, value: float, room: float, most: Sequence[int],
     known: Known | None = None,
-) -> Iterator[Divided]:  # fmt: skip
+) -> Iterator[BoxResult]:  # fmt: skip
     """The same up to each of these numbers of boxes, one after the other."""
-    division = Bounded(search, value, room, known)
+    division = BoxSearch(search, value, room, known)
     for k, count in enumerate(most):
         found = (
             division.found(division.further(count)) if k else division.run(division.bounded([(lower, upper)])[0], count)

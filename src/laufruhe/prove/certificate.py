@@ -52,7 +52,7 @@ STRENGTH = (Proof.NONE, Proof.LOCAL, Proof.WITHIN_GAP, Proof.GLOBAL).index
 """Of a proof: of several together the weakest counts."""
 
 
-class Reach(StrEnum):
+class ProofStrength(StrEnum):
     """Degree of optimality that the bound of a method can prove."""
 
     WHOLE = "closes on the optimum, however long that takes"
@@ -67,8 +67,8 @@ NEAR = 0.05
 
 
 def certified(
-    value: float, bound: float, nothing: float, tolerance: float, reach: Reach, kkt_residual: float, method: str,
-    doubt: float = 0.0,
+    value: float, bound: float, nothing: float, tolerance: float, reach: ProofStrength, kkt_residual: float,
+    method: str, doubt: float = 0.0,
 ) -> Certificate:  # fmt: skip
     """Return the certificate of a design; a bound that contradicts its value is reported, and proves nothing.
 
@@ -86,18 +86,18 @@ def certified(
     # no norm lies under zero
     value, bound = float(value), max(float(bound), 0.0)
     if not check_bound(method, bound, value, nothing + doubt):
-        return withheld(value, kkt_residual, method)
+        return unproven_certificate(value, kkt_residual, method)
     gap = gap_of(value, bound, nothing)
     if gap <= tolerance:
         kind = Proof.GLOBAL
-    elif reach is Reach.WHOLE or (reach is Reach.NEAR and gap <= NEAR):
+    elif reach is ProofStrength.WHOLE or (reach is ProofStrength.NEAR and gap <= NEAR):
         kind = Proof.WITHIN_GAP
     else:
         kind = Proof.LOCAL
     return Certificate(kind, bound, gap, kkt_residual, method)
 
 
-def withheld(value: float, kkt_residual: float, method: str) -> Certificate:
+def unproven_certificate(value: float, kkt_residual: float, method: str) -> Certificate:
     """Return the certificate of a design of which nothing is claimed."""
     return Certificate(Proof.NONE, 0.0, gap_of(value, 0.0, 0.0), kkt_residual, method)
 

@@ -27,7 +27,7 @@ from laufruhe.report.versions import versions
 from laufruhe.report.wording import why_star
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.ranking import RankedStar
-from laufruhe.solvers.values import Nearest, ObjectiveValue, Reached
+from laufruhe.solvers.values import AttainableLimit, Nearest, ObjectiveValue
 
 Record = dict[str, Any]
 
@@ -288,5 +288,5 @@ def _reached(result: Result) -> Record:
     return {"reached": reached, "nearest": near and {**_attributes(near, f"{names} excess broken"), **_values(near)}}
 
 
-def _values(design: Reached | Nearest) -> Record:
+def _values(design: AttainableLimit | Nearest) -> Record:
     return {"decisions": {d.name: _attributes(d, "value unit") for d in design.decisions}}

@@ -14,7 +14,7 @@ from laufruhe.present.tables import Table
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.report.document import Block, Bullets, Code, Document, Illustration, Paragraph
 from laufruhe.report.strict_json import strict
-from laufruhe.solvers.nearby import compares_stars
+from laufruhe.solvers.warm_start import compares_stars
 from laufruhe.studies.trade import KEEPS, REFERENCE_NAME, Row, Trade, is_local, is_open
 
 TITLE = "Speed against accuracy"
@@ -75,8 +75,8 @@ def trade_document(trade: Trade, picture: str | None, command: str) -> Document:
     if not trade.whole:
         blocks.append(Paragraph("Stopped at the time limit: fidelities beyond the last row were not measured."))
     mounts = OF_MOUNTS if problem.mount_decisions and problem.load_terms else ""
-    searched = OF_STARS if compares_stars(problem) else LOCAL if is_local(problem) else ""
-    blocks.append(Paragraph(COLUMNS + searched + mounts, marked=True))
+    search_note = OF_STARS if compares_stars(problem) else LOCAL if is_local(problem) else ""
+    blocks.append(Paragraph(COLUMNS + search_note + mounts, marked=True))
     static = static_sentence(problem, evaluate_start(problem)) if problem.load_terms else ""
     blocks.extend(Paragraph(line) for line in (*([static] if static else []), *trade.left_out, *_beyond(trade)))
     return Document(f"{TITLE}: {problem.title}", (*blocks, Code(command)))

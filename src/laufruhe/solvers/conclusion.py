@@ -21,7 +21,7 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Certificate, Proof, Reach, certified, gap_of
+from laufruhe.prove.certificate import Certificate, Proof, ProofStrength, certified, gap_of
 from laufruhe.prove.witness import Known
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.prices import ACTIVE, Price, angle_name
@@ -75,7 +75,7 @@ class Design:
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class ProofData:
     """Proof of a method for the best design that it proposes.
 
     Attributes
@@ -93,14 +93,14 @@ class Shown:
     """
 
     bound: float
-    reach: Reach
+    reach: ProofStrength
     kkt_residual: float
     method: str
     prices: Mapping[Side, Price] = field(default_factory=dict)
     bounds: Mapping[str, Price] = field(default_factory=dict)
 
 
-def judged(problem: Problem, values: Sequence[Value], samples: int | None = None) -> Design:
+def evaluate_design(problem: Problem, values: Sequence[Value], samples: int | None = None) -> Design:
     """A design by the exact model.
 
     Raises
@@ -114,7 +114,7 @@ def judged(problem: Problem, values: Sequence[Value], samples: int | None = None
     return Design(problem, tuple(values), evaluation, value, evaluation.excess(problem.limits))
 
 
-def given_design(problem: Problem, initial: Evaluation) -> Design | None:
+def initial_design(problem: Problem, initial: Evaluation) -> Design | None:
     """The design as given; None where it has no loads."""
     if initial.resonance:
         return None
@@ -204,7 +204,7 @@ def _doubt(problem: Problem, evaluation: Evaluation, prices: Mapping[Side, Price
     return missing
 
 
-def concluded(design: Design, initial: Evaluation, shown: Shown, timing: dict[str, float]) -> Result:
+def build_result(design: Design, initial: Evaluation, shown: ProofData, timing: dict[str, float]) -> Result:
     """The result of a design, or of the one given where that is better."""
     problem = design.problem
     given = objective_value(problem, initial)
@@ -290,7 +290,9 @@ def contradiction(conflict: Sequence[str]) -> str:
     return f"no design exists: {names} {verb}"
 
 
-def none_within(problem: Problem, initial: Evaluation, conflict: tuple[str, ...], timing: dict[str, float]) -> Result:
+def infeasible_result(
+    problem: Problem, initial: Evaluation, conflict: tuple[str, ...], timing: dict[str, float]
+) -> Result:
     """Return an infeasible result with the conflicting limits and the limit values of the initial design."""
     return Result(
         problem=problem,
@@ -304,10 +306,10 @@ def none_within(problem: Problem, initial: Evaluation, conflict: tuple[str, ...]
     )
 
 
-def not_found(problem: Problem, initial: Evaluation, names: Sequence[str], timing: dict[str, float]) -> Result:
+def failed_result(problem: Problem, initial: Evaluation, names: Sequence[str], timing: dict[str, float]) -> Result:
     """Return a failed result: the search found no feasible design, and nothing proves that none exists."""
     why = f"no design was found that keeps {quoted(tuple(names))}, and none is excluded; relax it, or give more time"
-    return replace(none_within(problem, initial, (), timing), status=Status.FAILED, message=why)
+    return replace(infeasible_result(problem, initial, (), timing), status=Status.FAILED, message=why)
 
 
 def broken_limits(limits: Sequence[Limit], evaluation: Evaluation) -> tuple[str, ...]:

@@ -20,10 +20,10 @@ from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Reach
-from laufruhe.solvers.conclusion import concluded, judged, values_of
+from laufruhe.prove.certificate import ProofStrength
+from laufruhe.solvers.conclusion import build_result, evaluate_design, values_of
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, searched, shown
+from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, shown, spread_starts
 from laufruhe.solvers.stars.phasing_solver import even_stars, solve_each_order
 from laufruhe.solvers.stars.star_results import no_star
 from laufruhe.solvers.throws.moved_throws import solve_moved_throws
@@ -61,19 +61,19 @@ def solve_generally(
     initial, program = evaluate_start(problem), LocalProgram.of(problem)
     # what cannot be evaluated is refused first
     objective_value(problem, initial)
-    places = [*map(program.shares, (problem.start, *near)), *looks(problem)]
+    places = [*map(program.shares, (problem.start, *near)), *spread_starts(problem)]
     modelled = time.perf_counter()
-    best = searched(program, places, problem.search.starts)
+    best = best_local_optimum(program, places, problem.search.starts)
     inner = tuple(decision for decision in problem.decisions if decision.kind in INNER)
     if 0 < len(inner) < len(problem.decisions) and by_cones(problem.changed(decisions=inner)):
         best = _in_turns(program, best, decide)
-    design = judged(problem, program.values(best))
+    design = evaluate_design(problem, program.values(best))
     text = f"local programs from the best of {counted(len(places), 'start')}"
-    found = shown(program, design, 0.0, Reach.ASIDE, text)
+    found = shown(program, design, 0.0, ProofStrength.ASIDE, text)
     # gas and speeds may follow from open numbers
     own = replace(problem, points=tuple(loads.point for loads in design.evaluation.loads))
     timing = {"model": modelled - started, "solve": time.perf_counter() - modelled}
-    return concluded(replace(design, problem=own), initial, found, timing)
+    return build_result(replace(design, problem=own), initial, found, timing)
 
 
 def _in_turns(program: LocalProgram, best: Array, decide: Decide) -> Array:
@@ -91,7 +91,7 @@ def _in_turns(program: LocalProgram, best: Array, decide: Decide) -> Array:
             break
         values |= dict(zip((d.name for d in held.decisions), own, strict=True))
         by_cones = program.shares([values[decision.name] for decision in problem.decisions])
-        best = min(best, searched(program, [by_cones], 1), by_cones, key=program.rank)
+        best = min(best, best_local_optimum(program, [by_cones], 1), by_cones, key=program.rank)
         if program.rank(best)[1] >= before[1] * (1.0 - GAIN):
             break
     return best

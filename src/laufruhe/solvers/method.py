@@ -14,7 +14,7 @@ from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence, dependence, kinds_of
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Reach
+from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.accuracy import solve_within
 from laufruhe.solvers.result import Result
 
@@ -74,7 +74,7 @@ class Method:
 
     name: str
     needs: Mapping[Kind, Collection[Dependence]]
-    reach: Reach
+    reach: ProofStrength
     home: str
     judges_fidelity: bool = False
     knows: frozenset[Channel] = frozenset()

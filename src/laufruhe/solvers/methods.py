@@ -30,22 +30,30 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Proof, Reach
-from laufruhe.solvers.apart import is_apart, solve_apart
+from laufruhe.prove.certificate import Proof, ProofStrength
+from laufruhe.solvers.attainable_limits import with_attainable_limits
 from laufruhe.solvers.boxes.place_boxes import without_places
-from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, judged, none_within, with_limits
+from laufruhe.solvers.conclusion import (
+    KEPT,
+    ProofData,
+    broken_limits,
+    build_result,
+    evaluate_design,
+    infeasible_result,
+    with_limits,
+)
 from laufruhe.solvers.cones.equal_designs import free_decisions
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts
-from laufruhe.solvers.in_order import solve_in_order
+from laufruhe.solvers.decomposition import is_separable, solve_decomposed
+from laufruhe.solvers.failed_proof import without_proof
+from laufruhe.solvers.lexicographic import solve_in_order
 from laufruhe.solvers.method import BUILT, OF_MOUNTS, OF_SIZES_ALONE, Method, by_home, is_no_number, is_pointwise
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex
-from laufruhe.solvers.reachable import with_reachable
-from laufruhe.solvers.relaxed import solve_relaxed
+from laufruhe.solvers.relaxation import solve_by_relaxation
 from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.sampling_refinement import refine_sampling, violation_at_fine_sampling
 from laufruhe.solvers.stars.shaft_collisions import exclude_collisions
-from laufruhe.solvers.told_limits import solve_told, told_excess
 from laufruhe.solvers.walk import walked
-from laufruhe.solvers.withheld import without_proof
 
 LIBRARIES = ("casadi", "clarabel", "cvxpy")
 """Packages that are imported where something open needs them, named as their modules."""
@@ -53,9 +61,9 @@ CUT_SHORT = "stopped at the time limit"
 Decide = Callable[[Problem], Result]
 
 
-def solve_each_apart(problem: Problem) -> Result:
+def solve_separable(problem: Problem) -> Result:
     """Parts of what is open, each by its own method."""
-    return solve_apart(problem, _decided)
+    return solve_decomposed(problem, _decided)
 
 
 def solve_with_places(problem: Problem) -> Result:
@@ -72,7 +80,7 @@ def solve_with_places(problem: Problem) -> Result:
 
 
 def _closes_without_places(problem: Problem) -> bool:
-    return Kind.PLACE in kinds_of(problem) and _method(without_places(problem)).reach is Reach.WHOLE
+    return Kind.PLACE in kinds_of(problem) and _method(without_places(problem)).reach is ProofStrength.WHOLE
 
 
 def solve_all_numbers(problem: Problem, near: Sequence[Sequence[Value]] = ()) -> Result:
@@ -84,7 +92,7 @@ def _is_rigid(problem: Problem) -> bool:
     return problem.engine.block is None and not problem.fidelity.is_uneven
 
 
-def _tells_stars_apart(problem: Problem) -> bool:
+def _distinguishes_stars(problem: Problem) -> bool:
     # measures that are numbers tell stars apart only at even steps
     moves = problem.phasing is not None and problem.phasing.continuous
     numbers = (m.channel.is_number and not m.is_mounting for m in problem.measures)
@@ -98,49 +106,49 @@ _PLACED = (Dependence.BIAFFINE, Dependence.BENT)
 _CONES, _JOINT = ".cones.unbalances:solve_polished", ".mounts.nonlinear:solve_joint"
 _STARS = ".stars.phasing_solver:solve_phasing"
 _OWN: tuple[Method, ...] = (
-    Method("evaluation", {}, Reach.WHOLE, ".conclusion:state", norms=lambda _: True,
+    Method("evaluation", {}, ProofStrength.WHOLE, ".conclusion:state", norms=lambda _: True,
            proves="the value itself"),
-    Method("boxes of the flywheel", {_F: ()}, Reach.WHOLE, ".boxes.flywheel:solve_flywheel",
+    Method("boxes of the flywheel", {_F: ()}, ProofStrength.WHOLE, ".boxes.flywheel:solve_flywheel",
            knows=frozenset(OF_FLYWHEEL), still=lambda _: False,
            proves="the optimum"),
-    Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, Reach.WHOLE, _CONES, True,
+    Method("second-order cones", {_U: _AFFINE, Kind.SHARE: _AFFINE}, ProofStrength.WHOLE, _CONES, True,
            proves="the optimum"),
-    Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, Reach.WHOLE, _CONES, True,
+    Method("second-order cones of pistons", {_U: _AFFINE, _Q: _AFFINE}, ProofStrength.WHOLE, _CONES, True,
            proves="the optimum"),
-    Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, Reach.WHOLE, ".boxes.leads:solve_leads", True,
+    Method("boxes of leads", {_U: _AFFINE, Kind.LEAD: _SHIFT}, ProofStrength.WHOLE, ".boxes.leads:solve_leads", True,
            frozenset({IRREGULARITY}), is_pointwise, is_no_number,
            proves="the optimum, as far as the boxes go (P13)"),
-    Method("boxes of leads between shared chambers", {Kind.LEAD: ()}, Reach.WHOLE,
+    Method("boxes of leads between shared chambers", {Kind.LEAD: ()}, ProofStrength.WHOLE,
            ".boxes.shared_leads:solve_shared_leads", True, frozenset({MOUNT_FORCE, *OF_BLOCK}), is_pointwise,
            is_no_number, _is_rigid,
            proves="the optimum, as far as the boxes go (P15)"),
-    Method("cones over boxes of places", {_U: _AFFINE, _P: _PLACED}, Reach.WHOLE,
+    Method("cones over boxes of places", {_U: _AFFINE, _P: _PLACED}, ProofStrength.WHOLE,
            ".boxes.places:solve_places", True, OF_SHAFT_PLACES, is_pointwise,
            proves="the optimum, as far as the boxes go (P8)"),
-    Method("stars, each with cones", {_S: BUILT, _U: _AFFINE}, Reach.WHOLE, _STARS, True,
+    Method("stars, each with cones", {_S: BUILT, _U: _AFFINE}, ProofStrength.WHOLE, _STARS, True,
            norms=is_pointwise,
            proves="the optimum; where throws leave the even steps as far as boxes of throws, bank angle and split "
            "pins go (S29, S30)"),
-    Method("linear matrix inequalities", {_K: ()}, Reach.WHOLE, ".mounts.convex:solve_convex_mounts",
+    Method("linear matrix inequalities", {_K: ()}, ProofStrength.WHOLE, ".mounts.convex:solve_convex_mounts",
            knows=frozenset({*CONVEX, FREQUENCIES}), also=is_convex,
            proves="the optimum"),
-    Method("smooth program, boxes of stiffness", {_K: ()}, Reach.NEAR, _JOINT, False, OF_MOUNTS, is_pointwise,
+    Method("smooth program, boxes of stiffness", {_K: ()}, ProofStrength.NEAR, _JOINT, False, OF_MOUNTS, is_pointwise,
            proves="mostly the optimum of up to four numbers, often of six; else a bound"),
-    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE, _JOINT, False, OF_MOUNTS, is_pointwise,
+    Method("smooth program", {_U: _AFFINE, _K: (), _M: ()}, ProofStrength.ASIDE, _JOINT, False, OF_MOUNTS, is_pointwise,
            proves="mostly the optimum of up to five numbers of the mounts (E69); else a local one, with a bound"),
     Method("flywheel, crankshaft and the rest apart",
-           dict.fromkeys(sorted(set(KINDS.values()) - {_S}), tuple(Dependence)), Reach.ASIDE,
-           ".methods:solve_each_apart", norms=lambda _: True, also=is_apart,
+           dict.fromkeys(sorted(set(KINDS.values()) - {_S}), tuple(Dependence)), ProofStrength.ASIDE,
+           ".methods:solve_each_apart", norms=lambda _: True, also=is_separable,
            proves="what each of them proves"),
-    Method("stars, each with a smooth program", {_S: BUILT, _U: _AFFINE, _K: (), _M: ()}, Reach.ASIDE,
-           ".mounts.stars:solve_star_mounts", False, OF_MOUNTS, is_pointwise, also=_tells_stars_apart,
+    Method("stars, each with a smooth program", {_S: BUILT, _U: _AFFINE, _K: (), _M: ()}, ProofStrength.ASIDE,
+           ".mounts.stars:solve_star_mounts", False, OF_MOUNTS, is_pointwise, also=_distinguishes_stars,
            proves="a local optimum, with a bound"),
     Method("local programs, places at their corners",
-           {_U: _AFFINE, _P: _PLACED, _Q: _AFFINE, _Z: _MASSES, Kind.LEAD: _SHIFT}, Reach.WHOLE,
+           {_U: _AFFINE, _P: _PLACED, _Q: _AFFINE, _Z: _MASSES, Kind.LEAD: _SHIFT}, ProofStrength.WHOLE,
            ".methods:solve_with_places", True, OF_SHAFT_PLACES | OF_SIZES_ALONE | {IRREGULARITY},
            also=_closes_without_places,
            proves="what is proven of the rest with places at the corners of their bounds (P20)"),
-    Method("local programs of all numbers", dict.fromkeys(KINDS.values(), tuple(Dependence)), Reach.ASIDE,
+    Method("local programs of all numbers", dict.fromkeys(KINDS.values(), tuple(Dependence)), ProofStrength.ASIDE,
            ".methods:solve_all_numbers", norms=lambda _: True,
            proves="a local optimum by exact evaluations, without a bound; of stars each of 60 at most"),
 )  # fmt: skip
@@ -197,7 +205,7 @@ def solve(
             return found
         if found.status is Status.OPTIMAL:
             return replace(found, free=free_decisions(found))
-        found = with_reachable(found, problem, kinds_of(problem), time.perf_counter() - begun, _decided)
+        found = with_attainable_limits(found, problem, kinds_of(problem), time.perf_counter() - begun, _decided)
         return without_proof(found, reports[0]) if reports else found
 
 
@@ -205,10 +213,13 @@ def _cut_short(problem: Problem, found: Result | None) -> Result:
     """Return the result when time is over: the best design found, or the initial design if it is feasible."""
     if found is None or found.status is Status.FAILED:
         with suppress(ModelError):
-            given = judged(problem, problem.start)
-            if problem.phasing is None and max(given.excess, told_excess(problem, given.evaluation)) <= KEPT:
-                shown = Shown(0.0, Reach.ASIDE, math.inf, f"the design as given; {CUT_SHORT}")
-                return concluded(given, given.evaluation, shown, {})
+            given = evaluate_design(problem, problem.start)
+            if (
+                problem.phasing is None
+                and max(given.excess, violation_at_fine_sampling(problem, given.evaluation)) <= KEPT
+            ):
+                shown = ProofData(0.0, ProofStrength.ASIDE, math.inf, f"the design as given; {CUT_SHORT}")
+                return build_result(given, given.evaluation, shown, {})
     if found is None:
         raise SolverError("no design was found within the time limit; raise it")
     if found.status is Status.FAILED:
@@ -263,12 +274,12 @@ def _by_method(problem: Problem) -> Result:
     report_progress(method.name)
     conflict = conflict_on_any_mounts(problem) if Kind.MOUNT in method.decides and kinds <= {_U, _K, _M} else ()
     if conflict:
-        return none_within(problem, evaluate_start(problem), conflict, {})
+        return infeasible_result(problem, evaluate_start(problem), conflict, {})
     closing = _closing(problem, kinds, method)
     if closing is None:
         return method.decided(problem)
     other, fewer = closing
-    return solve_relaxed(problem, fewer, other.decided, method.decided)
+    return solve_by_relaxation(problem, fewer, other.decided, method.decided)
 
 
 def _refuse_any_rank(problem: Problem) -> None:
@@ -289,7 +300,7 @@ def _without_fixed_limits(problem: Problem, decide: Decide, _: Decide) -> Result
     problem, least = exclude_collisions(problem, fixed, given)
     broken = broken_limits(fixed, with_fine_sampling(least))
     if broken:
-        return none_within(problem, given, broken, {})
+        return infeasible_result(problem, given, broken, {})
     moved = tuple(limit for limit in problem.limits if limit not in fixed)
     return with_limits(decide(problem.changed(limits=moved)), problem.limits)
 
@@ -301,12 +312,12 @@ def _is_settled(problem: Problem) -> bool:
     return not any(depends(term.measure.channel, kinds, problem) for term in problem.objective)
 
 
-def _as_given(problem: Problem, _: Decide, rest: Decide) -> Result:
-    design = judged(problem, problem.start)
+def _solve_without_decisions(problem: Problem, _: Decide, rest: Decide) -> Result:
+    design = evaluate_design(problem, problem.start)
     if design.excess > KEPT:
         return rest(problem)
-    shown = Shown(design.value, Reach.WHOLE, 0.0, "nothing open changes what is minimised")
-    return concluded(design, design.evaluation, shown, {})
+    shown = ProofData(design.value, ProofStrength.WHOLE, 0.0, "nothing open changes what is minimised")
+    return build_result(design, design.evaluation, shown, {})
 
 
 @dataclass(frozen=True)
@@ -335,11 +346,11 @@ class Reduction:
 
 
 REDUCTIONS: tuple[Reduction, ...] = (
-    Reduction("more angles where few read otherwise", lambda _: True, lambda p, _, rest: solve_told(p, rest)),
+    Reduction("more samples where few are not enough", lambda _: True, lambda p, _, rest: refine_sampling(p, rest)),
     Reduction("ranks, one after another", lambda p: bool(p.ranks), lambda p, decide, _: solve_in_order(p, decide),
               _refuse_any_rank),
     Reduction("limits that nothing open moves", lambda p: bool(_fixed_limits(p)), _without_fixed_limits),
-    Reduction("an objective that nothing open moves", _is_settled, _as_given),
+    Reduction("an objective that nothing open moves", _is_settled, _solve_without_decisions),
 )  # fmt: skip
 """Reductions of the core in the order in which they are looked for."""
 
@@ -353,10 +364,10 @@ def reductions() -> tuple[Reduction, ...]:
 
 def _closing(problem: Problem, kinds: frozenset[Kind], method: Method) -> tuple[Method, Problem] | None:
     """Return a method whose bound closes on what it knows of what is asked, and the problem of that alone."""
-    if method.reach is Reach.WHOLE or not problem.search.proves:
+    if method.reach is ProofStrength.WHOLE or not problem.search.proves:
         return None
     for other in METHODS:
-        if other.reach is not Reach.WHOLE or not kinds <= other.decides:
+        if other.reach is not ProofStrength.WHOLE or not kinds <= other.decides:
             continue
         free = problem.changed(limits=())
         terms = tuple(term for term in problem.objective if other.suits(free.changed(objective=(term,))))

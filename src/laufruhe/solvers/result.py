@@ -19,13 +19,13 @@ from laufruhe.prove.certificate import Certificate
 from laufruhe.solvers.prices import Price
 from laufruhe.solvers.stars.ranking import PhasingResult
 from laufruhe.solvers.values import (
+    AttainableLimit,
     DecisionRange,
     DecisionValue,
     LimitValue,
     Nearest,
     ObjectiveValue,
     RankValue,
-    Reached,
     meaningful,
 )
 
@@ -146,7 +146,7 @@ class Result(Told):
     phasing: PhasingResult | None = None
     details: Details | None = None
     ranks: tuple[RankValue, ...] = ()
-    reached: tuple[Reached, ...] = ()
+    reached: tuple[AttainableLimit, ...] = ()
     nearest: Nearest | None = None
     free: tuple[DecisionRange, ...] | None = None
 

@@ -139,7 +139,7 @@ class LimitValue:
 
 
 @dataclass(frozen=True)
-class Reached:
+class AttainableLimit:
     """Closest value that a broken limit can reach while the other limits hold [SI].
 
     Attributes

@@ -25,15 +25,15 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import SOONEST, Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import withheld
+from laufruhe.prove.certificate import unproven_certificate
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import Design, decided, limit_values, values_of
+from laufruhe.solvers.failed_proof import without_proof
 from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.sampling_refinement import violation_at_fine_sampling
 from laufruhe.solvers.stars.ranking import candidates_of, ranked_star
 from laufruhe.solvers.stars.star_results import phase_decisions
-from laufruhe.solvers.told_limits import told_excess
 from laufruhe.solvers.values import ObjectiveValue, RankValue
-from laufruhe.solvers.withheld import without_proof
 
 MOST, SEED = 64, 0
 """Evaluations of a walk at most, and the seed of its random directions."""
@@ -402,7 +402,7 @@ def _is_shown(found: Result, witness: Visit, bound: float | None) -> bool:
             return False
     standings = ((limit, own.standing(limit)) for limit in problem.limits)
     kept = all(stands.excess + relative(missed(limit.measure, own), stands.value) <= 0.0 for limit, stands in standings)
-    return kept and told_excess(problem, own) <= 0.0
+    return kept and violation_at_fine_sampling(problem, own) <= 0.0
 
 
 def _withheld(problem: Problem, found: Result, witness: Visit, bound: float) -> Result:
@@ -421,7 +421,7 @@ def _withheld(problem: Problem, found: Result, witness: Visit, bound: float) -> 
         problem=shown,
         status=Status.FEASIBLE,
         objective=ObjectiveValue.of(own, witness.value, objective_value(own, found.initial)),
-        certificate=withheld(witness.value, math.inf, "a walk by exact evaluations, which proves nothing"),
+        certificate=unproven_certificate(witness.value, math.inf, "a walk by exact evaluations, which proves nothing"),
         decisions=decisions,
         limits=limit_values(shown, witness.evaluation),
         final=witness.evaluation,

@@ -29,8 +29,8 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.conclusion import FEASIBLE
-from laufruhe.solvers.nearby import by_cones, first_of, is_convex, next_to
 from laufruhe.solvers.result import Result
+from laufruhe.solvers.warm_start import by_cones, first_of, is_convex, next_to
 
 REFERENCE_STEPS = 1440
 """Steps over the period at which the optimum beside which a regret is counted is solved."""

@@ -182,14 +182,14 @@ def test_verdicts_of_the_four(four: xr.Dataset) -> None:
 
 
 def test_worth_is_judged_against_fewer_shafts_and_the_next_engine(four: xr.Dataset) -> None:
-    judged = {worth.build: worth for worth in worths(four)}
-    assert judged["force pair"].worth
-    assert judged["force pair"].beside_next < 0.9
-    assert not judged["moment pair"].worth
-    assert judged["both"].fall > 0.75
-    assert judged["both"].further_fall == pytest.approx(0.142, abs=0.003)
-    assert not judged["both"].worth
-    assert "slight" in judged["both"].why
+    evaluate_design = {worth.build: worth for worth in worths(four)}
+    assert evaluate_design["force pair"].worth
+    assert evaluate_design["force pair"].beside_next < 0.9
+    assert not evaluate_design["moment pair"].worth
+    assert evaluate_design["both"].fall > 0.75
+    assert evaluate_design["both"].further_fall == pytest.approx(0.142, abs=0.003)
+    assert not evaluate_design["both"].worth
+    assert "slight" in evaluate_design["both"].why
 
 
 def test_moment_pair_is_worth_building_with_2_25_kg() -> None:
@@ -199,10 +199,10 @@ def test_moment_pair_is_worth_building_with_2_25_kg() -> None:
     assert better.agrees
     assert falls.agrees
     assert falls.ours == pytest.approx(-54.9, abs=0.3)
-    judged = {worth.build: worth for worth in worths(data)}
-    assert judged["both"].worth
-    assert not judged["force pair"].worth
-    assert "five without shafts run smoother" in judged["force pair"].why
+    evaluate_design = {worth.build: worth for worth in worths(data)}
+    assert evaluate_design["both"].worth
+    assert not evaluate_design["force pair"].worth
+    assert "five without shafts run smoother" in evaluate_design["force pair"].why
 
 
 @pytest.mark.parametrize(("mass", "fall"), [(1.25, 0.152), (2.25, 0.308)])

@@ -11,7 +11,7 @@ import pytest
 import laufruhe
 from attack.own_problem import Own
 from laufruhe.extensions.joint_mounts import prover
-from laufruhe.prove.best_first import Divided
+from laufruhe.prove.best_first import BoxResult
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.provers import Question
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
@@ -41,7 +41,7 @@ def test_one_number_is_proven(name: str) -> None:
 
 def test_boxes_that_are_behind_are_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE)
-    monkeypatch.setattr(prover, "load_bounds", lambda *_: iter([Divided(0.5, 1), Divided(0.6, 9)]))
+    monkeypatch.setattr(prover, "load_bounds", lambda *_: iter([BoxResult(0.5, 1), BoxResult(0.6, 9)]))
     for known, boxes in ((0.4, 9), (0.7, 1)):
         question = Question(problem, 1.0, 0.1, bound=known)
         assert [found.boxes for found in prover.load_answers(question)][-1] == boxes

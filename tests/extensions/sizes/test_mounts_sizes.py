@@ -12,7 +12,7 @@ from laufruhe.extensions.sizes.mounted import with_masses
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.certificate import Proof
-from laufruhe.solvers.conclusion import judged
+from laufruhe.solvers.conclusion import evaluate_design
 from laufruhe.solvers.result import Result
 from problem_files import changed
 
@@ -97,7 +97,7 @@ def test_masses_in_place_of_sizes_make_the_same_loads(problem: Problem) -> None:
         for decision, value in zip(relaxed.decisions, near, strict=True):
             assert decision.lower - 1e-12 <= abs(value) or decision.lower < 0.0
             assert abs(value) <= decision.set.scale * (1.0 + 1e-12)
-        assert judged(relaxed, near).value == pytest.approx(judged(problem, values).value, rel=1e-9)
+        assert evaluate_design(relaxed, near).value == pytest.approx(evaluate_design(problem, values).value, rel=1e-9)
 
 
 @pytest.mark.slow

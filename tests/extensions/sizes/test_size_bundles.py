@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from laufruhe.extensions.sizes.boxes import SizeBoxes
-from laufruhe.extensions.sizes.bundles import Reach
+from laufruhe.extensions.sizes.bundles import SizeReach
 from laufruhe.extensions.sizes.model import MASSES
 from laufruhe.problem.decision import Decision, Domain
 from laufruhe.problem.sets import Interval, Sector
@@ -22,7 +22,7 @@ def test_the_least_is_that_of_a_corner() -> None:
     domains = (Domain(Decision("a", "kg m", sets[0], 0j, ()), 0), Domain(Decision("b", "kg m", sets[1], 0j, ()), 1))
     low = random.uniform(-1.0, 1.0, MASSES)
     high = low + random.uniform(0.0, 1.0, MASSES)
-    reach = Reach(low, high, (0.1, 0.2), domains)
+    reach = SizeReach(low, high, (0.1, 0.2), domains)
     turns = np.linspace(0.0, math.tau, 721)
     disc = 0.3 * np.array([np.cos(turns), np.sin(turns)])
     for function in random.normal(size=(20, 1 + MASSES + 3)):

@@ -13,8 +13,8 @@ from laufruhe.problem.evaluation import evaluate, objective_value, with_fine_sam
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers import Result, Status, solve
 from laufruhe.solvers.conclusion import KEPT
-from laufruhe.solvers.told_limits import solve_told
-from solvers.test_told_limits import ENGINE, SECOND, problem
+from laufruhe.solvers.sampling_refinement import refine_sampling
+from solvers.test_sampling_refinement import ENGINE, SECOND, problem
 
 
 def sized(throw: float) -> dict[str, Any]:
@@ -70,7 +70,7 @@ def test_time_that_is_over_leaves_no_design_that_few_angles_alone_allow() -> Non
     limit = {"name": "quiet", "limit": "mean shaking force", "orders": [2], "max": f"{most} N"}
     asked = problem(told, objective={"minimise": "rms shaking force"}, constraints=[*told["constraints"], limit])
     with limited(1e-9):
-        result = solve_told(asked, solve_sizes)
+        result = refine_sampling(asked, solve_sizes)
     assert with_fine_sampling(result.final).excess(asked.limits) > KEPT
     assert result.status is Status.FAILED
     assert result.certificate is not None

@@ -188,14 +188,14 @@ class Economics(Part):
     @staticmethod
     def table(data: xr.Dataset) -> list[Text]:
         """Return every engine at its optimum, the judgements, the source's statements and the front."""
-        judged = {worth.build: worth for worth in worths(data)}
+        evaluate_design = {worth.build: worth for worth in worths(data)}
         unit, plain = data["optimum"].attrs["units"], float(data["optimum"].isel(build=0))
         head = ["engine", "shafts", "mass on them [kg]", f"{data.attrs['objective']} [{unit}]", f"lower bound [{unit}]",
                 f"{data.attrs['counterpart']} [{unit}]", "beside plain", "worth building"]  # fmt: skip
         rows = []
         for name in data["build"].values:
             row = data.sel(build=name)
-            force, worth = float(row["optimum"]), judged.get(str(name))
+            force, worth = float(row["optimum"]), evaluate_design.get(str(name))
             label = f"{name}, no shafts, equal power" if str(row["standing"].item()) == NEXT else str(name)
             cells = [label, str(int(row["shafts"])), f"{float(row['optimum_mass']):.2f}", number(force)]
             change = NOTHING if force == plain else percent(force / plain - 1.0)

@@ -30,7 +30,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray, Mask
 from laufruhe.problem.decision import sides_of
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import Around, Bounded, Box, Divided
+from laufruhe.prove.best_first import Around, Box, BoxResult, BoxSearch
 from laufruhe.prove.certificate import Multipliers
 from laufruhe.prove.mounts.box_series import balanced, rest_of
 from laufruhe.prove.mounts.named import named_part
@@ -159,9 +159,9 @@ class DesignBoxes:
         )
         pairing = self.loads.pairing(problem, Multipliers(multipliers.terms, limits))
         if value < self.value and problem.excess(columns) <= FEASIBLE:
-            judged = self._judge(mounts, columns)
-            if judged < self.value:
-                self.value, self.best = judged, (mounts, columns)
+            evaluate_design = self._judge(mounts, columns)
+            if evaluate_design < self.value:
+                self.value, self.best = evaluate_design, (mounts, columns)
         return Corner(columns, pairing)
 
     def _bound(self, lower: Array, upper: Array) -> tuple[float, int]:
@@ -321,7 +321,7 @@ def _concavity(values: Array) -> Array:
     return np.array(out)
 
 
-class _VertexBranching(Bounded):
+class _VertexBranching(BoxSearch):
     """Branch and bound with designs at vertices as incumbents."""
 
     def __init__(self, search: DesignBoxes, room: float, known: Known | None = None) -> None:
@@ -333,12 +333,12 @@ class _VertexBranching(Bounded):
         self.value = min(self.value, self._boxes.value)
 
 
-def designed_bound(boxes: DesignBoxes, room: float, known: Known | None = None) -> Divided:
+def designed_bound(boxes: DesignBoxes, room: float, known: Known | None = None) -> BoxResult:
     """Bound a problem that `mixes_corners`, until no design is more than `room` better than the incumbent."""
     division = _VertexBranching(boxes, room, known)
     most = boxes.most_boxes
     if not most:
-        return Divided(0.0, 0)
+        return BoxResult(0.0, 0)
     divided = division.run(division.bounded([(boxes.lower, boxes.upper)])[0], most)
     if known is not None:
         check_around(Around(boxes, boxes.lower, boxes.upper), known.place, known)

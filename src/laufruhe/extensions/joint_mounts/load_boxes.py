@@ -30,7 +30,7 @@ from laufruhe.problem.dependence import Dependence, dependence
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import Divided, divided_on
+from laufruhe.prove.best_first import BoxResult, divide_in_rounds
 from laufruhe.prove.mounts.box_lines import LinearRelaxation
 from laufruhe.prove.mounts.box_norms import LinearBound, counted_rows, line_weights, norm_under
 from laufruhe.prove.mounts.box_response import LoadedOrders, is_travel
@@ -71,7 +71,7 @@ def is_boxed(problem: Problem, throws: OpenThrows | None = None) -> bool:
 def load_bounds(
     problem: Problem, value: float, room: float, shares: Sequence[float], known: Known | None = None,
     throws: OpenThrows | None = None,
-) -> Iterator[Divided]:  # fmt: skip
+) -> Iterator[BoxResult]:  # fmt: skip
     """Yield bounds by boxes, until no design is more than `room` better than `value`.
 
     Parameters
@@ -91,7 +91,7 @@ def load_bounds(
     most = boxes.most_boxes
     if most and boxes.is_sampled_fully:
         counts = [math.ceil(share * most) for share in shares]
-        yield from divided_on(boxes, boxes.lower, boxes.upper, value, room, counts, known)
+        yield from divide_in_rounds(boxes, boxes.lower, boxes.upper, value, room, counts, known)
 
 
 def _is_affine(measure: Measure, problem: Problem) -> bool:

@@ -13,18 +13,18 @@ from laufruhe.extensions.joint_mounts.load_boxes import is_boxed, load_bounds
 from laufruhe.extensions.joint_mounts.open_throws import throws_at
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import domains_of, vector_of
-from laufruhe.prove.best_first import Divided
+from laufruhe.prove.best_first import BoxResult
 from laufruhe.prove.mounts.provers import Prover, Question
 from laufruhe.prove.mounts.subdivision import divides
 from laufruhe.prove.witness import Known
 from laufruhe.solvers.mounts.places import started_at
-from laufruhe.solvers.told_limits import over_read
+from laufruhe.solvers.sampling_refinement import over_read
 
 EARLY = 0.1
 """Share of the boxes before other provers have their turn."""
 
 
-def corner_answers(question: Question) -> Iterator[Divided]:
+def corner_answers(question: Question) -> Iterator[BoxResult]:
     """Yield one bound, with the best design at a vertex if it improves the value of the question."""
     problem = question.problem
     if question.of_many or question.value == math.inf:
@@ -42,7 +42,7 @@ def corner_answers(question: Question) -> Iterator[Divided]:
     yield replace(divided, places=() if boxes.best is None else (np.concatenate(boxes.best),))
 
 
-def load_answers(question: Question) -> Iterator[Divided]:
+def load_answers(question: Question) -> Iterator[BoxResult]:
     """Yield bounds by boxes of mounts and unbalances; end early if another prover is better after a share of them."""
     if question.of_many:
         return
@@ -55,7 +55,7 @@ def load_answers(question: Question) -> Iterator[Divided]:
             return
 
 
-def throw_answers(question: Question) -> Iterator[Divided]:
+def throw_answers(question: Question) -> Iterator[BoxResult]:
     """Yield one bound by boxes of throws, mounts and unbalances, for any firing order (E72)."""
     throws = None if question.moves is None else throws_at(question.problem, *question.moves)
     if throws is not None:

@@ -6,7 +6,7 @@ from laufruhe.numerics.processes import call_by_name
 from laufruhe.problem.decision import Kind
 from laufruhe.problem.dependence import Dependence
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Reach
+from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.method import BUILT, Method, is_pointwise
 
 
@@ -19,7 +19,7 @@ def is_long(problem: Problem) -> bool:
 LONG_CRANKS = Method(
     "stars of long cranks, each with cones",
     {Kind.STAR: BUILT, Kind.UNBALANCE: (Dependence.AFFINE,)},
-    Reach.WHOLE,
+    ProofStrength.WHOLE,
     "laufruhe.extensions.long_cranks.long_crank_search:solve_long_cranks",
     True,
     norms=is_pointwise,

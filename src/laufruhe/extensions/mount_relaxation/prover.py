@@ -18,7 +18,7 @@ from laufruhe.numerics.witness import EXCESS
 from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import EMPTY, NEARLY, Box, Divided, Halving, Over, Parts, Waiting, halves
+from laufruhe.prove.best_first import EMPTY, NEARLY, Box, BoxBisection, BoxResult, OpenNode, Over, Parts, halves
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.provers import Prover, Question
 from laufruhe.prove.mounts.subdivision import divides
@@ -50,7 +50,7 @@ def is_bounded(problem: Problem) -> bool:
     return on_mounts and not problem.mount_terms and is_lifted(problem)
 
 
-def bounds(question: Question) -> Iterator[Divided]:
+def bounds(question: Question) -> Iterator[BoxResult]:
     """Yield bounds, where stiffness alone is open that of the root box first."""
     stiffness_alone = divides(question.problem)
     for root_only in (True, False) if stiffness_alone else (False,):
@@ -68,7 +68,7 @@ SPRINGS = Prover("boxes of mounts and modes, by spring forces", applies, bounds,
 def spring_bound(
     problem: Problem, value: float, room: float, near: Sequence[Value], of_many: bool = False,
     root_only: bool = False, known: Known | None = None,
-) -> Divided:  # fmt: skip
+) -> BoxResult:  # fmt: skip
     """Divide the bounds until no design is more than `room` better than `value`, or as often as is worth it.
 
     Parameters
@@ -88,12 +88,12 @@ def spring_bound(
     """
     problem = named_part(problem)
     if not is_bounded(problem) or not 0.0 < value < math.inf:
-        return Divided(0.0, 0)
+        return BoxResult(0.0, 0)
     try:
         with bounds_ahead() as ahead:
             relaxation = SdpRelaxation(with_default_sampling(problem), value, room, near, ahead)
             if not relaxation.most_boxes or not relaxation.is_sampled_fully:
-                return Divided(0.0, 0)
+                return BoxResult(0.0, 0)
             # straight for the value, but where a box shows little of it
             shares: tuple[float, ...]
             if relaxation.modes:
@@ -106,7 +106,7 @@ def spring_bound(
             return _prove_levels(relaxation, room, shares, most, known)
     except np.linalg.LinAlgError:
         # a middle on a resonance that nothing damps
-        return Divided(0.0, 0)
+        return BoxResult(0.0, 0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +131,7 @@ class _Around:
 
 def _prove_levels(
     relaxation: SdpRelaxation, room: float, shares: Sequence[float], most: int, known: Known | None
-) -> Divided:
+) -> BoxResult:
     """Prove that no design is under a value, and then under values nearer to that of the best (E59)."""
 
     def level_of(share: float) -> float:
@@ -169,10 +169,10 @@ def _prove_levels(
         check_around(_Around(root_search, known), known.place, known)
     count = relaxation.mount_numbers
     candidates = (*relaxation.candidates, *places) if bound < relaxation.enough else ()
-    return Divided(bound, spent, tuple(place[:count] for place in candidates))
+    return BoxResult(bound, spent, tuple(place[:count] for place in candidates))
 
 
-class _Narrowing(Halving):
+class _Narrowing(BoxBisection):
     """Boxes that are narrowed before they are halved.
 
     Attributes
@@ -235,7 +235,7 @@ class _Narrowing(Halving):
         """Return the halves, narrowed where that paid for the whole."""
         return [self.narrow(*half, box.narrows) for box in boxes for half in halves(box)]
 
-    def parts(self, taken: Sequence[Waiting[Box]]) -> Parts[Box]:
+    def parts(self, taken: Sequence[OpenNode[Box]]) -> Parts[Box]:
         """Return the halves, and count relaxations in place of boxes."""
         parts = [*super().parts(taken)]
         self.seen = self.spent

@@ -30,15 +30,15 @@ from laufruhe.problem.dependence import is_affine
 from laufruhe.problem.evaluation import Evaluation, evaluate, objective_value
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import Division, Parts, Waiting
-from laufruhe.prove.certificate import Proof, Reach, certified, withheld
+from laufruhe.prove.best_first import BranchAndBound, OpenNode, Parts
+from laufruhe.prove.certificate import Proof, ProofStrength, certified, unproven_certificate
 from laufruhe.prove.witness import Known, check_around
 from laufruhe.solvers import walk
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import KEPT, limit_values
+from laufruhe.solvers.failed_proof import without_proof
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import ObjectiveValue
-from laufruhe.solvers.withheld import without_proof
 
 MOST_NODES, STEPS, RANDOM = 20_000, 8, 2000
 """Parts of all assemblies that are bounded, steps of each bound, and assemblies at random that are shown."""
@@ -71,10 +71,10 @@ def solve_assembly(problem: Problem, *_: object) -> Result:
     chosen = search.best if witness is None else witness
     initial, final = _evaluated(problem, lots, search.given), _evaluated(problem, lots, chosen)
     value = objective_value(problem, final)
-    certificate = withheld(value, math.inf, "a walk by exact evaluations, which proves nothing")
+    certificate = unproven_certificate(value, math.inf, "a walk by exact evaluations, which proves nothing")
     if witness is None:
         certificate = certified(
-            value, bound, numerical_zero(problem), problem.tolerance, Reach.WHOLE, 0.0,
+            value, bound, numerical_zero(problem), problem.tolerance, ProofStrength.WHOLE, 0.0,
             f"branch and bound over assignments, {search.seen} parts bounded by dual rows",
         )  # fmt: skip
     met = final.excess(problem.limits) <= KEPT
@@ -153,7 +153,7 @@ def _terms(problem: Problem) -> Terms:
     return tuple((weight, replace(norm, slope=norm.slope / PER_KILOGRAM)) for weight, norm in built.terms)
 
 
-class _Search(Division[Chosen]):
+class _Search(BranchAndBound[Chosen]):
     """Branch and bound over assemblies."""
 
     what = "parts bounded"
@@ -190,11 +190,11 @@ class _Search(Division[Chosen]):
         """Bound from which no assembly of a node is better by half the tolerance."""
         return self.value * (1.0 - 0.5 * self.tolerance)
 
-    def is_done(self, one: Waiting[Chosen]) -> bool:
+    def is_fathomed(self, one: OpenNode[Chosen]) -> bool:
         """Return whether no assembly of it is better by half the tolerance."""
         return one.bound >= self.enough
 
-    def parts(self, taken: Sequence[Waiting[Chosen]]) -> Parts[Chosen]:
+    def parts(self, taken: Sequence[OpenNode[Chosen]]) -> Parts[Chosen]:
         """Yield the parts left for the cylinder that counts most of those without one."""
         ((under, _, node),) = taken
         lot, cylinder = next((at for at in self.order if node[at[0]][at[1]] < 0), (-1, -1))

@@ -33,7 +33,15 @@ from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.certificate import Proof, certified
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.conclusion import KEPT, Design, Shown, decided, decision_values, limit_values, none_within
+from laufruhe.solvers.conclusion import (
+    KEPT,
+    Design,
+    ProofData,
+    decided,
+    decision_values,
+    infeasible_result,
+    limit_values,
+)
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import LimitValue, ObjectiveValue
 
@@ -175,11 +183,11 @@ def _scaled_objective(
     return total
 
 
-def infeasible_result(
+def infeasible_robust_result(
     problem: Problem, given: WorstEngines, conflict: tuple[str, ...], timing: dict[str, float]
 ) -> Result:
     """Return that no design keeps its limits in every engine, and how the worst engines of the one given stand."""
-    found = none_within(problem, evaluate(problem), conflict, timing)
+    found = infeasible_result(problem, evaluate(problem), conflict, timing)
     return replace(found, limits=_limits_in_the_worst_case(problem, found.limits, given, {}))
 
 
@@ -202,7 +210,7 @@ def robust_result(
     given: WorstEngines,
     found: WorstEngines,
     active: ActiveErrors,
-    shown: Shown,
+    shown: ProofData,
     details: RobustResult,
     timing: dict[str, float],
 ) -> Result:

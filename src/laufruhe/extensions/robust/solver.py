@@ -22,7 +22,7 @@ from laufruhe.extensions.robust.built_engines import (
     WorstEngines,
     evaluate_built,
 )
-from laufruhe.extensions.robust.conclusion import ActiveErrors, compare_designs, infeasible_result, robust_result
+from laufruhe.extensions.robust.conclusion import ActiveErrors, compare_designs, infeasible_robust_result, robust_result
 from laufruhe.extensions.robust.tolerance import Population, robust_of, tolerances_of, with_errors, with_tolerances
 from laufruhe.load_models.affine import AffineModel, AffineProblem
 from laufruhe.numerics.arrays import Array
@@ -37,8 +37,8 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, READINGS, Shown, judged, unbalances_of
+from laufruhe.prove.certificate import ProofStrength, best_bound, gap_of, kkt_residual
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, READINGS, ProofData, evaluate_design, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import is_infeasible, smallest_conflict, tighten_limits
 from laufruhe.solvers.general import solve_star_by_star
@@ -126,11 +126,11 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
     adversary = replace(adversary, samples=least.samples)
     as_given = adversary.at(problem.start, proven=False)
     if least.conflict:
-        return infeasible_result(problem, as_given, least.conflict, {"solve": time.perf_counter() - started})
+        return infeasible_robust_result(problem, as_given, least.conflict, {"solve": time.perf_counter() - started})
     solved = time.perf_counter()
-    reach = Reach.WHOLE if over.share is None else Reach.ASIDE
-    design = judged(problem, least.values, least.samples)
-    shown = Shown(least.bound, reach, least.active.residual, _method(problem, least))
+    reach = ProofStrength.WHOLE if over.share is None else ProofStrength.ASIDE
+    design = evaluate_design(problem, least.values, least.samples)
+    shown = ProofData(least.bound, reach, least.active.residual, _method(problem, least))
     details = compare_designs(problem, adversary, start, least.values, least.found, least.active, least.scenarios)
     timing = {"solve": solved - started, "compare": time.perf_counter() - solved}
     return robust_result(problem, design, as_given, least.found, least.active, shown, details, timing)

@@ -22,7 +22,7 @@ from laufruhe.load_models.affine import AffineNorm
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import lengths
 from laufruhe.numerics.witness import is_over, report
-from laufruhe.prove.best_first import Division, Over, Parts, Waiting
+from laufruhe.prove.best_first import BranchAndBound, OpenNode, Over, Parts
 from laufruhe.prove.witness import THIN, Known, check_around
 
 Terms: TypeAlias = Sequence[tuple[float, AffineNorm]]
@@ -130,7 +130,7 @@ class _Part:
     split: int
 
 
-class _ErrorSearch(Division[_Part]):
+class _ErrorSearch(BranchAndBound[_Part]):
     """Branch and bound over errors; it minimises the negative of the sum."""
 
     what, of_objective = "boxes of errors", False
@@ -143,11 +143,11 @@ class _ErrorSearch(Division[_Part]):
         """Keep a value and its errors if they are worse than the worst so far."""
         self.best = max(self.best, point, key=lambda each: each[0])
 
-    def is_done(self, one: Waiting[_Part]) -> bool:
+    def is_fathomed(self, one: OpenNode[_Part]) -> bool:
         """Return whether no errors of a part are worse by the tolerance."""
         return -one.bound <= self.best[0] * (1.0 + self._tolerance)
 
-    def parts(self, taken: Sequence[Waiting[_Part]]) -> Parts[_Part]:
+    def parts(self, taken: Sequence[OpenNode[_Part]]) -> Parts[_Part]:
         """Yield parts with one interval fixed at either end, or one circle parted."""
         ((above, _, own),) = taken
         rest = [block for k, block in enumerate(own.blocks) if k != own.split]

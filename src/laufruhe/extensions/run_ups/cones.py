@@ -21,7 +21,7 @@ from laufruhe.problem.decision import domains_of, vector_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.measure import Limit, Measure, Term
 from laufruhe.problem.problem import Problem
-from laufruhe.solvers.conclusion import none_within, unbalances_of, with_limits
+from laufruhe.solvers.conclusion import infeasible_result, unbalances_of, with_limits
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.unbalances import smallest_conflict
 from laufruhe.solvers.result import Result, Status
@@ -37,7 +37,7 @@ def solve_run_cones(
     steps = _Steps(problem, limits, terms, rows)
     if not steps.gather():
         names = [limit.name for limit in steps.problem.load_limits]
-        return none_within(problem, evaluate(problem), smallest_conflict(steps.affine(averaged=True), names), {})
+        return infeasible_result(problem, evaluate(problem), smallest_conflict(steps.affine(averaged=True), names), {})
     for _ in in_time(range(_AGAIN)):
         result = decide(steps.problem)
         x = vector_of(domains_of(problem.decisions), unbalances_of(problem, result)) if result.decisions else None

@@ -14,10 +14,10 @@ from laufruhe.problem.evaluation import Evaluation
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import Divided
-from laufruhe.prove.certificate import Reach
+from laufruhe.prove.best_first import BoxResult
+from laufruhe.prove.certificate import ProofStrength
 from laufruhe.prove.mounts.subdivision import divides
-from laufruhe.solvers.conclusion import KEPT, Shown, broken_limits, concluded, none_within
+from laufruhe.solvers.conclusion import KEPT, ProofData, broken_limits, build_result, infeasible_result
 from laufruhe.solvers.mounts.bounds import conflict_of, divided_by
 from laufruhe.solvers.mounts.search import NEAR, MountSearch, SearchResult
 from laufruhe.solvers.mounts.starts import place_of
@@ -47,39 +47,39 @@ def solve_run_mounts(problem: Problem, relaxed: Result | None) -> Result:
     search = MountSearch(limited, initial, first=first, beside=True, coarser=1 if alone else COARSER)
     bounded = divides(problem) and bounds_runs(problem)
     search.run()
-    searched = bool(search.optima) and not stopped and not alone
-    if searched and search.best is not None and search.best.design.excess <= NEAR:
+    was_searched = bool(search.optima) and not stopped and not alone
+    if was_searched and search.best is not None and search.best.design.excess <= NEAR:
         search.refined()
-    divided = divided_by(problem, search, False) if bounded else Divided(0.0, 0)
+    divided = divided_by(problem, search, False) if bounded else BoxResult(0.0, 0)
     timing = {"solve": time.perf_counter() - started}
     best = search.chosen
     if best is None or best.design.excess > KEPT:
         conflict = conflict_of(problem) if divided.bound == math.inf else ()
-        result = none_within(problem, initial, conflict, timing)
+        result = infeasible_result(problem, initial, conflict, timing)
         return result if conflict else _none(problem, search, best, result)
-    return _concluded(problem, search, best, initial, relaxed, divided, timing)
+    return _best_result(problem, search, best, initial, relaxed, divided, timing)
 
 
-def _concluded(
+def _best_result(
     problem: Problem, search: MountSearch, best: SearchResult, initial: Evaluation, relaxed: Result | None,
-    divided: Divided, timing: dict[str, float],
+    divided: BoxResult, timing: dict[str, float],
 ) -> Result:  # fmt: skip
     """Return the result of the best design, with the better of both bounds."""
     certificate = None if relaxed is None else relaxed.certificate
     relaxed_bound = 0.0 if certificate is None else certificate.lower_bound
     optimum = best.optimum
-    facts = Shown(
+    facts = ProofData(
         bound=max(relaxed_bound, divided.bound),
-        reach=Reach.NEAR if divided.boxes else Reach.ASIDE,
+        reach=ProofStrength.NEAR if divided.boxes else ProofStrength.ASIDE,
         kkt_residual=math.inf if optimum is None else optimum.kkt_residual,
         method=_method(search.optima, max(best.design.value, numerical_zero(problem)), relaxed_bound, divided),
         prices={} if optimum is None else best.joint.prices(optimum),
     )
     design = replace(best.design, problem=problem)
-    return concluded(design, initial, facts, timing)
+    return build_result(design, initial, facts, timing)
 
 
-def _method(optima: Sequence[LocalOptimum], scale: float, relaxed_bound: float, divided: Divided) -> str:
+def _method(optima: Sequence[LocalOptimum], scale: float, relaxed_bound: float, divided: BoxResult) -> str:
     ends = ends_in_words(optima, len(distinct(optima, scale, 1e-3)))
     if divided.bound > relaxed_bound:
         bound = f"; bounds of mounts and run-ups looked at in {divided.boxes} box{'es' if divided.boxes > 1 else ''}"

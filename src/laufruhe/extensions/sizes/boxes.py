@@ -18,14 +18,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from laufruhe.extensions.sizes.bundles import Bundle, Number, Reach, Ways, corner
+from laufruhe.extensions.sizes.bundles import Bundle, Number, SizeReach, Ways, corner
 from laufruhe.extensions.sizes.model import SizeModel
 from laufruhe.extensions.sizes.programs import Ask, SizePrograms, Together
 from laufruhe.extensions.sizes.rod_series import RodSeries, rod_series
 from laufruhe.machine import Engine
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.measure import Limit, Measure
-from laufruhe.prove.best_first import Box, Divided, Halving, Over, halves, widest
+from laufruhe.prove.best_first import Box, BoxBisection, BoxResult, Over, halves, widest
 from laufruhe.prove.witness import Known, check_around, thin
 
 MOST_BOXES = 3000
@@ -144,12 +144,12 @@ class SizeBoxes:
         other._together = other._programs(self._ask)
         return other
 
-    def reach(self, lower: Array, upper: Array) -> Reach:
+    def reach(self, lower: Array, upper: Array) -> SizeReach:
         """Return the ranges of masses and rod length on a box."""
         ends = (self.model.masses(corner(way * self._light, lower, upper)) for way in (1.0, -1.0))
         light, heavy = ends
         rod = self.model.rod_length(lower), self.model.rod_length(upper)
-        return Reach(np.minimum(light, heavy), np.maximum(light, heavy), rod, self.model.domains)
+        return SizeReach(np.minimum(light, heavy), np.maximum(light, heavy), rod, self.model.domains)
 
     def touch(self, lower: Array, upper: Array) -> None:
         """Add affine functions that loads meet at masses of a box."""
@@ -160,7 +160,7 @@ class SizeBoxes:
                 for masses in (reach.low, middle) if bundle.count < most else ():
                     bundle.touch(np.append(masses, unbalances), length)
 
-    def least(self, number: Number, lower: Array, upper: Array, reach: Reach) -> float:
+    def least(self, number: Number, lower: Array, upper: Array, reach: SizeReach) -> float:
         """Return a lower bound of a measure on a box."""
         at = corner(number.ways, lower, upper)
         if not number.pieces:
@@ -168,7 +168,7 @@ class SizeBoxes:
         engine = self.model.engine(at) if np.any(number.ways) else self.model.problem.engine
         return max(self._piece(bundle, number.measure, engine, reach) for bundle in number.pieces)
 
-    def _piece(self, bundle: Bundle, measure: Measure, engine: Engine, reach: Reach) -> float:
+    def _piece(self, bundle: Bundle, measure: Measure, engine: Engine, reach: SizeReach) -> float:
         factors = self.model.factors(bundle.piece, measure, engine)
         ratio = bundle.piece.ratio(factors)
         if ratio is not None:
@@ -273,7 +273,7 @@ class _SizeBox(Box):
     known: tuple[Together, ...] = ()
 
 
-class _Sizes(Halving):
+class _Sizes(BoxBisection):
     """Halves of a side, each cut."""
 
     what = "boxes of sizes"
@@ -323,7 +323,7 @@ class _Around:
 
 def divided_sizes(
     boxes: SizeBoxes, value: float, room: float, most: int = MOST_BOXES, known: Known | None = None
-) -> Divided:  # fmt: skip
+) -> BoxResult:  # fmt: skip
     """Halve boxes, the least first, until none may hold a design that is `room` better than `value` (Z12)."""
     division = _Sizes(boxes, value, room, known)
     bound = division.run(division.bounded(boxes.model.lower, boxes.model.upper), most)

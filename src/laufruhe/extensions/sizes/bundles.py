@@ -20,7 +20,7 @@ from laufruhe.problem.decision import Domain
 from laufruhe.problem.measure import Measure
 
 
-class Reach(NamedTuple):
+class SizeReach(NamedTuple):
     """Ranges of the masses and of the length of the rod on a box; unbalances lie anywhere in their sets."""
 
     low: Array
@@ -52,7 +52,7 @@ class Reach(NamedTuple):
 Ways: TypeAlias = Array
 
 
-def least_of(nodes: Array, terms: Array, rest: Array, reach: Reach) -> Array:
+def least_of(nodes: Array, terms: Array, rest: Array, reach: SizeReach) -> Array:
     """Return the least of functions on a box, shape (t,): their first two terms at its ends, less bounds of the others.
 
     Parameters
@@ -91,7 +91,7 @@ class Bundle:
         """Return an empty bundle with other factors of its rows."""
         return Bundle(self.lengths.scaled(factors))
 
-    def least(self, reach: Reach) -> float:
+    def least(self, reach: SizeReach) -> float:
         """Return a lower bound of the norm on a box."""
         values = least_of(self.nodes, self.lengths.terms(*reach.rod), self.lengths.rest, reach)
         return max(float(values.max(initial=0.0)), 0.0)

@@ -22,12 +22,12 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Interval, Value
-from laufruhe.prove.certificate import Reach, room_of
+from laufruhe.prove.certificate import ProofStrength, room_of
 from laufruhe.prove.mounts.provers import Question, proven
-from laufruhe.solvers.conclusion import KEPT, Design, concluded, judged
+from laufruhe.solvers.conclusion import KEPT, Design, build_result, evaluate_design
 from laufruhe.solvers.mounts.nonlinear import mounts_bound
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, searched, shown
+from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, shown, spread_starts
 
 STARTS, LOOKS = 2, 6
 """Searches, and designs looked at before these."""
@@ -41,14 +41,14 @@ def solve_mounted_sizes(problem: Problem) -> Result:
     initial, without_mounts = evaluate_start(problem), _on_given_mounts(problem)
     check_acts(SizeModel(without_mounts))
     program = LocalProgram.of(problem)
-    best = searched(
-        program, [*_first(program, without_mounts), *looks(problem)[:LOOKS]], min(problem.search.starts, STARTS)
+    best = best_local_optimum(
+        program, [*_first(program, without_mounts), *spread_starts(problem)[:LOOKS]], min(problem.search.starts, STARTS)
     )
-    design = judged(problem, program.values(best))
+    design = evaluate_design(problem, program.values(best))
     bound = _bound(problem, design)
     words = "local programs; bound of the mounts with any masses that the sizes may have" if bound else "local programs"
-    proof = shown(program, design, bound, Reach.ASIDE, words)
-    return concluded(design, initial, proof, {"solve": time.perf_counter() - started})
+    proof = shown(program, design, bound, ProofStrength.ASIDE, words)
+    return build_result(design, initial, proof, {"solve": time.perf_counter() - started})
 
 
 def _on_given_mounts(problem: Problem) -> Problem:

@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from laufruhe.extensions.sizes.bundles import Grouped, Number, Reach, corner, least_of
+from laufruhe.extensions.sizes.bundles import Grouped, Number, SizeReach, corner, least_of
 from laufruhe.extensions.sizes.model import MASSES, SizeModel
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.machine import Engine
@@ -66,7 +66,7 @@ class SizePrograms:
     ) -> None:
         self._model, self._terms, self._limits, self._ask = model, tuple(terms), tuple(limits), ask
 
-    def learned(self, lower: Array, upper: Array, reach: Reach, exactly: bool = False) -> Together | None:
+    def learned(self, lower: Array, upper: Array, reach: SizeReach, exactly: bool = False) -> Together | None:
         """Return the dual rows of a box's program; None where they bound nothing."""
         program = self.program(lower, upper, reach)
         x, multipliers = self._ask(program, exactly)
@@ -78,7 +78,7 @@ class SizePrograms:
         stripped = replace(program, terms=())
         return self._together(stripped, minorant(stripped, spread(stripped, multipliers)).multipliers)
 
-    def program(self, lower: Array, upper: Array, reach: Reach) -> AffineProblem:
+    def program(self, lower: Array, upper: Array, reach: SizeReach) -> AffineProblem:
         """Return the program of a box: its masses as decisions beside the unbalances, factors where they are least."""
         half = 0.5 * (reach.high - reach.low)
         moving = [int(k) for k in np.flatnonzero(half > 0.0)]
@@ -97,7 +97,7 @@ class SizePrograms:
         decisions = (*masses, *(domain.decision for domain in self._model.domains))
         return AffineProblem(terms, limits, domains_of(decisions), self._model.problem.fidelity.samples)
 
-    def _rows(self, number: Number, engine: Engine, reach: Reach) -> list[AffineNorm]:
+    def _rows(self, number: Number, engine: Engine, reach: SizeReach) -> list[AffineNorm]:
         rows = []
         for bundle in number.pieces:
             factors = self._model.factors(bundle.piece, number.measure, engine)
@@ -126,7 +126,7 @@ class SizePrograms:
             parts.append((number, tuple(Grouped.from_rows(bundle.lengths, rows) for bundle, rows in bundles)))
         return Together(tuple(parts), constant, size, not rows.terms)
 
-    def least(self, known: Together, lower: Array, upper: Array, reach: Reach) -> float:
+    def least(self, known: Together, lower: Array, upper: Array, reach: SizeReach) -> float:
         """Return the bound of a box from dual rows; infinite where they exclude it."""
         if not known.parts:
             return 0.0

@@ -19,14 +19,14 @@ from laufruhe.numerics.norms import Grid
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import Divided
-from laufruhe.prove.certificate import Multipliers, Reach
+from laufruhe.prove.best_first import BoxResult
+from laufruhe.prove.certificate import Multipliers, ProofStrength
 from laufruhe.solvers.boxes.box_designs import rebalance
-from laufruhe.solvers.conclusion import Design, concluded, known_of, none_within
+from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, known_of
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, proven, searched, shown
+from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proven, shown, spread_starts
 
 MOST_WITH_ROD, MOST_PROGRAMS = 300, 400
 """Boxes where the length of the rod is open, which take ten times as long, and where each has cone programs."""
@@ -99,11 +99,11 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
     with suppress(ValueError):
         boxes = SizeBoxes(model, ask_cones)
 
-    def bounded(value: float, room: float, design: Design) -> Divided:
+    def bounded(value: float, room: float, design: Design) -> BoxResult:
         usual = MOST_WITH_ROD if model.moves_rod else MOST_PROGRAMS if model.domains else MOST_BOXES
         most = problem.search.boxes_or(usual)
         if boxes is None:
-            return Divided(0.0, 0)
+            return BoxResult(0.0, 0)
         if known < value < math.inf:
             # a room is a share of the value
             value, room = known, room * known / value
@@ -115,25 +115,25 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
         conflict = smallest_conflict(
             problem.limits, lambda limits: divided_sizes(boxes.keeping(limits), math.inf, 0.0, 64).bound == math.inf
         )
-        return none_within(problem, initial, conflict, {"solve": time.perf_counter() - started})
+        return infeasible_result(problem, initial, conflict, {"solve": time.perf_counter() - started})
     if boxes is not None:
         words = f"local programs; lower bound on {outcome.divided.boxes} boxes of sizes"
     else:
         rod = "; nothing bounds what the length of the rod makes of a load"
         words = f"local programs{rod if model.moves_rod else ''}"
-    reach = Reach.ASIDE if boxes is None else Reach.WHOLE if boxes.is_whole else Reach.NEAR
+    reach = ProofStrength.ASIDE if boxes is None else ProofStrength.WHOLE if boxes.is_whole else ProofStrength.NEAR
     proof = shown(program, outcome.design, outcome.bound, reach, words)
-    return concluded(outcome.design, initial, proof, {"solve": time.perf_counter() - started})
+    return build_result(outcome.design, initial, proof, {"solve": time.perf_counter() - started})
 
 
 def _proposed(program: SizeProgram) -> Array:
     problem = program.problem
     first = program.shares(problem.start)
-    starts = [first, np.ones(len(first)), *looks(problem)]
+    starts = [first, np.ones(len(first)), *spread_starts(problem)]
     if program.model.domains:
         sizes = [program.columns(start)[program.sized] for start in starts[:2]]
         starts = [*(program.balanced(one) for one in sizes), *starts]
-    best = searched(program, starts, min(problem.search.starts, STARTS))
+    best = best_local_optimum(program, starts, min(problem.search.starts, STARTS))
     return min(best, program.balanced(program.columns(best)[program.sized]), key=program.rank)
 
 

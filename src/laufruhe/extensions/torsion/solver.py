@@ -14,12 +14,12 @@ from laufruhe.extensions.torsion.machine import TORSION
 from laufruhe.problem.channels import FLYWHEEL_INERTIA, IRREGULARITY
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import Divided, divide
-from laufruhe.prove.certificate import Reach
-from laufruhe.solvers.conclusion import KEPT, Design, concluded, known_of, none_within
+from laufruhe.prove.best_first import BoxResult, divide
+from laufruhe.prove.certificate import ProofStrength
+from laufruhe.solvers.conclusion import KEPT, Design, build_result, infeasible_result, known_of
 from laufruhe.solvers.method import Method, is_pointwise
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, proven, searched, shown
+from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proven, shown, spread_starts
 
 # open numbers that are divided, and boxes that this may take
 MOST_OPEN, MOST_BOXES = 3, 3000
@@ -34,14 +34,14 @@ def solve_torsion(problem: Problem) -> Result:
     started = time.perf_counter()
     initial = evaluate(problem)
     program = LocalProgram.of(problem)
-    best = searched(program, [program.shares(problem.start), *looks(problem)], problem.search.starts)
+    best = best_local_optimum(program, [program.shares(problem.start), *spread_starts(problem)], problem.search.starts)
     boxes = TwistBoxes(problem, initial)
     known = boxes.coordinates.is_exact and boxes.is_sampled_fully
     most = problem.search.boxes_or(MOST_BOXES if len(problem.decisions) <= MOST_OPEN else 0) if known else 0
 
-    def bounded(value: float, room: float, design: Design) -> Divided:
+    def bounded(value: float, room: float, design: Design) -> BoxResult:
         if not most or (value < math.inf and not boxes.has_terms):
-            return Divided(0.0, 0)
+            return BoxResult(0.0, 0)
         coordinates = boxes.coordinates
         place = coordinates.from_decisions(np.array([float(x.real) for x in design.values]))
         known = known_of(design, place) if value < math.inf else None
@@ -51,16 +51,17 @@ def solve_torsion(problem: Problem) -> Result:
     outcome = proven(program, best, bounded)
     if outcome.excludes_all:
         names = tuple(limit.name for limit in problem.limits)
-        return none_within(problem, initial, names, {"solve": time.perf_counter() - started})
+        return infeasible_result(problem, initial, names, {"solve": time.perf_counter() - started})
     method = f"local programs; lower bound on {outcome.divided.boxes} boxes of discs and shafts"
     is_near = boxes.coordinates.is_exact and boxes.knows_all and outcome.design.excess <= KEPT
     bound = outcome.bound if boxes.coordinates.is_exact else 0.0
-    proof = shown(program, outcome.design, bound, Reach.NEAR if is_near else Reach.ASIDE, method)
-    return concluded(outcome.design, initial, proof, {"solve": time.perf_counter() - started})
+    proof = shown(program, outcome.design, bound, ProofStrength.NEAR if is_near else ProofStrength.ASIDE, method)
+    return build_result(outcome.design, initial, proof, {"solve": time.perf_counter() - started})
 
 
 METHOD = Method(
-    "boxes of discs and shafts", {TORSION: ()}, Reach.NEAR, "laufruhe.extensions.torsion.solver:solve_torsion", True,
+    "boxes of discs and shafts", {TORSION: ()}, ProofStrength.NEAR,
+    "laufruhe.extensions.torsion.solver:solve_torsion", True,
     frozenset({*FACTORS, *RESONANCES, ABSORBER_HEAT, IRREGULARITY, FLYWHEEL_INERTIA}), is_pointwise,
     proves="the optimum of root mean squares of two or three; else a local one",
     before="flywheel, crankshaft and the rest apart",

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.led_model import LedModel, carried
+from laufruhe.load_models.phase_lead_model import PhaseLeadModel, carried
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms.norm import curvature
 from laufruhe.numerics.spectrum import Spectrum, spectrum_of
@@ -39,7 +39,7 @@ class _Part:
 class LeadSwing:
     """Bounds of the degree of irregularity over boxes of leads."""
 
-    def __init__(self, problem: Problem, model: LedModel, measure: Measure) -> None:
+    def __init__(self, problem: Problem, model: PhaseLeadModel, measure: Measure) -> None:
         fidelity, inertia = problem.fidelity, turning_inertia(problem.engine, problem.fidelity)
         if inertia is None:
             raise ModelError("degree of irregularity: the inertia of what turns is not told; add [flywheel]")

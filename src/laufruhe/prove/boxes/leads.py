@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from laufruhe.load_models.affine import AffineProblem
-from laufruhe.load_models.led_model import LedModel, LedNorm
+from laufruhe.load_models.phase_lead_model import PhaseLeadModel, PhaseLeadNorm
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import lengths
 from laufruhe.numerics.norms.norm import curvature, mean_square
@@ -88,7 +88,7 @@ class LeadBoxes:
         Model of a problem with open leads, and perhaps open unbalances.
     """
 
-    def __init__(self, model: LedModel) -> None:
+    def __init__(self, model: PhaseLeadModel) -> None:
         self.model = model
         problem = model.problem
         shafts = {shaft.name: shaft for shaft in problem.engine.shafts}
@@ -113,7 +113,8 @@ class LeadBoxes:
         return total, {name: by for name, by in over.items() if by > SLACK}
 
     def bound(
-        self, middle: Array, half: Array, program: AffineProblem, norms: Sequence[LedNorm], multipliers: Multipliers
+        self, middle: Array, half: Array, program: AffineProblem, norms: Sequence[PhaseLeadNorm],
+        multipliers: Multipliers,
     ) -> LeadBound:  # fmt: skip
         """Return the bound of a box by multipliers of the program at its middle, on any grid.
 
@@ -155,7 +156,7 @@ class LeadBoxes:
             tuple(broken),
         )
 
-    def _remainder(self, measure: Measure, s: int, led: LedNorm, z: Array, middle: Array, half: float) -> float:
+    def _remainder(self, measure: Measure, s: int, led: PhaseLeadNorm, z: Array, middle: Array, half: float) -> float:
         """Return an upper bound of the second order of a lead in <Z, V>."""
         rest, norm = self._rests[measure][s], led.norm
         if measure.norm.refinement == 1:

@@ -16,7 +16,7 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.roots import parted
 from laufruhe.numerics.witness import EXCESS
-from laufruhe.prove.best_first import Box, Divided, Halving, Over, halves, widest
+from laufruhe.prove.best_first import Box, BoxBisection, BoxResult, Over, halves, widest
 from laufruhe.prove.witness import Known, check_around, thin
 
 MOST_BOXES = 4000
@@ -77,7 +77,7 @@ class MonotoneProblem:
         return replace(self, limits=(*self.limits, (cutoff, Monotone(self.value, self.terms[0][1].signs))))
 
 
-class _MonotoneBoxes(Halving):
+class _MonotoneBoxes(BoxBisection):
     """Branch and bound over boxes without slices that violate a limit."""
 
     what = "boxes"
@@ -123,7 +123,7 @@ class _Around:
 
 def divided(
     problem: MonotoneProblem, value: float, room: float, most: int = MOST_BOXES, known: Known | None = None
-) -> Divided:  # fmt: skip
+) -> BoxResult:  # fmt: skip
     """Halve boxes until none may hold a design that is `room` better than `value` (T9).
 
     Parameters

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from laufruhe.errors import ModelError
-from laufruhe.load_models.led_model import LedModel
+from laufruhe.load_models.phase_lead_model import PhaseLeadModel
 from laufruhe.machine import Cycle, Engine, OperatingPoint, Seiliger, SliderCrank, kinematics
 from laufruhe.machine.facing import Facing
 from laufruhe.numerics.arrays import Array
@@ -148,7 +148,7 @@ class SharedGasBoxes:
     def __init__(self, problem: Problem) -> None:
         self.problem = problem
         still = replace(problem, points=tuple(replace(point, gas=None) for point in problem.points))
-        self._model = LedModel(still)
+        self._model = PhaseLeadModel(still)
         self._names = self._model.names
         if not all(_is_known(point.gas) for point in problem.points):
             raise ModelError("a lead between two cranks that share chambers is decided with a seiliger cycle")

@@ -15,7 +15,7 @@ from laufruhe.numerics.budget import at_least, passed
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import Divided
+from laufruhe.prove.best_first import BoxResult
 from laufruhe.prove.mounts.subdivision import divided_bounds, divides
 from laufruhe.prove.witness import Known
 
@@ -80,12 +80,12 @@ class Prover:
 
     name: str
     applies: Callable[[Problem], bool]
-    bounds: Callable[[Question], Iterator[Divided]]
+    bounds: Callable[[Question], Iterator[BoxResult]]
     before: str = ""
     of_moves: bool = False
 
 
-def _stiffness_bounds(question: Question) -> Iterator[Divided]:
+def _stiffness_bounds(question: Question) -> Iterator[BoxResult]:
     yield from divided_bounds(question.problem, question.value, question.room, (EARLY, 1.0), question.known)
 
 
@@ -100,11 +100,11 @@ def provers() -> tuple[Prover, ...]:
     return ordered
 
 
-def proven(question: Question) -> Divided:
+def proven(question: Question) -> BoxResult:
     """Run all provers that apply in rounds of growing work, until one closes the gap or time is over."""
     eligible = [prover for prover in provers() if prover.of_moves is (question.moves is not None)]
     running = [prover.bounds(question) for prover in eligible if prover.applies(question.problem)]
-    results: dict[Iterator[Divided], Divided] = {}
+    results: dict[Iterator[BoxResult], BoxResult] = {}
 
     def is_over() -> bool:
         return bool(results) and (passed() or not question.bound < question.value - question.room)
@@ -120,4 +120,4 @@ def proven(question: Question) -> Divided:
             else:
                 results[bounds], question.bound = result, max(question.bound, result.bound)
     places = [result.places for result in results.values() if result.places]
-    return Divided(question.bound, sum(result.boxes for result in results.values()), places[-1] if places else ())
+    return BoxResult(question.bound, sum(result.boxes for result in results.values()), places[-1] if places else ())

@@ -24,7 +24,7 @@ from laufruhe.problem.evaluation import with_default_sampling
 from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import NEARLY, Divided, divided_on
+from laufruhe.prove.best_first import NEARLY, BoxResult, divide_in_rounds
 from laufruhe.prove.mounts.box_lines import LinearRelaxation
 from laufruhe.prove.mounts.box_norms import LinearBound, under
 from laufruhe.prove.mounts.box_numbers import RANGES, SAID, UNDER, breaks
@@ -56,7 +56,7 @@ def divides(problem: Problem) -> bool:
 
 def divided_bounds(
     problem: Problem, value: float, room: float, shares: Sequence[float], known: Known | None = None
-) -> Iterator[Divided]:  # fmt: skip
+) -> Iterator[BoxResult]:  # fmt: skip
     """Yield bounds by boxes of stiffness, until no design is more than `room` better than `value`.
 
     Parameters
@@ -76,7 +76,7 @@ def divided_bounds(
     most = search.most_boxes
     if most and search.is_sampled_fully:
         counts = [math.ceil(share * most) for share in shares]
-        yield from divided_on(search, search.model.lower, search.model.upper, value, room, counts, known)
+        yield from divide_in_rounds(search, search.model.lower, search.model.upper, value, room, counts, known)
 
 
 class SimulatedBoxes(Protocol):

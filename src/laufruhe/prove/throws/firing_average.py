@@ -12,7 +12,7 @@ from fractions import Fraction
 from functools import reduce
 from operator import add
 
-from laufruhe.load_models.lone_parts import gas_tells_apart
+from laufruhe.load_models.isolated_cylinders import gas_distinguishes_cylinders
 from laufruhe.machine import Engine
 from laufruhe.numerics.spectrum import Spectrum, as_order
 from laufruhe.problem.evaluation import Evaluation, over
@@ -32,7 +32,7 @@ def firing_bound(problem: Problem, design: Evaluation) -> float:
     if any(term.measure.is_load and term.measure.is_inside for term in problem.objective) or problem.fidelity.is_uneven:
         return 0.0
     # shafts that are not built here may be elsewhere
-    if not _is_alike(engine) or not _is_alike(problem.engine) or gas_tells_apart(problem):
+    if not _is_alike(engine) or not _is_alike(problem.engine) or gas_distinguishes_cylinders(problem):
         return 0.0
     total = 0.0
     for term in problem.objective:

@@ -8,14 +8,14 @@ from laufruhe.present.numbers import DASH, figure, share, with_unit
 from laufruhe.present.tables import Table
 from laufruhe.prove.certificate import Proof
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.values import DecisionValue, Nearest, Reached, meaningful
+from laufruhe.solvers.values import AttainableLimit, DecisionValue, Nearest, meaningful
 
 NOTE = "Each column breaks the limit in its heading; none is an answer."
 
 
 def tables(result: Result) -> list[Table]:
     """Return the designs nearest to each limit, a row per decision."""
-    designs: list[tuple[str, Reached | Nearest]] = [
+    designs: list[tuple[str, AttainableLimit | Nearest]] = [
         (f"nearest to '{design.name}'", design) for design in result.reached if design.decisions
     ]
     designs += [("nearest to all limits", result.nearest)] if result.nearest is not None else []
@@ -40,7 +40,7 @@ def sentences(result: Result) -> list[str]:
     return texts if result.nearest is None else [*texts, _nearest(result.nearest)]
 
 
-def _sentence(limit: Reached, lead: str) -> str:
+def _sentence(limit: AttainableLimit, lead: str) -> str:
     if limit.why and math.isfinite(limit.value):
         stands, required = figure(limit.value, limit.unit), f"{limit.side} {with_unit(limit.limit, limit.unit)}"
         return f"'{limit.name}' stays at {stands}: {limit.why}; {required} is asked."

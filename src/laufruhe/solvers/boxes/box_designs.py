@@ -17,10 +17,18 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.prove.best_first import Over
-from laufruhe.prove.certificate import Reach
+from laufruhe.prove.certificate import ProofStrength
 from laufruhe.prove.witness import Known
 from laufruhe.solvers.boxes.search import Box, Search, divided
-from laufruhe.solvers.conclusion import Design, Shown, concluded, judged, known_of, none_within, unbalances_of
+from laufruhe.solvers.conclusion import (
+    Design,
+    ProofData,
+    build_result,
+    evaluate_design,
+    infeasible_result,
+    known_of,
+    unbalances_of,
+)
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
@@ -116,16 +124,16 @@ class RebalancedSearch(Search[S, RebalancedDesign]):
             best, bound, boxes = divided(self, root, first, nothing, problem.tolerance, most, f"boxes of {what}")
         timing = {"solve": time.perf_counter() - started}
         if best is None or (math.isinf(bound) and best.design.rank[0]):
-            return none_within(problem, initial, self.conflict, timing)
+            return infeasible_result(problem, initial, self.conflict, timing)
         balance, design = best.result, best.design
-        proof = Shown(
+        proof = ProofData(
             bound=0.0 if design.rank[0] else bound,
-            reach=Reach.WHOLE,
+            reach=ProofStrength.WHOLE,
             kkt_residual=balance.certificate.kkt_residual if balance and balance.certificate else math.inf,
             method=f"{how} {boxes} box{'es' * (boxes > 1)} of {what}",
             prices=(balance.prices if balance else {}) | self.prices(design),
         )
-        return concluded(design, replace(initial, samples=design.evaluation.samples), proof, timing)
+        return build_result(design, replace(initial, samples=design.evaluation.samples), proof, timing)
 
 
 def rebalance(problem: Problem, fixed: Problem, where: dict[str, Value], angles: int = 0) -> RebalancedDesign:
@@ -153,4 +161,4 @@ def rebalance(problem: Problem, fixed: Problem, where: dict[str, Value], angles:
             unbalances = unbalances_of(fixed, result)
             values |= dict(zip((decision.name for decision in fixed.decisions), unbalances, strict=True))
         samples = result.final.samples
-    return RebalancedDesign(judged(problem, list(values.values()), samples), result)
+    return RebalancedDesign(evaluate_design(problem, list(values.values()), samples), result)

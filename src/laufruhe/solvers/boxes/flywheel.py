@@ -17,13 +17,13 @@ from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import Divided
+from laufruhe.prove.best_first import BoxResult
 from laufruhe.prove.boxes.monotone import Monotone, MonotoneProblem, divided
-from laufruhe.prove.certificate import Reach
-from laufruhe.solvers.conclusion import Design, concluded, known_of, none_within
+from laufruhe.prove.certificate import ProofStrength
+from laufruhe.solvers.conclusion import Design, build_result, infeasible_result, known_of
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.smooth.local_programs import LocalProgram, looks, proven, searched, shown
+from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, proven, shown, spread_starts
 
 WIDTH = "flywheel.width"
 # share of the tolerance for a monotone objective, whose boxes close fast
@@ -139,9 +139,9 @@ def solve_flywheel(problem: Problem) -> Result:
     coordinates, plain = (_Coordinates.from_problem(problem, by_mass) for by_mass in (True, False))
     functions = coordinates.monotone_problem(initial, problem.limits)
     program = _WheelProgram(problem, *plain.bounds, plain.monotone_problem(initial, problem.limits))
-    best = searched(program, [program.shares(problem.start), *looks(problem)], problem.search.starts)
+    best = best_local_optimum(program, [program.shares(problem.start), *spread_starts(problem)], problem.search.starts)
 
-    def bounded(value: float, room: float, design: Design) -> Divided:
+    def bounded(value: float, room: float, design: Design) -> BoxResult:
         known = None if math.isinf(value) else known_of(design, coordinates.place(design.values), excess=0.0)
         result = divided(functions, value, (SHARPER if functions.is_monotone else 1.0) * room, known=known)
         return replace(result, places=tuple(coordinates.decisions(x) for x in result.places))
@@ -153,7 +153,7 @@ def solve_flywheel(problem: Problem) -> Result:
     answer = proven(program, best, bounded)
     timing = {"solve": time.perf_counter() - started}
     if answer.excludes_all:
-        return none_within(problem, initial, smallest_conflict(problem.limits, excluded), timing)
+        return infeasible_result(problem, initial, smallest_conflict(problem.limits, excluded), timing)
     method = f"monotone quantities, bounded on {answer.divided.boxes} boxes of the flywheel's numbers"
-    proof = shown(program, answer.design, answer.bound, Reach.WHOLE, method)
-    return concluded(answer.design, initial, proof, timing)
+    proof = shown(program, answer.design, answer.bound, ProofStrength.WHOLE, method)
+    return build_result(answer.design, initial, proof, timing)

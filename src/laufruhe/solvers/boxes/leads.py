@@ -14,7 +14,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import AffineProblem
-from laufruhe.load_models.led_model import LedModel, LedNorm
+from laufruhe.load_models.phase_lead_model import PhaseLeadModel, PhaseLeadNorm
 from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import Decision
 from laufruhe.problem.problem import Problem
@@ -25,7 +25,7 @@ from laufruhe.prove.certificate import Multipliers, best_bound
 from laufruhe.prove.witness import thin
 from laufruhe.solvers.boxes.box_designs import SHARE, RebalancedDesign, RebalancedSearch, rebalance
 from laufruhe.solvers.boxes.search import search_from_grid
-from laufruhe.solvers.conclusion import judged
+from laufruhe.solvers.conclusion import evaluate_design
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
 from laufruhe.solvers.result import Result
@@ -69,7 +69,7 @@ class LeadSearch(RebalancedSearch[_Box]):
 
     def __init__(self, problem: Problem) -> None:
         super().__init__(problem)
-        self.model = LedModel(problem)
+        self.model = PhaseLeadModel(problem)
         self.boxes = LeadBoxes(self.model)
         self.samples = max(problem.fidelity.samples // COARSE, 24) * COARSE
 
@@ -109,7 +109,7 @@ class LeadSearch(RebalancedSearch[_Box]):
         return self.boxes.bound(middle, half, fine, norms, bound.multipliers)
 
     def _bound_without_unbalances(
-        self, middle: Array, half: Array, program: AffineProblem, norms: tuple[LedNorm, ...]
+        self, middle: Array, half: Array, program: AffineProblem, norms: tuple[PhaseLeadNorm, ...]
     ) -> LeadBound:  # fmt: skip
         none = tuple(np.zeros_like(norm.constant) for _, norm in program.limits)
         for k, (most, norm) in enumerate(program.limits):
@@ -122,7 +122,8 @@ class LeadSearch(RebalancedSearch[_Box]):
         return self.boxes.bound(middle, half, program, norms, Multipliers(rows, none))
 
     def _excluded(
-        self, middle: Array, half: Array, program: AffineProblem, norms: tuple[LedNorm, ...], limits: tuple[Array, ...]
+        self, middle: Array, half: Array, program: AffineProblem, norms: tuple[PhaseLeadNorm, ...],
+        limits: tuple[Array, ...],
     ) -> LeadBound | None:  # fmt: skip
         # an infinite bound proves that the box has no feasible design
         stripped = replace(program, terms=())
@@ -154,7 +155,7 @@ class LeadSearch(RebalancedSearch[_Box]):
 
     def first(self) -> RebalancedDesign:
         """Return the best of the baseline design and of a few others."""
-        designs = [RebalancedDesign(judged(self.problem, self.problem.start))]
+        designs = [RebalancedDesign(evaluate_design(self.problem, self.problem.start))]
         if self.model.domains:
             designs += [
                 self.rebalance_at(self.model.start),
@@ -162,7 +163,7 @@ class LeadSearch(RebalancedSearch[_Box]):
             ]
         else:
             ends = search_from_grid(self._penalised, self.model.lower, self.model.upper, GRID, MOST_STARTS, MOST_STEPS)
-            designs += [RebalancedDesign(judged(self.problem, each.tolist())) for each in ends]
+            designs += [RebalancedDesign(evaluate_design(self.problem, each.tolist())) for each in ends]
         return min(designs, key=lambda each: each.rank)
 
     def rebalance_at(self, leads: Array) -> RebalancedDesign:

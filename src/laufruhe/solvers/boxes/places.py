@@ -22,10 +22,10 @@ from laufruhe.prove.witness import thin
 from laufruhe.solvers.boxes.box_designs import SHARE, RebalancedDesign, RebalancedSearch, rebalance
 from laufruhe.solvers.boxes.place_boxes import Relaxation
 from laufruhe.solvers.boxes.search import divided
-from laufruhe.solvers.conclusion import Design, judged, none_within, values_of
+from laufruhe.solvers.conclusion import Design, evaluate_design, infeasible_result, values_of
 from laufruhe.solvers.cones.unbalances import solve_unbalances
 from laufruhe.solvers.prices import ACTIVE, Price, Slopes, edges_at, prices_of
-from laufruhe.solvers.relaxed import with_bound
+from laufruhe.solvers.relaxation import with_bound
 from laufruhe.solvers.result import Result, Status
 
 Solve: TypeAlias = Callable[[Problem], Result]
@@ -99,11 +99,11 @@ def solve_places_with(problem: Problem, prove: Solve, how: str, propose: Propose
     search = _PlaceSearchByMethod(problem, prove_roughly)
     root = search.box(*search.bounds)
     if isinstance(root, Over):
-        return none_within(problem, evaluate(problem), search.conflict, {"solve": time.perf_counter() - started})
+        return infeasible_result(problem, evaluate(problem), search.conflict, {"solve": time.perf_counter() - started})
     result = propose(problem, [root.near])
     if not result.status.has_design or not problem.search.proves:
         return result
-    first = RebalancedDesign(judged(problem, values_of(problem, result), result.final.samples), result)
+    first = RebalancedDesign(evaluate_design(problem, values_of(problem, result), result.final.samples), result)
     _, bound, _ = divided(search, root, first, numerical_zero(problem), problem.tolerance, 1, "boxes of places")
     return with_bound(result, bound, f"{how} with places at the corners of their bounds")
 

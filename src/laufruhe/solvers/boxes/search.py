@@ -13,7 +13,7 @@ import numpy as np
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.budget import passed
 from laufruhe.numerics.workers import Speculation, speculation
-from laufruhe.prove.best_first import Division, Over, Parts, Waiting
+from laufruhe.prove.best_first import BranchAndBound, OpenNode, Over, Parts
 from laufruhe.prove.certificate import gap_of
 from laufruhe.prove.witness import Bounder, Known, check_around
 
@@ -93,7 +93,7 @@ class Search(Generic[B, D]):
         """Add names of limits that boxes of a worker process violate."""
 
 
-class _Branching(Division[B], Generic[B, D]):
+class _Branching(BranchAndBound[B], Generic[B, D]):
     """Branch and bound that keeps the best design of all boxes."""
 
     def __init__(
@@ -112,13 +112,13 @@ class _Branching(Division[B], Generic[B, D]):
         """Return whether the best design lies in a box."""
         return self._search.holds(box, self.best)
 
-    def is_done(self, one: Waiting[B]) -> bool:
+    def is_fathomed(self, one: OpenNode[B]) -> bool:
         """Return whether the gap between a box and the incumbent is closed."""
         gap = gap_of(self.value, one.bound, self._nothing)
         # the bound of an exact box differs from its best design by no more than the tolerance of its program
         return gap <= NEARLY * self._tolerance or (gap < np.inf and one.part.is_exact)
 
-    def parts(self, taken: Sequence[Waiting[B]]) -> Parts[B]:
+    def parts(self, taken: Sequence[OpenNode[B]]) -> Parts[B]:
         """Yield the parts of a box, prepared by workers if the search is shared."""
         ((bound, name, box),) = taken
         search, step = self._search, (self._search, box, self.value)

@@ -15,9 +15,18 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.prove.best_first import divide
 from laufruhe.prove.boxes.shared_gas import SharedGasBoxes
-from laufruhe.prove.certificate import Reach
+from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.boxes.search import search_from_grid
-from laufruhe.solvers.conclusion import KEPT, Design, Shown, better, concluded, judged, known_of, none_within
+from laufruhe.solvers.conclusion import (
+    KEPT,
+    Design,
+    ProofData,
+    better,
+    build_result,
+    evaluate_design,
+    infeasible_result,
+    known_of,
+)
 from laufruhe.solvers.result import Result
 
 MOST_BOXES = 20_000
@@ -40,9 +49,9 @@ def solve_shared_leads(problem: Problem) -> Result:
     divided = divide(boxes, lower, upper, value, room, problem.search.boxes_or(MOST_BOXES), known)
     timing = {"solve": time.perf_counter() - started}
     if best is None or (known is None and math.isinf(divided.bound)):
-        return none_within(problem, initial, tuple(limit.name for limit in problem.limits), timing)
+        return infeasible_result(problem, initial, tuple(limit.name for limit in problem.limits), timing)
     method = f"local searches; lower bound on {divided.boxes} box{'es' * (divided.boxes > 1)} of leads"
-    return concluded(best, initial, Shown(divided.bound, Reach.WHOLE, math.inf, method), timing)
+    return build_result(best, initial, ProofData(divided.bound, ProofStrength.WHOLE, math.inf, method), timing)
 
 
 def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
@@ -50,7 +59,7 @@ def _best_design(problem: Problem, lower: Array, upper: Array) -> Design | None:
 
     def design(leads: Array) -> Design | None:
         try:
-            return judged(problem, [float(x) for x in np.clip(leads, lower, upper)])
+            return evaluate_design(problem, [float(x) for x in np.clip(leads, lower, upper)])
         except ModelError:
             return None
 

@@ -18,7 +18,7 @@ from laufruhe.problem.dependence import depends
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.numerical_zero import numerical_zero
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, judged, unbalances_of
+from laufruhe.solvers.conclusion import FEASIBLE, KEPT, evaluate_design, unbalances_of
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.tie_break import distance
 from laufruhe.solvers.prices import angle_name
@@ -104,7 +104,7 @@ def free_decisions(result: Result) -> tuple[DecisionRange, ...] | None:
         for share in SHARES:
             there = x + share * (end - x)
             values = [domain.complex_value(there) for domain in model.domains]
-            design = judged(problem, values, result.final.samples)
+            design = evaluate_design(problem, values, result.final.samples)
             if design.value <= highest and design.excess <= KEPT:
                 designs.append(there)
                 break

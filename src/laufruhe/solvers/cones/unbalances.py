@@ -18,8 +18,17 @@ from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.mount_resonance import off_resonance
 from laufruhe.problem.numerical_zero import ROUNDING, numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Reach, best_bound, gap_of, kkt_residual
-from laufruhe.solvers.conclusion import FEASIBLE, KEPT, Shown, broken_limits, concluded, judged, none_within, not_found
+from laufruhe.prove.certificate import ProofStrength, best_bound, gap_of, kkt_residual
+from laufruhe.solvers.conclusion import (
+    FEASIBLE,
+    KEPT,
+    ProofData,
+    broken_limits,
+    build_result,
+    evaluate_design,
+    failed_result,
+    infeasible_result,
+)
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.cones.equations import refine_multipliers
 from laufruhe.solvers.cones.newton_polish import Optimum, polish
@@ -27,7 +36,7 @@ from laufruhe.solvers.cones.tie_break import break_ties
 from laufruhe.solvers.conflicts import smallest
 from laufruhe.solvers.prices import Price, affine_prices
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.told_limits import told_excess
+from laufruhe.solvers.sampling_refinement import violation_at_fine_sampling
 
 MOST_DOUBLINGS = 4
 MOST_MARGINS = 3
@@ -75,7 +84,7 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
     modelled = time.perf_counter()
     fixed, hopeless = _fixed_limits(problem, model)
     if hopeless:
-        return none_within(problem, initial, hopeless, {"model": modelled - started})
+        return infeasible_result(problem, initial, hopeless, {"model": modelled - started})
     model = model.with_limits([limit for limit in problem.limits if limit not in fixed])
     begin = int(angles * float(problem.engine.cycle.base_order / model.base))
     optimum, samples = _refine(model.problem, model, numerical_zero(problem), begin)
@@ -87,29 +96,29 @@ def solve_unbalances(problem: Problem, polished: bool = False, angles: int = 0) 
         sound = model.at(samples, averaged=True)
         names = [limit.name for limit in limits]
         if not is_infeasible(sound):
-            return not_found(problem, initial, names, timing)
-        return none_within(problem, initial, smallest_conflict(sound, names), timing)
+            return failed_result(problem, initial, names, timing)
+        return infeasible_result(problem, initial, smallest_conflict(sound, names), timing)
     if polished:
         optimum = polish(model, optimum)
     values = [domain.complex_value(optimum.x) for domain in model.domains]
     cycle_samples = int(optimum.problem.samples * float(model.base / problem.engine.cycle.base_order))
-    design = judged(problem, values, cycle_samples)
+    design = evaluate_design(problem, values, cycle_samples)
     if fixed and design.excess > KEPT:
-        design = judged(problem, values, with_fine_sampling(design.evaluation).samples)
+        design = evaluate_design(problem, values, with_fine_sampling(design.evaluation).samples)
     initial = replace(initial, samples=design.evaluation.samples)
     timing["evaluate"] = time.perf_counter() - solved
     bound = optimum.bound
     prices, bounds = affine_prices(optimum.problem, limits, optimum.x, bound)
     unit = design.value if design.value > optimum.nothing else optimum.nothing / ROUNDING
-    proof = Shown(
+    proof = ProofData(
         bound=bound.value,
-        reach=Reach.WHOLE,
+        reach=ProofStrength.WHOLE,
         kkt_residual=kkt_residual(optimum.problem, optimum.x, bound, unit),
         method=f"second-order cones at {optimum.samples} angles{optimum.then}, dual bound at {optimum.problem.samples}",
         prices=dict.fromkeys([(limit, "at most") for limit in fixed], Price(0.0, math.inf)) | prices,
         bounds=bounds,
     )
-    return concluded(design, initial, proof, timing)
+    return build_result(design, initial, proof, timing)
 
 
 def _fixed_limits(problem: Problem, model: AffineModel) -> tuple[list[Limit], tuple[str, ...]]:
@@ -160,8 +169,8 @@ def _refine(problem: Problem, model: AffineModel, nothing: float, begin: int) ->
         rows = max(len(norm.grid.weights) for _, norm in best.problem.terms)
         is_close = best.gap <= problem.tolerance or not problem.search.proves
         is_allowed = best.excess <= (FEASIBLE if k < MOST_DOUBLINGS else KEPT)
-        is_done = is_allowed and (is_close or k >= MOST_DOUBLINGS)
-        if rows > MOST_ROWS or (is_done and _keeps_limits_finely(problem, optimum)):
+        is_fathomed = is_allowed and (is_close or k >= MOST_DOUBLINGS)
+        if rows > MOST_ROWS or (is_fathomed and _keeps_limits_finely(problem, optimum)):
             break
         samples *= 2
     return best, samples
@@ -172,7 +181,7 @@ def _keeps_limits_finely(problem: Problem, optimum: Optimum) -> bool:
     if not any(limit.measure.is_load for limit in problem.load_limits):
         return True
     values = [domain.complex_value(optimum.x) for domain in optimum.problem.domains]
-    return told_excess(problem, evaluate(problem, problem.design(values))) <= KEPT
+    return violation_at_fine_sampling(problem, evaluate(problem, problem.design(values))) <= KEPT
 
 
 def allowed_optimum(problem: Problem, model: AffineModel, samples: int, nothing: float) -> Optimum | None:

@@ -13,15 +13,15 @@ from laufruhe.numerics.budget import in_time, passed
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.best_first import NEARLY, Divided
-from laufruhe.prove.certificate import Reach, certified, room_of
+from laufruhe.prove.best_first import NEARLY, BoxResult
+from laufruhe.prove.certificate import ProofStrength, certified, room_of
 from laufruhe.prove.mounts.provers import Question, proven
 from laufruhe.prove.mounts.subdivision import divided_bounds, divides
 from laufruhe.solvers.conclusion import KEPT, Design, known_of, values_of
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.mounts.search import MountSearch
 from laufruhe.solvers.result import Result
-from laufruhe.solvers.told_limits import over_read
+from laufruhe.solvers.sampling_refinement import over_read
 
 MOST_DIVISIONS = 3
 # share of the boxes of a problem that each set of limits may use up
@@ -34,7 +34,7 @@ def mount_numbers(design: Design) -> Array:
     return np.array([float(value.real) for decision, value in pairs if not decision.is_affine])
 
 
-def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
+def divided_by(problem: Problem, search: MountSearch, among: bool) -> BoxResult:
     """Bound the result of a search by all provers; continue the search where their bounds are least.
 
     Parameters
@@ -42,7 +42,7 @@ def divided_by(problem: Problem, search: MountSearch, among: bool) -> Divided:
     among
         Whether the problem is one of several. Those with more than stiffness open then wait for `bounded_under`.
     """
-    divided = Divided(0.0, 0)
+    divided = BoxResult(0.0, 0)
     if search.moves is not None or not problem.search.proves or (among and not divides(problem)):
         return divided
     for _ in in_time(range(MOST_DIVISIONS)):
@@ -88,7 +88,13 @@ def bounded_under(result: Result, value: float, enough: float = math.inf, of_man
         return result
     text = f"{certificate.method}; bounds of mounts looked at in {divided.boxes} box{'es' if divided.boxes > 1 else ''}"
     certificate = certified(
-        result.objective.value, divided.bound, nothing, problem.tolerance, Reach.NEAR, certificate.kkt_residual, text
+        result.objective.value,
+        divided.bound,
+        nothing,
+        problem.tolerance,
+        ProofStrength.NEAR,
+        certificate.kkt_residual,
+        text,
     )
     return replace(result, certificate=certificate)
 

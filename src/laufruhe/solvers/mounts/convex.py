@@ -20,7 +20,7 @@ from laufruhe.problem.decision import STIFFNESS, Decision, sides_of
 from laufruhe.problem.measure import Limit, Measure, Side
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Reach
+from laufruhe.prove.certificate import ProofStrength
 from laufruhe.prove.mounts.convex_functions import (
     Compliance,
     ConvexDuals,
@@ -33,7 +33,14 @@ from laufruhe.prove.mounts.convex_functions import (
     StiffnessMatrices,
     dual_bound,
 )
-from laufruhe.solvers.conclusion import Shown, better, concluded, given_design, judged, none_within
+from laufruhe.solvers.conclusion import (
+    ProofData,
+    better,
+    build_result,
+    evaluate_design,
+    infeasible_result,
+    initial_design,
+)
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.prices import Price, bounds_of
 from laufruhe.solvers.result import Result
@@ -133,12 +140,12 @@ def solve_convex_mounts(problem: Problem) -> Result:
             limits = tuple(limit for limit in program.limits if problem.limits[limit.source] in kept)
             return solve_cones(replace(program, terms=(), limits=limits)) is None
 
-        return none_within(problem, initial, smallest_conflict(problem.limits, excluded), timing)
+        return infeasible_result(problem, initial, smallest_conflict(problem.limits, excluded), timing)
     x, duals = solution
     bound, gradient = dual_bound(program, x, duals)
-    proof = Shown(
+    proof = ProofData(
         bound=bound,
-        reach=Reach.WHOLE,
+        reach=ProofStrength.WHOLE,
         kkt_residual=_residual(program, x, duals, gradient),
         method="linear matrix inequalities, dual bound over the box of stiffnesses",
         prices=_prices(problem, program, duals),
@@ -148,8 +155,8 @@ def solve_convex_mounts(problem: Problem) -> Result:
             for name, price in bounds_of(decision, np.array([value]), gradient[k : k + 1]).items()
         },
     )
-    design = better(judged(problem, [float(v) for v in x]), given_design(problem, initial))
-    return concluded(design, initial, proof, {**timing, "evaluate": time.perf_counter() - solved})
+    design = better(evaluate_design(problem, [float(v) for v in x]), initial_design(problem, initial))
+    return build_result(design, initial, proof, {**timing, "evaluate": time.perf_counter() - solved})
 
 
 def _prices(problem: Problem, program: ConvexProgram, duals: ConvexDuals) -> dict[Side, Price]:

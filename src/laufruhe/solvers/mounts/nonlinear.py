@@ -22,18 +22,27 @@ from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import Divided
-from laufruhe.prove.certificate import Reach, gap_of, room_of
+from laufruhe.prove.best_first import BoxResult
+from laufruhe.prove.certificate import ProofStrength, gap_of, room_of
 from laufruhe.prove.mounts.named import named_part
 from laufruhe.prove.mounts.provers import Question, proven, provers
 from laufruhe.prove.mounts.subdivision import divides
-from laufruhe.solvers.conclusion import KEPT, Design, Shown, concluded, decided, nearest_of, none_within, unbalances_of
+from laufruhe.solvers.conclusion import (
+    KEPT,
+    Design,
+    ProofData,
+    build_result,
+    decided,
+    infeasible_result,
+    nearest_of,
+    unbalances_of,
+)
 from laufruhe.solvers.cones.unbalances import conflict_on_any_mounts, solve_unbalances
 from laufruhe.solvers.mounts.bounds import conflict_of, divided_by, excludes
 from laufruhe.solvers.mounts.convex import CONVEX, is_convex, solve_convex_mounts
-from laufruhe.solvers.mounts.places import Place, judged_at
+from laufruhe.solvers.mounts.places import Place, evaluate_design_at
 from laufruhe.solvers.mounts.search import MountSearch, SearchResult
-from laufruhe.solvers.mounts.starts import looks, place_of
+from laufruhe.solvers.mounts.starts import evaluation_count, place_of
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.smooth.ipopt import run
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, ends_in_words
@@ -103,7 +112,7 @@ def _solved(
     """Return the result, and deviations of the throws [rad]."""
     started = time.perf_counter()
     initial = evaluate_start(problem)
-    worth = looks(problem) >= MANY_LOOKS and workers != 1 and not among
+    worth = evaluation_count(problem) >= MANY_LOOKS and workers != 1 and not among
     with worker_pool(run, *(prover.bounds for prover in provers())) if worth else nullcontext():
         search = MountSearch(problem, initial, workers, moves, first, beside=moves is None)
         modelled = time.perf_counter()
@@ -149,7 +158,7 @@ def _balance(share: tuple[Problem, Sequence[float]]) -> tuple[list[complex], flo
 def _rebalanced(design: Design, unbalances: Sequence[complex], gap: float) -> tuple[Design, float] | None:
     mounts, columns = iter(_mounts(design)), iter(unbalances)
     values = [next(columns) if d.is_affine else next(mounts) for d in design.problem.decisions]
-    again = judged_at(design.problem, values)
+    again = evaluate_design_at(design.problem, values)
     return None if again is None or again.excess > KEPT else (again, gap)
 
 
@@ -216,7 +225,7 @@ def _result(
     initial: Evaluation,
     best: SearchResult,
     proven: tuple[Design, float] | None,
-    divided: Divided,
+    divided: BoxResult,
     timing: dict[str, float],
     among: bool,
 ) -> Result:
@@ -226,9 +235,9 @@ def _result(
     # the bound does not hold for moved throws
     if search.moves is None and problem.search.proves and gap_of(design.value, bound, nothing) > problem.tolerance:
         bound = max(bound, mounts_bound(problem, () if among else design.values))
-    proof = Shown(
+    proof = ProofData(
         bound=bound,
-        reach=Reach.NEAR if divided.boxes else Reach.ASIDE,
+        reach=ProofStrength.NEAR if divided.boxes else ProofStrength.ASIDE,
         kkt_residual=optimum.kkt_residual if optimum is not None else math.inf,
         method=_method(search.optima, max(design.value, nothing), proven, divided),
         prices=best.joint.prices(optimum) if optimum is not None else {},
@@ -236,10 +245,12 @@ def _result(
     if search.moves is not None:
         # prices of limits depend on the open throws
         design = replace(design, problem=replace(design.problem, phasing=search.moves.phasing))
-    return concluded(design, initial, proof, timing)
+    return build_result(design, initial, proof, timing)
 
 
-def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, float] | None, divided: Divided) -> str:
+def _method(
+    optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, float] | None, divided: BoxResult
+) -> str:
     different = distinct(optima, scale)
     text = ends_in_words(optima, len(different))
     if len(different) > 1 and different[-1].value > WORTH_SAYING * different[0].value > 0.0:
@@ -252,13 +263,13 @@ def _method(optima: Sequence[LocalOptimum], scale: float, proven: tuple[Design, 
 
 
 def _none(
-    problem: Problem, search: MountSearch, initial: Evaluation, divided: Divided, timing: dict[str, float]
+    problem: Problem, search: MountSearch, initial: Evaluation, divided: BoxResult, timing: dict[str, float]
 ) -> Result:
     """Return a result without a design, with the limits that contradict each other if that is proven."""
     conflict = _proven_conflict(problem)
     if not conflict and divided.bound == math.inf:
         conflict = conflict_of(problem)
-    result = none_within(problem, initial, conflict, timing)
+    result = infeasible_result(problem, initial, conflict, timing)
     if conflict:
         return result
     nearest = min(search.optima, key=lambda o: o.violation)

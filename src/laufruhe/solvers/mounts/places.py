@@ -10,16 +10,16 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.solvers.conclusion import Design, judged
+from laufruhe.solvers.conclusion import Design, evaluate_design
 
 Place: TypeAlias = tuple[list[float], Array | None]
 """Numbers of the mounts, and columns of the unbalances or None."""
 
 
-def judged_at(problem: Problem, values: Sequence[Value]) -> Design | None:
+def evaluate_design_at(problem: Problem, values: Sequence[Value]) -> Design | None:
     """Return a design by the exact model, or None on an undamped resonance."""
     try:
-        return judged(problem, values)
+        return evaluate_design(problem, values)
     except ModelError:
         return None
 
@@ -28,4 +28,4 @@ def started_at(problem: Problem, place: tuple[list[float], Array]) -> Design | N
     """Return the design at mounts and columns of unbalances, or None on an undamped resonance."""
     mounts, columns = iter(place[0]), place[1]
     unbalances = iter(domain.complex_value(columns) for domain in domains_of(problem.unbalances))
-    return judged_at(problem, [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions])
+    return evaluate_design_at(problem, [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions])

@@ -19,8 +19,8 @@ from laufruhe.problem.measure import Limit
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.solvers.conclusion import FEASIBLE, Design, given_design
-from laufruhe.solvers.mounts.places import Place, judged_at, started_at
+from laufruhe.solvers.conclusion import FEASIBLE, Design, initial_design
+from laufruhe.solvers.mounts.places import Place, evaluate_design_at, started_at
 from laufruhe.solvers.mounts.starts import start_points
 from laufruhe.solvers.smooth.local_optimum import LocalOptimum, distinct, is_explored
 from laufruhe.solvers.smooth.nonlinear import Enough, solve_nonlinear, try_all
@@ -111,7 +111,7 @@ class MountSearch:
         self._ignored = self._limits_with_room()
         report_progress("smooth program of all that is open")
         self.joint = self._program()
-        self._baseline = given_design(problem, initial) if moves is None else None
+        self._baseline = initial_design(problem, initial) if moves is None else None
         self.best: SearchResult | None = None
         self._nearly_feasible: list[SearchResult] = []
         self._active_again: set[Limit] = set()
@@ -279,7 +279,7 @@ class MountSearch:
             # throws at an end that is no optimum may not fire in their order
             return None
         values: list[Value] = [next(unbalances) if d.is_affine else next(mounts) for d in problem.decisions]
-        return judged_at(problem, values)
+        return evaluate_design_at(problem, values)
 
     def _nudged(self, generator: np.random.Generator, k: int) -> Array:
         # a symmetric star may be a saddle, so later starts are random

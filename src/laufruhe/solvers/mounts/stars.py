@@ -27,21 +27,21 @@ from laufruhe.problem.measure import Measure, Term
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Method
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.best_first import Divided
-from laufruhe.prove.certificate import Proof, Reach, certified, room_of
+from laufruhe.prove.best_first import BoxResult
+from laufruhe.prove.certificate import Proof, ProofStrength, certified, room_of
 from laufruhe.prove.mounts.provers import Question, proven
-from laufruhe.solvers.conclusion import contradiction, judged, known_of, result_under, values_of
+from laufruhe.solvers.conclusion import contradiction, evaluate_design, known_of, result_under, values_of
 from laufruhe.solvers.mounts.bounds import bounded_under, mount_numbers
 from laufruhe.solvers.mounts.nonlinear import solve_mounts, solve_moved
 from laufruhe.solvers.mounts.starts import place_of
 from laufruhe.solvers.result import Result, Status
+from laufruhe.solvers.sampling_refinement import over_read
 from laufruhe.solvers.stars.cut_search import search_designs
 from laufruhe.solvers.stars.even_search import MOST_LISTED
 from laufruhe.solvers.stars.families import Family, families_of
 from laufruhe.solvers.stars.ranking import RankedStar, distinct_orders, ranked_star, ranking_result
 from laufruhe.solvers.stars.star_results import StarDesign, no_star, with_star
 from laufruhe.solvers.throws.throw_starts import firing_intervals, starts_of, why_none_fires
-from laufruhe.solvers.told_limits import over_read
 
 MOST_SEARCHED = 3
 # starts of a star besides the mounts of the first of the ranking
@@ -250,15 +250,17 @@ def _result(problem: Problem, phasing: Phasing, found: list[StarDesign], designs
     certificate = best.result.certificate
     if certificate is not None:
         text, residual = f"{method}; of the best: {certificate.method}", certificate.kkt_residual
-        certificate = certified(best.value, bound, nothing, problem.tolerance, Reach.NEAR, residual, text, doubt)
+        certificate = certified(
+            best.value, bound, nothing, problem.tolerance, ProofStrength.NEAR, residual, text, doubt
+        )
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 
 
-def _divided(problem: Problem, phasing: Phasing, best: StarDesign) -> Divided:
+def _divided(problem: Problem, phasing: Phasing, best: StarDesign) -> BoxResult:
     if phasing.throw_bounds is None or not best.is_met or not problem.search.proves or passed():
-        return Divided(0.0, 0)
+        return BoxResult(0.0, 0)
     realised = with_default_sampling(replace(phasing.realise(best.candidate), phasing=None))
-    design = judged(realised, values_of(realised, best.result))
+    design = evaluate_design(realised, values_of(realised, best.result))
     known = known_of(design, mount_numbers(design))
     value = design.value - over_read(realised, design.evaluation)
     room = room_of(value, problem.tolerance, numerical_zero(problem, design.evaluation.engine))

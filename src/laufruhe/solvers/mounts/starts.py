@@ -36,7 +36,7 @@ MISSED_WEIGHT = 10.0
 POOL_SAMPLES, POOL_ORDERS = 72, 18
 
 
-def looks(problem: Problem) -> int:
+def evaluation_count(problem: Problem) -> int:
     """Return the number of operating points that the candidates evaluate, a measure of the time of a search."""
     return _candidates(problem) * len(problem.points)
 

@@ -19,11 +19,11 @@ from laufruhe.problem.measure import Side
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
-from laufruhe.prove.best_first import Divided
-from laufruhe.prove.certificate import Reach, room_of
-from laufruhe.solvers.conclusion import KEPT, Design, Shown, judged
+from laufruhe.prove.best_first import BoxResult
+from laufruhe.prove.certificate import ProofStrength, room_of
+from laufruhe.solvers.conclusion import KEPT, Design, ProofData, evaluate_design
 from laufruhe.solvers.prices import Price, Slopes, bounds_of, edges_at, prices_of
-from laufruhe.solvers.told_limits import over_read
+from laufruhe.solvers.sampling_refinement import over_read
 
 # designs looked at for each start of the search; step of a slope, room that is none, and an objective that is far off
 LOOKS, STEP, HELD, FAR = 4, 1e-6, 1e-6, 1e3
@@ -109,7 +109,7 @@ class LocalProgram:
         return _rank(self.numbers(shares))
 
 
-def looks(problem: Problem) -> list[Array]:
+def spread_starts(problem: Problem) -> list[Array]:
     """Designs spread evenly over the bounds of every column."""
     rng, many = np.random.default_rng(problem.search.seed), LOOKS * problem.search.starts
     # of each number one in every share of its bounds
@@ -117,7 +117,7 @@ def looks(problem: Problem) -> list[Array]:
     return list(np.array(columns).T)
 
 
-def searched(program: LocalProgram, places: list[Array], starts: int) -> Array:
+def best_local_optimum(program: LocalProgram, places: list[Array], starts: int) -> Array:
     """The best design of local programs from the best of some places."""
     ranked = sorted(in_time(places), key=program.rank)
     best = ranked[0]
@@ -178,7 +178,7 @@ def _rank(numbers: Array) -> tuple[float, float]:
     return max(-min(rooms, default=0.0), KEPT), float(value)
 
 
-Bounded: TypeAlias = Callable[[float, float, Design], Divided]
+BoxSearch: TypeAlias = Callable[[float, float, Design], BoxResult]
 """What no design goes under, where one of this value is known and another by less than this room no better; the one."""
 
 
@@ -188,7 +188,7 @@ class Proven:
 
     shares: Array
     design: Design
-    divided: Divided
+    divided: BoxResult
 
     @property
     def excludes_all(self) -> bool:
@@ -201,10 +201,10 @@ class Proven:
         return self.divided.bound if self.design.excess <= KEPT else 0.0
 
 
-def proven(program: LocalProgram, best: Array, bounded: Bounded) -> Proven:
+def proven(program: LocalProgram, best: Array, bounded: BoxSearch) -> Proven:
     """A design and its bound, sought once more where boxes promise more than what was found."""
     problem = program.problem
-    found = Proven(best, judged(problem, program.values(best)), Divided(0.0, 0))
+    found = Proven(best, evaluate_design(problem, program.values(best)), BoxResult(0.0, 0))
     for _ in range(TRIES):
         if passed():
             break
@@ -218,14 +218,14 @@ def proven(program: LocalProgram, best: Array, bounded: Bounded) -> Proven:
         places = [program.place(x) for x in found.divided.places]
         if not places or found.divided.bound >= value - room:
             break
-        again = searched(program, [found.shares, *places], len(places) + 1)
+        again = best_local_optimum(program, [found.shares, *places], len(places) + 1)
         if program.rank(again) >= program.rank(found.shares):
             break
-        found = Proven(again, judged(problem, program.values(again)), found.divided)
+        found = Proven(again, evaluate_design(problem, program.values(again)), found.divided)
     return found
 
 
-def shown(program: LocalProgram, design: Design, bound: float, reach: Reach, method: str) -> Shown:
+def shown(program: LocalProgram, design: Design, bound: float, reach: ProofStrength, method: str) -> ProofData:
     """A bound, with multipliers of the limits and bounds that hold a design, and how far these are from balance."""
     from scipy.optimize import nnls
 
@@ -253,7 +253,7 @@ def shown(program: LocalProgram, design: Design, bound: float, reach: Reach, met
         prices[limit, side] = Price.both(float(share) * scale / (steep * (abs(edge) or 1.0)))
         left = left - float(share) * scale / steep * slopes[1 + k]
     bounds = _both_sides(program, best, slopes, left, sides, prices)
-    return Shown(bound, reach, float(rest), method, prices, bounds)
+    return ProofData(bound, reach, float(rest), method, prices, bounds)
 
 
 def _both_sides(

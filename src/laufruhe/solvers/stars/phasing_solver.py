@@ -12,14 +12,14 @@ from typing import TypeAlias
 import numpy as np
 
 from laufruhe.errors import ModelError, SolverError, counted
-from laufruhe.load_models.lone_parts import gas_tells_apart
+from laufruhe.load_models.isolated_cylinders import gas_distinguishes_cylinders
 from laufruhe.machine.firing import MOST_ORDERS
 from laufruhe.numerics.budget import limited, passed
 from laufruhe.numerics.progress import report_progress
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.certificate import Reach, certified, room_of
+from laufruhe.prove.certificate import ProofStrength, certified, room_of
 from laufruhe.prove.throws.firing_average import firing_bound
 from laufruhe.solvers.conclusion import quoted, result_under
 from laufruhe.solvers.result import Result, Status
@@ -61,7 +61,7 @@ def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
     if phasing is None:
         raise SolverError("nothing of the phasing is open")
     has_wheel = bool(flywheel_measures(problem))
-    if phasing.throws is None and has_wheel and not phasing.continuous and not gas_tells_apart(problem):
+    if phasing.throws is None and has_wheel and not phasing.continuous and not gas_distinguishes_cylinders(problem):
         return solve_alike_stars(problem, phasing, partial(solve_phasing, search=search))
     started = time.perf_counter()
     if phasing.throws is not None:
@@ -75,7 +75,7 @@ def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
 
 def _solve_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Result:
     is_even = phasing.intervals.holds([phasing.even_interval])
-    is_unlike = gas_tells_apart(problem)
+    is_unlike = gas_distinguishes_cylinders(problem)
     if flywheel_measures(problem) and not is_unlike:
         even = replace(phasing, intervals=Intervals(phasing.even_interval, phasing.even_interval))
         solve = partial(solve_phasing, search=search)
@@ -159,7 +159,7 @@ def _best_of(problem: Problem, phasing: Phasing, answer: Answer) -> Result:
     result, doubt = result_under(result, bound, nothing)
     value = result.objective.value if result.objective else best.value
     certificate = certified(
-        value, bound, nothing, problem.tolerance, Reach.WHOLE,
+        value, bound, nothing, problem.tolerance, ProofStrength.WHOLE,
         result.certificate.kkt_residual if result.certificate else 0.0, answer.method, doubt,
     )  # fmt: skip
     ranking = [replace(first, shafts=phasing.built(candidate)), *(entry for _, entry in left)]
@@ -247,7 +247,7 @@ def solve_each_order(
         method += f", {len(every)} of all {whole} drawn and decided"
     proof = best.result.certificate
     how, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
-    reach = Reach.WHOLE if most is None else Reach.ASIDE
+    reach = ProofStrength.WHOLE if most is None else ProofStrength.ASIDE
     result, doubt = result_under(best.result, bound, nothing)
     best = replace(best, result=result)
     certificate = certified(best.value, bound, nothing, problem.tolerance, reach, residual, how, doubt)

@@ -65,7 +65,7 @@ _STANDING, _MOST_STANDING = 1e-5, 12
 
 
 @dataclass(frozen=True)
-class Searched:
+class ThrowBound:
     """Bound that boxes of throws prove.
 
     Attributes
@@ -190,7 +190,7 @@ class _Best:
 
 def search_throws(
     problem: Problem, phasing: Phasing, best: StarDesign | None, floor: float, improve: Improve
-) -> Searched | None:
+) -> ThrowBound | None:
     """Bound all throws, and return the best design on the way; None where boxes prove nothing.
 
     Parameters
@@ -212,7 +212,7 @@ def search_throws(
     if windows is None:
         return None
     if not windows:
-        return None if best is not None else Searched(math.inf, None, 0, ())
+        return None if best is not None else ThrowBound(math.inf, None, 0, ())
     try:
         search = ThrowSearch(problem, phasing, windows, improve, best)
         for stage, _, _ in search.roots:
@@ -222,7 +222,7 @@ def search_throws(
         return None
     most = len(search.roots) + problem.search.boxes_or(MOST_BOXES)
     incumbent, bound, boxes = divided(search, _Part(floor), _Best(best), nothing, search.reached, most, search.what)
-    return Searched(bound, incumbent.design, boxes, search.conflict, search.what)
+    return ThrowBound(bound, incumbent.design, boxes, search.conflict, search.what)
 
 
 class ThrowSearch(Search[_Part, _Best]):

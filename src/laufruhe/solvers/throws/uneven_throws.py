@@ -25,7 +25,7 @@ from laufruhe.problem.measure import Side, Term
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.problem.problem import Phasing, Problem
-from laufruhe.prove.certificate import Reach, certified
+from laufruhe.prove.certificate import ProofStrength, certified
 from laufruhe.prove.throws.firing_windows_bound import steady_bound, uneven_bound
 from laufruhe.solvers.conclusion import FEASIBLE, KEPT, limit_values, quoted, result_under, unbalances_of
 from laufruhe.solvers.prices import Price
@@ -36,7 +36,7 @@ from laufruhe.solvers.stars.families import families_of
 from laufruhe.solvers.stars.ranking import TradePoint, ranked_star, ranking_result
 from laufruhe.solvers.stars.star_results import StarDesign, no_star, solve_fixed, with_star
 from laufruhe.solvers.throws.stored_work import bounding, proposing, with_problem
-from laufruhe.solvers.throws.throw_search import Searched, search_throws
+from laufruhe.solvers.throws.throw_search import ThrowBound, search_throws
 from laufruhe.solvers.throws.throw_starts import firing_intervals, starts_of, why_none_fires
 
 STARTS = 6
@@ -84,25 +84,27 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         if designs and len(shares) > 1:
             trade.append(_trade_point(problem, phasing, allowed, designs[0]))
     floor, source = _bound(problem, phasing, phasing.intervals)
-    searched = None
+    bounded = None
     if not designs or phasing.thorough:
-        searched = _search_boxes(problem, phasing, designs[0] if designs else None, floor)
-    if searched is not None:
-        floor, source = max(floor, searched.bound), f"{searched.boxes} {searched.what}"
-        if searched.best is not None and searched.best not in designs:
-            designs = [searched.best, *designs]
+        bounded = _search_boxes(problem, phasing, designs[0] if designs else None, floor)
+    if bounded is not None:
+        floor, source = max(floor, bounded.bound), f"{bounded.boxes} {bounded.what}"
+        if bounded.best is not None and bounded.best not in designs:
+            designs = [bounded.best, *designs]
             trade = [*trade[:-1], _trade_point(problem, phasing, phasing.intervals, designs[0])] if trade else []
-    if not designs and not starts and searched is None:
+    if not designs and not starts and bounded is None:
         return no_star(problem, why, Status.FAILED)
     if not designs:
-        return _none(problem, phasing, searched)
+        return _none(problem, phasing, bounded)
     trade = [replace(point, lower_bound=max(point.lower_bound, floor)) for point in trade]
     nothing = numerical_zero(problem)
     result, doubt = result_under(designs[0].result, floor, nothing)
     best = replace(designs[0], result=result)
     method = f"IPOPT from {counted(len(designs), 'start')}, firing orders kept; bound from {source}"
     # no norm lies under zero: a design that reaches it is optimal
-    certificate = certified(best.value, floor, nothing, problem.tolerance, Reach.NEAR, best.kkt_residual, method, doubt)
+    certificate = certified(
+        best.value, floor, nothing, problem.tolerance, ProofStrength.NEAR, best.kkt_residual, method, doubt
+    )
     ranking = [
         ranked_star(replace(phasing, firing_order=d.candidate.firing_order), d.candidate, None, d.value, 0.0, False)
         for d in _distinct(designs)
@@ -114,7 +116,7 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
     return with_star(problem, phasing, best.result, best.candidate, certificate, details)
 
 
-def _search_boxes(problem: Problem, phasing: Phasing, first: StarDesign | None, floor: float) -> Searched | None:
+def _search_boxes(problem: Problem, phasing: Phasing, first: StarDesign | None, floor: float) -> ThrowBound | None:
     # None without a proof
 
     def improve(candidate: Candidate, moving: bool) -> StarDesign | None:
@@ -157,18 +159,18 @@ def _bound(problem: Problem, phasing: Phasing, intervals: Intervals) -> tuple[fl
     return steady_bound(problem), "the steady part of the loads"
 
 
-def _none(problem: Problem, phasing: Phasing, searched: Searched | None) -> Result:
+def _none(problem: Problem, phasing: Phasing, bounded: ThrowBound | None) -> Result:
     """Return that no start led to a design: infeasible only where boxes, or a bound of what is limited, prove it."""
-    if searched is not None and searched.bound == math.inf:
-        names = quoted(searched.conflict) or "the bounds on firing intervals"
-        return no_star(problem, f"no crank keeps {names}, whatever else is decided", conflict=searched.conflict)
+    if bounded is not None and bounded.bound == math.inf:
+        names = quoted(bounded.conflict) or "the bounds on firing intervals"
+        return no_star(problem, f"no crank keeps {names}, whatever else is decided", conflict=bounded.conflict)
     for limit in problem.load_limits:
         alone = replace(problem, objective=(Term(limit.measure),))
         if _bound(alone, phasing, phasing.intervals)[0] > limit.maximum * (1.0 + KEPT):
             why = f"no crank keeps '{limit.name}', whatever else is decided"
             return no_star(problem, why, conflict=(limit.name,))
     names = quoted(limit.name for limit in problem.limits) or "the bounds"
-    left = "" if searched is None else f", and {searched.boxes} boxes of throws do not exclude one; raise search.boxes"
+    left = "" if bounded is None else f", and {bounded.boxes} boxes of throws do not exclude one; raise search.boxes"
     return no_star(problem, f"no crank was found that keeps {names}{left}; relax them, or open more", Status.FAILED)
 
 

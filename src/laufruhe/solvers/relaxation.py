@@ -13,7 +13,7 @@ from dataclasses import replace
 from laufruhe.errors import counted
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Proof, Reach, certified
+from laufruhe.prove.certificate import Proof, ProofStrength, certified
 from laufruhe.solvers.conclusion import KEPT, limit_values, result_under, with_limits
 from laufruhe.solvers.prices import Price
 from laufruhe.solvers.result import Result, Status
@@ -22,7 +22,7 @@ Solve = Callable[[Problem], Result]
 PARTS = (("limits", "limit"), ("objective", "term"))
 
 
-def solve_relaxed(problem: Problem, fewer: Problem, prove: Solve, solve: Solve) -> Result:
+def solve_by_relaxation(problem: Problem, fewer: Problem, prove: Solve, solve: Solve) -> Result:
     """Return the optimum of less than is asked where it keeps all limits, else a design under all with that bound.
 
     Parameters
@@ -66,6 +66,8 @@ def with_bound(result: Result, bound: float, source: str) -> Result:
     nothing = numerical_zero(result.problem, result.final.engine)
     result, doubt = result_under(result, bound, nothing)
     value, text = (result.objective or told).value, f"{own.method}; {source}"
-    proof = certified(value, bound, nothing, result.problem.tolerance, Reach.NEAR, own.kkt_residual, text, doubt)
+    proof = certified(
+        value, bound, nothing, result.problem.tolerance, ProofStrength.NEAR, own.kkt_residual, text, doubt
+    )
     status = Status.OPTIMAL if proof.kind is Proof.GLOBAL else result.status
     return replace(result, certificate=proof, status=status)

@@ -22,22 +22,22 @@ SAME = 9
 """Digits of a lead [rad] that count."""
 
 
-def idle(part: SliderCrank) -> SliderCrank:
+def massless_copy(part: SliderCrank) -> SliderCrank:
     """A cylinder without mass, and without an area that a charge could press."""
     return replace(part.only({}), bore=None if part.bore is None else 0.0)
 
 
-def lone(engine: Engine, k: int, beside: bool, part: SliderCrank | None = None) -> Engine:
+def isolate(engine: Engine, k: int, beside: bool, part: SliderCrank | None = None) -> Engine:
     """Cylinder k alone, or another in its place; the places of the others beside it where these are asked."""
     parts = engine.slider_cranks
     own = parts[k] if part is None else part
-    every = [own if j == k else idle(other) for j, other in enumerate(parts)]
+    every = [own if j == k else massless_copy(other) for j, other in enumerate(parts)]
     return replace(engine, slider_cranks=tuple(every) if beside else (own,), rotors=())
 
 
 def only_rotors(engine: Engine, rotors: Sequence[Rotor], beside: bool) -> Engine:
     """These rotors alone; the places of the cylinders beside them where these are asked."""
-    parts = tuple(map(idle, engine.slider_cranks)) if beside else ()
+    parts = tuple(map(massless_copy, engine.slider_cranks)) if beside else ()
     return replace(engine, slider_cranks=parts, rotors=tuple(rotors))
 
 
@@ -57,7 +57,7 @@ def motored(problem: Problem) -> Problem:
     return replace(problem, fidelity=replace(problem.fidelity, gas=False, gas_orders=None))
 
 
-def gas_tells_apart(problem: Problem) -> bool:
+def gas_distinguishes_cylinders(problem: Problem) -> bool:
     """Return True if gas that is felt drives some cylinders differently from others."""
     if not problem.feels_gas:
         return False

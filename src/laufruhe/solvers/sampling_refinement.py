@@ -35,26 +35,26 @@ FELT, LEAST_TIMES = 0.1, 2.0
 """Share of the tolerance by which an objective may be misread, and tolerances that more count as at least."""
 
 
-def solve_told(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
+def refine_sampling(problem: Problem, solve: Callable[[Problem], Result]) -> Result:
     """Solve, and again at more angles where many tell otherwise than these do; what time leaves is judged at many."""
     result = solve(problem)
     for _ in rounds(ROUNDS):
         own = problem.fidelity
-        untold = _told_otherwise(result) if own.samples < FINE_SAMPLES else 0.0
+        untold = _sampling_disagreement(result) if own.samples < FINE_SAMPLES else 0.0
         if untold <= 1.0:
             return result
         # means at equal steps come nearer by the square of these; the gas keeps its own
         problem = finer(problem, min(math.ceil(math.sqrt(2.0 * untold)), MOST_TIMES))
         result = solve(problem)
-    return result if _told_otherwise(result) <= 1.0 else _as_many_tell(result)
+    return result if _sampling_disagreement(result) <= 1.0 else _evaluated_at_fine_sampling(result)
 
 
-def _told_otherwise(result: Result) -> float:
+def _sampling_disagreement(result: Result) -> float:
     # disagreement at many angles, relative to the tolerances
     return max(_untold(result) / KEPT, _misproven(result))
 
 
-def _as_many_tell(result: Result) -> Result:
+def _evaluated_at_fine_sampling(result: Result) -> Result:
     """A design whose angles were too few, and which time or rounds left so, judged at many."""
     problem, told, proof = result.problem, result.objective, result.certificate
     if told is None or proof is None or not result.status.has_design:
@@ -66,7 +66,7 @@ def _as_many_tell(result: Result) -> Result:
     doubt = sum(term.weight * missed(term.measure, final) for term in problem.objective)
     check_bound(proof.method, proof.lower_bound, value, nothing + doubt)
     weaker = Proof.WITHIN_GAP if proof.kind is Proof.GLOBAL else proof.kind
-    met = told_excess(problem, result.final) <= KEPT or result.measured is not result.final
+    met = violation_at_fine_sampling(problem, result.final) <= KEPT or result.measured is not result.final
     kind = Proof.NONE if not met else Proof.GLOBAL if gap <= problem.tolerance else weaker
     status = Status.FAILED if not met else Status.OPTIMAL if kind is Proof.GLOBAL else Status.FEASIBLE
     return replace(
@@ -80,13 +80,13 @@ def _as_many_tell(result: Result) -> Result:
     )
 
 
-def told_excess(problem: Problem, evaluation: Evaluation) -> float:
+def violation_at_fine_sampling(problem: Problem, evaluation: Evaluation) -> float:
     """Largest relative excess that many angles tell over a limit which few tell of; negative where all have room."""
-    limits = _told_by_few(problem, evaluation)
+    limits = _coarsely_sampled_limits(problem, evaluation)
     return with_fine_sampling(evaluation).excess(limits) if limits else -math.inf
 
 
-def _told_by_few(problem: Problem, evaluation: Evaluation) -> list[Limit]:
+def _coarsely_sampled_limits(problem: Problem, evaluation: Evaluation) -> list[Limit]:
     # load limits evaluated at few angles
     loads = [limit for limit in problem.load_limits if limit.measure.is_load]
     return [limit for limit in loads if is_coarsely_sampled(limit.measure, evaluation.samples)]
@@ -98,9 +98,9 @@ def _untold(result: Result) -> float:
     if result.status is Status.INFEASIBLE or own.resonance:
         return 0.0
     if result.status.has_design:
-        return told_excess(problem, own)
+        return violation_at_fine_sampling(problem, own)
     few = replace(own, samples=problem.fidelity.samples)
-    limits, many = _told_by_few(problem, few), with_fine_sampling(few)
+    limits, many = _coarsely_sampled_limits(problem, few), with_fine_sampling(few)
     # what a search missed at fewer angles than by default is sought at these, wherever the design as given stands
     least = 0.5 * KEPT * (with_default_sampling(problem).fidelity.samples / few.samples) ** 2
     return max((max(least, abs(many.standing(x).excess - few.standing(x).excess)) for x in limits), default=0.0)

@@ -21,14 +21,14 @@ from laufruhe.problem.decision import Kind
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.measure import Limit
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Proof, Reach
+from laufruhe.prove.certificate import Proof, ProofStrength
 from laufruhe.report.json_result import as_dict
 from laufruhe.report.sections.reach import sentences, tables
 from laufruhe.report.wording import explained
 from laufruhe.solvers import solve
 from laufruhe.solvers.accuracy import error_of
-from laufruhe.solvers.conclusion import Shown, concluded, judged, none_within
-from laufruhe.solvers.reachable import LONG, with_reachable
+from laufruhe.solvers.attainable_limits import LONG, with_attainable_limits
+from laufruhe.solvers.conclusion import ProofData, build_result, evaluate_design, infeasible_result
 from laufruhe.solvers.result import Result, Status
 
 SINGLE = {
@@ -236,7 +236,7 @@ def told_of(problem: Problem, status: Status, seconds: float | None = None) -> R
     """What is told of a problem that a method says so of, whether that is so or not."""
     found = replace(solve(problem.changed(decisions=())), status=status, conflict=("quiet",))
     with limited(seconds):
-        return with_reachable(found, problem, {Kind.UNBALANCE}, 1.0, solve)
+        return with_attainable_limits(found, problem, {Kind.UNBALANCE}, 1.0, solve)
 
 
 @pytest.mark.slow
@@ -292,9 +292,9 @@ def test_every_limit_has_its_share_of_the_time_and_it_is_said_where_that_ended_a
             return replace(solve(asked), certificate=None)
 
     steps: list[Step] = []
-    none = none_within(problem, solve(problem.changed(decisions=())).final, ("light", "quiet"), {})
+    none = infeasible_result(problem, solve(problem.changed(decisions=())).final, ("light", "quiet"), {})
     with limited(0.4), progress_listener(steps.append):
-        found = with_reachable(none, problem, {Kind.UNBALANCE}, 1.0, slow)
+        found = with_attainable_limits(none, problem, {Kind.UNBALANCE}, 1.0, slow)
     assert [(each.ended, each.why) for each in found.reached] == [(True, "")] * 2
     assert all("want of time" in text for text in sentences(found)[:2])
     assert shares[:2] == pytest.approx([0.2, 0.2])
@@ -319,9 +319,9 @@ def test_what_nothing_open_changes_stays() -> None:
 
 def test_a_design_that_breaks_a_limit_proves_nothing() -> None:
     problem = SCENES["vee"]
-    design = judged(problem, problem.start)
-    shown = Shown(0.9 * design.value, Reach.WHOLE, 0.0, "a bound")
-    result = concluded(design, design.evaluation, shown, {})
+    design = evaluate_design(problem, problem.start)
+    shown = ProofData(0.9 * design.value, ProofStrength.WHOLE, 0.0, "a bound")
+    result = build_result(design, design.evaluation, shown, {})
     assert result.status is Status.FAILED
     assert result.certificate.kind is Proof.NONE
     assert result.certificate.lower_bound == shown.bound

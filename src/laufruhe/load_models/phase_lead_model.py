@@ -34,7 +34,7 @@ class Share:
 
 
 @dataclass(frozen=True, eq=False)
-class LedNorm:
+class PhaseLeadNorm:
     """A norm at some leads, and what each lead changes of its rows there.
 
     Attributes
@@ -52,7 +52,7 @@ class LedNorm:
     angles: Array | None = None
 
 
-class LedModel:
+class PhaseLeadModel:
     """Loads at any leads.
 
     Parameters
@@ -94,12 +94,12 @@ class LedModel:
             self._known[measure] = still, shafts
         return self._known[measure]
 
-    def norm(self, measure: Measure, leads: Array, samples: int, averaged: bool) -> LedNorm:
+    def norm(self, measure: Measure, leads: Array, samples: int, averaged: bool) -> PhaseLeadNorm:
         """A measure at some leads, its means averaged about their angles where asked (P7)."""
         if not measure.is_load:
             norm = self.whole.norm(measure, samples)
             none = np.zeros_like(norm.constant), np.zeros_like(norm.slope), np.zeros_like(norm.slope)
-            return LedNorm(norm, (none,) * len(self.names))
+            return PhaseLeadNorm(norm, (none,) * len(self.names))
         still, shafts = self.shares(measure)
         by = leads - self.start
         led = [_moved(share, float(d)) for share, d in zip(shafts, by, strict=True)]
@@ -123,12 +123,12 @@ class LedModel:
             moved.append((own, rising, flat))
         steps = total.own[0].period * np.arange(samples) / samples
         angles = np.array([np.concatenate([steps, own]) for own in bends])
-        return LedNorm(AffineNorm(measure.norm, constant, slope, grid), tuple(moved), angles)
+        return PhaseLeadNorm(AffineNorm(measure.norm, constant, slope, grid), tuple(moved), angles)
 
-    def at(self, leads: Array, samples: int, averaged: bool = False) -> tuple[AffineProblem, tuple[LedNorm, ...]]:
+    def at(self, leads: Array, samples: int, averaged: bool = False) -> tuple[AffineProblem, tuple[PhaseLeadNorm, ...]]:
         """Terms and limits that are loads or masses at some leads, and all of these norms in their order."""
 
-        def norm(measure: Measure) -> LedNorm:
+        def norm(measure: Measure) -> PhaseLeadNorm:
             # without a program peaks are sought as finely as results are measured (M6), and means hardly averaged
             times = 1 if self.domains or not measure.is_load else measure.norm.refinement
             if times == 1 and averaged and not self.domains:

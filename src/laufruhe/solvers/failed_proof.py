@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from laufruhe.errors import BoundError
-from laufruhe.prove.certificate import Certificate, Proof, withheld
+from laufruhe.prove.certificate import Certificate, Proof, unproven_certificate
 from laufruhe.solvers.result import Result, Status
 
 STATUS = {Status.OPTIMAL: Status.FEASIBLE, Status.INFEASIBLE: Status.FAILED}
@@ -33,4 +33,4 @@ def without_proof(result: Result, error: BoundError) -> Result:
 
 
 def _nothing(own: Certificate | None, value: float) -> Certificate | None:
-    return None if own is None else withheld(value, own.kkt_residual, own.method)
+    return None if own is None else unproven_certificate(value, own.kkt_residual, own.method)

@@ -18,9 +18,9 @@ from laufruhe.problem.measure import Measure
 from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import STRENGTH, Certificate, Proof, withheld
+from laufruhe.prove.certificate import STRENGTH, Certificate, Proof, unproven_certificate
 from laufruhe.solvers.accuracy import largest_error
-from laufruhe.solvers.conclusion import none_within
+from laufruhe.solvers.conclusion import infeasible_result
 from laufruhe.solvers.result import Result, Status
 from laufruhe.solvers.values import ObjectiveValue
 
@@ -35,7 +35,7 @@ def _groups(problem: Problem) -> list[Kinds]:
     return [*(frozenset({kind}) for kind in alone), kinds.difference(alone)]
 
 
-def is_apart(problem: Problem) -> bool:
+def is_separable(problem: Problem) -> bool:
     """Tell if decisions include a flywheel or crankshaft beside others, and each measure depends on one group alone."""
     groups = [group for group in _groups(problem) if group]
     return len(groups) > 1 and all(len(_movers(measure, groups, problem)) <= 1 for measure in problem.measures)
@@ -45,7 +45,7 @@ def _movers(measure: Measure, groups: list[Kinds], problem: Problem) -> list[Kin
     return [group for group in groups if group and depends(measure.channel, group, problem)]
 
 
-def solve_apart(problem: Problem, solve: Solve) -> Result:
+def solve_decomposed(problem: Problem, solve: Solve) -> Result:
     """Solve each group of decisions by its own method, and return one joint result.
 
     Raises
@@ -58,7 +58,7 @@ def solve_apart(problem: Problem, solve: Solve) -> Result:
     found = list(by_group.values())
     for result in found:
         if result.status is Status.INFEASIBLE:
-            return none_within(problem, evaluate_start(problem), result.conflict, result.timing)
+            return infeasible_result(problem, evaluate_start(problem), result.conflict, result.timing)
     engine = by_group[groups[-1]].final.engine if groups[-1] in by_group else problem.engine
     for group, result in by_group.items():
         if Kind.FLYWHEEL in group:
@@ -98,13 +98,13 @@ def _parts(problem: Problem, groups: list[Kinds]) -> dict[Kinds, Problem]:
 def _part(problem: Problem, groups: list[Kinds], group: Kinds) -> Problem:
     # measures that depend on no group belong to the last one
 
-    def is_own(measure: Measure) -> bool:
+    def belongs(measure: Measure) -> bool:
         return (_movers(measure, groups, problem) or [groups[-1]])[0] == group
 
     return problem.changed(
         decisions=tuple(d for d in problem.decisions if d.kind in group),
-        objective=tuple(term for term in problem.objective if is_own(term.measure)),
-        limits=tuple(limit for limit in problem.limits if is_own(limit.measure)),
+        objective=tuple(term for term in problem.objective if belongs(term.measure)),
+        limits=tuple(limit for limit in problem.limits if belongs(limit.measure)),
     )
 
 
@@ -122,7 +122,7 @@ def _together(found: list[Result], value: float) -> Certificate:
     residual = max(certificate.kkt_residual for certificate in told)
     method = "; beside it ".join(certificate.method for certificate in told)
     if not check_bound(method, bound, value, sum(numerical_zero(r.problem, r.final.engine) for r in found)):
-        return withheld(value, residual, method)
+        return unproven_certificate(value, residual, method)
     gap = (value - bound) / value if value > 0.0 else 0.0
     # what cancels in a part counts as zero there
     gap = gap if any(certificate.gap for certificate in told) else 0.0

@@ -20,7 +20,7 @@ from laufruhe.problem.dependence import kinds_of
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.phasing import Candidate
 from laufruhe.problem.problem import Phasing, Problem, Search
-from laufruhe.solvers.conclusion import given_design, values_of
+from laufruhe.solvers.conclusion import initial_design, values_of
 from laufruhe.solvers.cones.conic import solve_cones
 from laufruhe.solvers.methods import solve
 from laufruhe.solvers.result import Result
@@ -94,7 +94,7 @@ def _is_like(problem: Problem, known: Result) -> bool:
 
 
 def _best(problem: Problem, engines: Sequence[Engine | None]) -> Engine | None:
-    designs = [given_design(problem, evaluate(problem, engine)) for engine in engines if engine is not None]
+    designs = [initial_design(problem, evaluate(problem, engine)) for engine in engines if engine is not None]
     best = min((design for design in designs if design is not None), key=lambda design: design.rank, default=None)
     return None if best is None else best.evaluation.engine
 

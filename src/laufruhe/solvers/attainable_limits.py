@@ -21,21 +21,21 @@ from laufruhe.problem.evaluation import objective_value, with_fine_sampling
 from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.numerical_zero import numerical_zero
 from laufruhe.problem.problem import Problem
-from laufruhe.prove.certificate import Proof, Reach, certified
+from laufruhe.prove.certificate import Proof, ProofStrength, certified
 from laufruhe.solvers.accuracy import error_of
 from laufruhe.solvers.conclusion import (
     KEPT,
     broken_limits,
     contradiction,
+    infeasible_result,
     limit_values,
     nearest_of,
-    none_within,
     quoted,
     read_under,
 )
 from laufruhe.solvers.conflicts import smallest_conflict
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.values import Nearest, ObjectiveValue, Reached
+from laufruhe.solvers.values import AttainableLimit, Nearest, ObjectiveValue
 
 Solve = Callable[[Problem], Result]
 LEAST_SECONDS = 10.0
@@ -49,12 +49,14 @@ LONG = "there was no time left for it; give more by a time limit"
 class _Answer:
     """Reached value of one limit, its result, and a flag set if no design keeps the other limits."""
 
-    told: Reached
+    told: AttainableLimit
     result: Result | None = None
     is_none: bool = False
 
 
-def with_reachable(found: Result, problem: Problem, kinds: Collection[Kind], took: float, solve: Solve) -> Result:
+def with_attainable_limits(
+    found: Result, problem: Problem, kinds: Collection[Kind], took: float, solve: Solve
+) -> Result:
     """A result without a design, with what each conflicting limit can reach, and with the nearest design.
 
     A design that was overlooked becomes the result; where a bound shows that there is none, the result says so.
@@ -122,7 +124,7 @@ def _wanted(found: Result, problem: Problem) -> Collection[str]:
 
 def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], found: Result, solve: Solve) -> _Answer:
     """Return the value that a limit can reach under the others; of two sides the second if the first is no cause."""
-    measure, nothing = limit.measure, Reached(limit.name, "at most", limit.maximum, limit.measure.unit)
+    measure, nothing = limit.measure, AttainableLimit(limit.name, "at most", limit.maximum, limit.measure.unit)
     if limit.outside is not None:
         return _Answer(replace(nothing, why="a band is kept or not; no single value can be reached"))
     others = tuple(other for other in problem.limits if other is not limit)
@@ -167,7 +169,7 @@ def _asking(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, 
     return asked.changed(decisions=moving)
 
 
-def _least(told: Reached, asked: Problem, solve: Solve) -> _Answer:
+def _least(told: AttainableLimit, asked: Problem, solve: Solve) -> _Answer:
     """Return the reached value of a measure by minimising it under the other limits."""
     result = solve(asked)
     if not result.status.has_design or result.objective is None:
@@ -185,7 +187,7 @@ def _least(told: Reached, asked: Problem, solve: Solve) -> _Answer:
     )
 
 
-def _none(told: Reached, result: Result) -> _Answer:
+def _none(told: AttainableLimit, result: Result) -> _Answer:
     # the other limits have no design either
     if result.status is Status.INFEASIBLE:
         names = quoted(result.conflict)
@@ -207,7 +209,7 @@ def _narrowed(found: Result, problem: Problem, solve: Solve) -> Result:
 
 
 def _at_edges(
-    told: Reached, limit: Limit, problem: Problem, others: tuple[Limit, ...], status: Status, solve: Solve
+    told: AttainableLimit, limit: Limit, problem: Problem, others: tuple[Limit, ...], status: Status, solve: Solve
 ) -> _Answer:
     """Return the reached value of a limit by bisection between its edge and the value of a design without it."""
     high = told.side == "at most"
@@ -244,7 +246,7 @@ def _recovered(found: Result, problem: Problem, result: Result) -> Result:
     read = read_under(problem, result.final, objective_value(problem, result.final), bound, nothing)
     result, value = replace(result, final=read.evaluation), read.value
     how = f"found while {result.problem.objective_name} was minimised"
-    proof = certified(value, bound, nothing, problem.tolerance, Reach.ASIDE, math.inf, how, read.doubt)
+    proof = certified(value, bound, nothing, problem.tolerance, ProofStrength.ASIDE, math.inf, how, read.doubt)
     own = result.problem.changed(objective=problem.objective, limits=problem.limits)
     return replace(
         result,
@@ -267,7 +269,7 @@ def _excluded(found: Result, problem: Problem) -> Result:
         if told.side == "at most" and told.bound > told.limit * (1.0 + KEPT):
             names = tuple(limit.name for limit in problem.limits)
             others = " that keeps the other limits" if len(names) > 1 else ""
-            none = none_within(problem, found.initial, names, found.timing)
+            none = infeasible_result(problem, found.initial, names, found.timing)
             message = f"no design exists: none{others} keeps '{told.name}'"
             return replace(none, message=message, reached=found.reached)
     return found
