@@ -93,7 +93,7 @@ def test_no_bound_is_brought_to_a_value(room: str) -> None:
         "bound = max(min(bound + mean.constant, self.most), mean.floor)",
         "return min(total, self.value), pull",
         "found = Searched(min(bound, search.cut(found.value)), found.design)",
-        "shown = Shown(bound=min(bound, design.value))",
+        "shown = ProofData(bound=min(bound, design.value))",
         "return min(self.divide(root, 10), self._enough.value)",
         "return WorstCase(errors, value, max(value, -bound), seen)",
         "least = np.minimum(bounds, value)",
