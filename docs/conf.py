@@ -13,6 +13,7 @@ version = release = version_of("laufruhe")
 from drawn import scraper  # noqa: E402
 
 extensions = [
+    "labels",
     "mathml",
     "myst_nb",
     "sphinx.ext.autodoc",

@@ -47,7 +47,7 @@ BLOCKS = (
     Code("laufruhe solve " + "a-problem-with-a-long-name-" * 8 + ".toml"),
 )  # fmt: skip
 LEFT_OUT = {"_build", "jupyter_execute", "gallery", "notebooks", "examples"}
-SITE = ("index", "reference/commands", "theory/equations")
+SITE = ("index", "reference/commands", "theory/kinematics")
 
 
 def _run(*words: object) -> None:
@@ -103,10 +103,10 @@ def site() -> Path:
             if str(page.relative_to(source).with_suffix("")) not in (*SITE, "README"):
                 page.unlink()
         # its first equations have all that the others are set in
-        equations = source / "theory" / "equations.md"
-        first, _, _ = equations.read_text(encoding="utf-8").partition("**Order coefficients")
-        equations.write_text(first, encoding="utf-8")
-        extensions = "extensions=mathml,myst_nb,sphinx_copybutton"
+        kinematics = source / "theory" / "kinematics.md"
+        first, _, _ = kinematics.read_text(encoding="utf-8").partition("## Orders in closed form")
+        kinematics.write_text(first, encoding="utf-8")
+        extensions = "extensions=labels,mathml,myst_nb,sphinx_copybutton"
         words = [sys.executable, "-m", "sphinx", "-Q", "-b", "html", "-D", extensions, source, folder / "site"]
         subprocess.run(words, check=True)
 
