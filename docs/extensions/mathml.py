@@ -7,6 +7,7 @@ with `\tag{K1}`, its label.
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from itertools import zip_longest
 
 from docutils import nodes
 from latex2mathml.converter import convert
@@ -85,7 +86,7 @@ def _space_names(parent: ET.Element) -> None:
     if parent.tag not in map(_tag, ("mrow", "math", "mtd", "mstyle", "msqrt")):
         return
     children = list(parent)
-    for child, after in zip(children, [*children[1:], None], strict=True):
+    for child, after in zip_longest(children, children[1:]):
         if _is_name(child):
             head = child[0] if len(child) else child
             head.tag = _tag("mi")

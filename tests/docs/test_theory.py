@@ -1,4 +1,4 @@
-"""Theory pages: figures are what their script draws, and every label of an equation is there once."""
+"""Theory pages: figures are what their script draws, and every label of an equation is on one page."""
 
 from __future__ import annotations
 
@@ -21,8 +21,9 @@ LABEL = re.compile(r"\*\*([A-Z]\d+[a-z]?)\b|\\tag\{([A-Z]\d+[a-z]?)\}")
 
 
 def labels() -> Counter[str]:
+    """Labels, each with the number of pages that define it."""
     found = [LABEL.findall(page.read_text(encoding="utf-8")) for page in PAGES]
-    return Counter(bold or tag for page in found for bold, tag in page)
+    return Counter(label for page in found for label in {bold or tag for bold, tag in page})
 
 
 @pytest.mark.parametrize("name", FIGURES)
@@ -31,7 +32,7 @@ def test_figures_are_up_to_date(name: str) -> None:
     assert (PICTURES / f"{name}.svg").read_text(encoding="utf-8") == FIGURES[name]()
 
 
-def test_every_label_stands_in_one_place() -> None:
+def test_every_label_stands_on_one_page() -> None:
     assert [label for label, count in labels().items() if count > 1] == []
 
 
