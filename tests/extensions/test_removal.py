@@ -3,43 +3,92 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 import laufruhe
+from extensions.removed_folder import SOURCE, without
 from laufruhe.extension import HOMES, Tables
 from problem_files import PROBLEMS
+from shared import once
 
-SOURCE = Path(laufruhe.__file__).parent
 EXTENSIONS = sorted(path.name for path in (SOURCE / "extensions").iterdir() if (path / "__init__.py").exists())
 MAIN = "tractor-four-lanchester"
-EVERY_MODULE = """
-import importlib, pkgutil, laufruhe
-for module in pkgutil.walk_packages(laufruhe.__path__, "laufruhe."):
-    if module.name != "laufruhe.__main__":
-        importlib.import_module(module.name)
-laufruhe.cli.main()
-"""
 STUDY = 'title = "t"\n[study]\n[[study.parts]]\nkind = "{}"\nname = "n"\ntitle = "t"\ncases = []\n'
+# one channel of each extension stands for all
+NEEDS = [
+    (t, n)
+    for t, homes in HOMES.items()
+    for n in (homes if t != "channels" else {h: n for n, h in homes.items()}.values())
+]
 
 
-def without(name: str, folder: Path) -> dict[str, str]:
-    """Copy the package without an extension, and return the environment of processes that see the copy."""
-    # compiled modules come along, for compiling all of them takes seconds
-    shutil.copytree(SOURCE, folder / "laufruhe")
-    shutil.rmtree(folder / "laufruhe" / "extensions" / name)
-    return {**os.environ, "PYTHONPATH": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+@dataclass(frozen=True)
+class Answer:
+    status: int
+    error: str
 
 
-def run(environment: dict[str, str], *words: str | Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, *map(str, words)]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+def words_of(table: Tables, name: str, folder: Path) -> list[str]:
+    """Return a command that needs an entry of a table, and write its file."""
+    folder.mkdir()
+    text = (PROBLEMS / f"{MAIN}.toml").read_text(encoding="utf-8")
+    layout, drive = (f"{said}\nkey_of_its_own = 1" for said in (f'"{name}"', f'"inline"\ndrive = "{name}"'))
+    mass = '{ between = ["1 kg", "2 kg"], tolerance = "1 %" }' if name == "tolerance" else f'"2 kg {name} 1 %"'
+    command, file = {
+        "layouts": ("solve", text.replace('"inline"', layout)),
+        "drives": ("solve", text.replace('"inline"', drive)),
+        "study_kinds": ("study", STUDY.format(name)),
+        "commands": (name, text),
+        "keys": ("solve", f"{text}\n[{name}]\n"),
+        "channels": ("solve", re.sub(r"minimise = .*", f'minimise = "{name}"', text)),
+        "notes": ("solve", re.sub(r"reciprocating_mass = .*", f"reciprocating_mass = {mass}", text)),
+    }[table]
+    (folder / "asked.toml").write_text(file, encoding="utf-8")
+    return [command, str(folder / "asked.toml")]
+
+
+def commands_without(name: str, folder: Path) -> list[list[str]]:
+    """Return the command that solves, then one for each entry of a table that the extension has."""
+    ends = ["--no-plots", "--out", str(folder / "out"), "--json", str(folder / "result.json")]
+    lacking = [(table, entry) for table, entry in NEEDS if HOMES[table][entry] == name]
+    asked = [words_of(table, entry, folder / f"asked-{k}") for k, (table, entry) in enumerate(lacking)]
+    return [["solve", str(PROBLEMS / f"{MAIN}.toml"), *ends], *asked]
+
+
+@pytest.fixture(scope="module")
+def answers() -> Iterator[Callable[[str], Path]]:
+    """Folder with the answers of commands that see the package without an extension."""
+    script = str(Path(__file__).with_name("forked_commands.py"))
+    streams = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, script], text=True, **streams) as server:
+
+        def fill(name: str) -> Callable[[Path], None]:
+            def run(folder: Path) -> None:
+                without(name, folder)
+                copy = {"folder": str(folder), "commands": commands_without(name, folder)}
+                print(json.dumps(copy), file=server.stdin, flush=True)
+                assert server.stdout.readline() == "done\n", server.stderr.read()
+                shutil.rmtree(folder / "laufruhe")
+
+            return run
+
+        yield lambda name: once(f"without-{name}", fill(name))
+        server.stdin.close()
+        server.wait()
+
+
+def answer_of(folder: Path, k: int) -> Answer:
+    assert (folder / f"{k}.status").exists(), (folder / "import.err").read_text(encoding="utf-8")
+    error = (folder / f"{k}.err").read_text(encoding="utf-8")
+    return Answer(int((folder / f"{k}.status").read_text(encoding="utf-8")), error)
 
 
 def test_every_home_is_there() -> None:
@@ -48,52 +97,23 @@ def test_every_home_is_there() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EXTENSIONS)
-def test_the_core_runs_without_an_extension(name: str, tmp_path: Path) -> None:
-    environment = without(name, tmp_path / "site")
-    file = tmp_path / "result.json"
-    solve = "solve", PROBLEMS / f"{MAIN}.toml", "--no-plots", "--out", tmp_path / "out", "--json", file
-    solved = run(environment, "-c", EVERY_MODULE, *solve)
-    assert solved.returncode == 0, solved.stderr
+def test_the_core_runs_without_an_extension(name: str, answers: Callable[[str], Path]) -> None:
+    folder = answers(name)
+    solved = answer_of(folder, 0)
+    assert solved.status == 0, solved.error
     objective = laufruhe.solve(PROBLEMS / f"{MAIN}.toml").objective
     assert objective is not None
-    assert json.loads(file.read_text(encoding="utf-8"))["objective"]["value"] == objective.value
+    assert json.loads((folder / "result.json").read_text(encoding="utf-8"))["objective"]["value"] == objective.value
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("table", "name"),
-    # one channel of each extension stands for all
-    [
-        (t, n)
-        for t, homes in HOMES.items()
-        for n in (homes if t != "channels" else {h: n for n, h in homes.items()}.values())
-    ],
-)
-def test_a_file_or_command_that_needs_it_is_refused_by_its_name(table: Tables, name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("table", "name"), NEEDS)
+def test_a_file_or_command_that_needs_it_is_refused_by_its_name(
+    table: Tables, name: str, answers: Callable[[str], Path]
+) -> None:
     home = HOMES[table][name]
-    environment = without(home, tmp_path / "site")
-    (tmp_path / "study.toml").write_text(STUDY.format(name), encoding="utf-8")
-    problem = PROBLEMS / f"{MAIN}.toml"
-    (tmp_path / "problem.toml").write_text(f"{problem.read_text(encoding='utf-8')}\n[{name}]\n", encoding="utf-8")
-    mass = '{ between = ["1 kg", "2 kg"], tolerance = "1 %" }' if name == "tolerance" else f'"2 kg {name} 1 %"'
-    noted = re.sub(r"reciprocating_mass = .*", f"reciprocating_mass = {mass}", problem.read_text(encoding="utf-8"))
-    (tmp_path / "note.toml").write_text(noted, encoding="utf-8")
-    text = problem.read_text(encoding="utf-8")
-    layout, drive = (f"{said}\nkey_of_its_own = 1" for said in (f'"{name}"', f'"inline"\ndrive = "{name}"'))
-    (tmp_path / "layout.toml").write_text(text.replace('"inline"', layout), encoding="utf-8")
-    (tmp_path / "drive.toml").write_text(text.replace('"inline"', drive), encoding="utf-8")
-    asked = re.sub(r"minimise = .*", f'minimise = "{name}"', text)
-    (tmp_path / "channel.toml").write_text(asked, encoding="utf-8")
-    words = {
-        "layouts": ("solve", tmp_path / "layout.toml"),
-        "drives": ("solve", tmp_path / "drive.toml"),
-        "study_kinds": ("study", tmp_path / "study.toml"),
-        "commands": (name, problem),
-        "keys": ("solve", tmp_path / "problem.toml"),
-        "channels": ("solve", tmp_path / "channel.toml"),
-        "notes": ("solve", tmp_path / "note.toml"),
-    }
-    refused = run(environment, "-m", "laufruhe", *words[table])
-    assert refused.returncode == 2
-    (line,) = refused.stderr.strip().splitlines()
+    lacking = [(t, n) for t, n in NEEDS if HOMES[t][n] == home]
+    refused = answer_of(answers(home), 1 + lacking.index((table, name)))
+    assert refused.status == 2
+    (line,) = refused.error.strip().splitlines()
     assert f"needs the extension '{home}'" in line

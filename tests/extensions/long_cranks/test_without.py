@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import laufruhe
-from extensions.test_removal import run, without
+from extensions.removed_folder import run, without
 from phasing import engines
 from problem_files import PROBLEMS
 

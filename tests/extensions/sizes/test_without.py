@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from extensions.test_removal import run, without
+from extensions.removed_folder import run, without
 from problem_files import PROBLEMS
 
 SOLVE = """
