@@ -107,33 +107,56 @@ def gallery() -> str:
 PROVEN = """\
 # What is proven when
 
-How good a design is proven to be follows from what is open and what is asked. These tables are made from those that
-choose the method; [the report](../reference/results.md) says it of each design.
+Two things decide how good a design can be proven to be: which numbers are open, and which quantities count in the
+objective and limits. This page has the tables from which the program chooses its method.
+[The report](../reference/results.md) states the proof of each design, and
+[What a proof claims](../theory/proofs.md) explains the words.
+
+To look up a problem:
+
+1. List the kinds of numbers that are open, such as unbalances and stiffness.
+2. Find in the second table how each quantity depends on each of these kinds.
+3. Take the first row of the first table whose kinds include all open ones, and which accepts these dependences.
+
+Labels such as P13 are those of [the theory](../theory/equations.md).
 
 ## Methods
 
-The first row that covers all kinds that are open, and that what is asked suits, decides. What is not in the second
-table is decided by the last row. A limit or a term that a method with a closing bound does not know is left out for
-its bound alone.
+The first row that fits decides. Quantities that are not in the second table are left to the last row. A method
+may have a bound that closes, but not know one of the limits or terms. Then the bound leaves this limit or term out.
 
-| method | open | what is asked may be | its bound proves |
+| method | open | quantities may be | its bound proves |
 | --- | --- | --- | --- |
 """
 DEPENDENCES = """
 ## Quantities
 
-How each quantity depends on numbers of one kind while all others are held, on elastic mounts at an even speed. A dash
-means that it does not.
+Each row shows how its quantities depend on numbers of one kind while all other numbers are fixed. It holds on elastic
+mounts at an even speed. Quantities in one row depend on all kinds in the same way. A dash means no
+dependence.
 
+| words | meaning |
+| --- | --- |
 """
+WORDS = {
+    "affine": "a constant plus multiples of the open numbers",
+    "affine while unbalances are fixed": "affine in these numbers once the unbalances are fixed",
+    "affine between bearings": "the same, with a kink where a place passes a bearing of its shaft",
+    "affine in masses that follow": "affine in masses that sizes set, times a monotone factor",
+    "sum of shifted parts": "a sum over throws or shafts, each earlier by its own angle",
+    "number of shifted parts": "one number of a signal that is a sum of shifted parts",
+    "convex": "any tangent lies below it",
+    "never falls, never rises": "monotone in each number",
+    "smooth": "continuous, and nothing more is claimed",
+}
 SHORT = {
     "NONE": "-",
     "AFFINE": "affine",
     "BIAFFINE": "affine while unbalances are fixed",
-    "BENT": "the same between bearings",
+    "BENT": "affine between bearings",
     "MASSES": "affine in masses that follow",
     "SHIFT": "sum of shifted parts",
-    "SWING": "number of such a sum",
+    "SWING": "number of shifted parts",
     "CONVEX": "convex",
     "MONOTONE_UP": "never falls",
     "MONOTONE_DOWN": "never rises",
@@ -145,27 +168,33 @@ SHORT = {
 CLAIMS = """
 ## Norms
 
-What each norm claims of itself; methods and bounds use nothing else of it. Every method with a bound needs a convex
-one; boxes, stars and smooth programs need one that takes points alone, and boxes of sizes one of row lengths.
+A norm makes one number of a signal, such as its mean or its largest value. Methods and bounds use only the properties
+in this table. Every method with a bound needs a convex norm. Boxes, stars and smooth programs also need one that takes
+points alone, and boxes of sizes one of row lengths.
 
-| norm | claims |
+- *Of row lengths* means that only the lengths of the vectors count, wherever they stand. The norm never
+  falls when one grows.
+- *Points alone* means that operating points do not count as groups.
+- *Averages bound it* means that averages about the angles bound the whole cycle (P7).
+
+| norm | properties |
 | --- | --- |
 """
 FACTS = {
     "is_convex": "convex",
-    "of_row_lengths": "of row lengths, and never falls with one",
-    "is_pointwise": "takes points alone",
+    "of_row_lengths": "of row lengths",
+    "is_pointwise": "points alone",
     "sums_lengths": "sum of lengths",
     "is_euclidean": "root of the sum of squares",
     "is_largest": "largest length",
     "is_diameter": "largest diameter of a signal",
-    "is_largest_mean": "largest mean of a point",
-    "averages": "averages about angles bound it",
+    "is_largest_mean": "largest mean of an operating point",
+    "averages": "averages bound it",
 }
 
 
 def proven() -> str:
-    """The methods, and how every quantity depends on every kind."""
+    """Return the methods, and how every quantity depends on every kind."""
     from laufruhe.numerics.norms import NORMS
     from laufruhe.problem.decision import KINDS
     from laufruhe.problem.dependence import TABLE, Dependence
@@ -179,22 +208,24 @@ def proven() -> str:
         rows.append(f"| {method.name} | {kinds} | {_asked(method, every)} | {method.proves} |\n")
     kinds = list(next(iter(TABLE.values())))
     heads = " | ".join(kind.words for kind in kinds)
-    rows += [DEPENDENCES, f"| quantity | {heads} |\n", "| --- " * (len(kinds) + 1) + "|\n"]
+    rows += [DEPENDENCES, *(f"| {words} | {meaning} |\n" for words, meaning in WORDS.items())]
+    rows += [f"\n| quantities | {heads} |\n", "| --- " * (len(kinds) + 1) + "|\n"]
+    names: dict[str, list[str]] = {}
     for name, row in TABLE.items():
-        rows.append(
-            f"| {name} | " + " | ".join(SHORT[row.get(kind, Dependence.UNKNOWN).name] for kind in kinds) + " |\n"
-        )
+        cells = " | ".join(SHORT[row.get(kind, Dependence.UNKNOWN).name] for kind in kinds)
+        names.setdefault(cells, []).append(name)
+    rows += [f"| {', '.join(alike)} | {cells} |\n" for cells, alike in names.items()]
     rows += [CLAIMS, "".join(f"| {name} | {_claimed(norm)} |\n" for name, norm in NORMS.items())]
     return "".join(rows)
 
 
 def _claimed(norm: Any) -> str:
-    """What a norm claims of itself, in words."""
+    """Return the properties that a norm claims, in words."""
     return ", ".join(words for fact, words in FACTS.items() if getattr(norm, fact))
 
 
 def _asked(method: Any, every: bool) -> str:
-    """What a method may be asked for, in words."""
+    """Return the quantities that a method accepts, in words."""
     if every or not method.needs:
         return "anything"
     found = dict.fromkeys(SHORT[each.name] for needs in method.needs.values() for each in needs)
