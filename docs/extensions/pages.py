@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import ast
 import json
+import re
 import sys
 from collections.abc import Iterator
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 DOCS = Path(__file__).parents[1]
 sys.path.append(str(DOCS.parent / "tests"))
@@ -233,7 +234,73 @@ def _asked(method: Any, every: bool) -> str:
     return "; ".join(part for part in (", ".join(found), ", ".join(names)) if part)
 
 
-PAGES = {"reference/keys.md": keys, "gallery.md": gallery, "how-to/what-is-proven.md": proven}
+EQUATIONS = """\
+# Equations
+
+Every equation and every statement of the theory has a label: a letter for its subject and a number. Comments in the
+code, messages and other pages cite these labels. This table says where each of them stands.
+
+Sources are named where they are used. Hasselgruber is *Grundlagen der Landtechnik* 1964, whose equation numbers stand
+in parentheses. Roetscher is *Die Maschinenelemente*, chapter 14. The textbook and the worked diesel are named in the
+[sources](../sources.md). Labels N are steps of the nonlinear programs, which `solvers/smooth/nonlinear.py` explains.
+
+| labels | section | page |
+| --- | --- | --- |
+"""
+LABEL = re.compile(r"\*\*([A-Z])(\d+)([a-z]?)\b|\\tag\{([A-Z])(\d+)([a-z]?)\}")
+
+Label: TypeAlias = tuple[str, int, str]
+"""Letter, number, and a small letter or nothing."""
+Section: TypeAlias = tuple[str, str, str]
+"""Link, heading, and title of the page."""
+
+
+def equations() -> str:
+    """Return the table of all labels of the theory, in their order, with the section that each stands in."""
+    listed = re.findall(r"^   theory/([a-z-]+)$", (DOCS / "index.rst").read_text(encoding="utf-8"), re.MULTILINE)
+    places: dict[Label, Section] = {}
+    for name in listed:
+        if name != "equations":
+            places |= _labels_of(DOCS / "theory" / f"{name}.md")
+    rows: list[tuple[Section, list[Label]]] = []
+    for label in sorted(places):
+        if not rows or rows[-1][0] != places[label] or rows[-1][1][-1][0] != label[0]:
+            rows.append((places[label], []))
+        rows[-1][1].append(label)
+    return EQUATIONS + "".join(
+        f"| {_span(labels)} | [{heading}]({link}) | {title} |\n" for (link, heading, title), labels in rows
+    )
+
+
+def _labels_of(page: Path) -> dict[Label, Section]:
+    """Return the labels of a page, each with the section that it stands in first."""
+    found: dict[Label, Section] = {}
+    title = heading = ""
+    for line in page.read_text(encoding="utf-8").splitlines():
+        if head := re.match(r"#{1,3} (.*)", line):
+            heading = head.group(1)
+            title = title or heading
+        anchor = re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
+        section = (f"{page.name}#{anchor}", heading, title)
+        for bold, number, letter, tag, tagged, small in LABEL.findall(line):
+            found.setdefault((bold or tag, int(number or tagged), letter or small), section)
+    return found
+
+
+def _span(labels: list[Label]) -> str:
+    """Return labels as words: `K1 to K6`, or the two or one that there are."""
+    names = [f"{letter}{number}{small}" for letter, number, small in labels]
+    return (
+        names[0] if len(names) == 1 else f"{names[0]}, {names[1]}" if len(names) == 2 else f"{names[0]} to {names[-1]}"
+    )
+
+
+PAGES = {
+    "reference/keys.md": keys,
+    "theory/equations.md": equations,
+    "gallery.md": gallery,
+    "how-to/what-is-proven.md": proven,
+}
 
 if __name__ == "__main__":
     for place, made in PAGES.items():
