@@ -28,6 +28,10 @@ def mathml(text: str, display: str = "inline") -> str:
     for parent in list(tree.iter()):
         _set_primes(parent)
         _space_names(parent)
+    for bar in tree.iter(_tag("mo")):
+        if bar.text == "|":
+            # a length and no relation
+            bar.attrib |= {"lspace": "0", "rspace": "0"}
     for table in tree.iter(_tag("mtable")):
         _align(table, between="displaystyle" in table.attrib)
     if display == "block":
@@ -90,7 +94,7 @@ def _space_names(parent: ET.Element) -> None:
         if _is_name(child):
             head = child[0] if len(child) else child
             head.tag = _tag("mi")
-            if after is not None and after.tag not in (_tag("mo"), _tag("mspace")):
+            if after is not None and (after.tag not in (_tag("mo"), _tag("mspace")) or after.text == "|"):
                 _insert(parent, list(parent).index(child) + 1)
         elif after is not None and _is_name(after) and child.tag not in (_tag("mo"), _tag("mspace")):
             _insert(parent, list(parent).index(after))
