@@ -126,6 +126,8 @@ Labels such as P13 are those of [the theory](../theory/equations.md).
 The first row that fits decides. Quantities that are not in the second table are left to the last row. A method
 may have a bound that closes, but not know one of the limits or terms. Then the bound leaves this limit or term out.
 
+*Quantities of elastic mounts* are {of_mounts}.
+
 | method | open | quantities may be | its bound proves |
 | --- | --- | --- | --- |
 """
@@ -200,8 +202,9 @@ def proven() -> str:
     from laufruhe.problem.decision import KINDS
     from laufruhe.problem.dependence import TABLE, Dependence
     from laufruhe.solvers import METHODS
+    from laufruhe.solvers.method import OF_MOUNTS
 
-    rows = [PROVEN]
+    rows = [PROVEN.format(of_mounts=", ".join(sorted(channel.name for channel in OF_MOUNTS)))]
     for method in METHODS:
         every, missing = len(method.needs) >= len(KINDS) - 1, [k for k in KINDS.values() if k not in method.needs]
         kinds = ", ".join(kind.words for kind in method.needs) or "nothing"
@@ -227,10 +230,14 @@ def _claimed(norm: Any) -> str:
 
 def _asked(method: Any, every: bool) -> str:
     """Return the quantities that a method accepts, in words."""
+    from laufruhe.solvers.method import OF_MOUNTS
+
     if every or not method.needs:
         return "anything"
     found = dict.fromkeys(SHORT[each.name] for needs in method.needs.values() for each in needs)
-    names = sorted(channel.name for channel in method.knows)
+    of_mounts = method.knows >= OF_MOUNTS
+    names = sorted(channel.name for channel in method.knows - (OF_MOUNTS if of_mounts else frozenset()))
+    names += ["quantities of elastic mounts"] if of_mounts else []
     return "; ".join(part for part in (", ".join(found), ", ".join(names)) if part)
 
 
