@@ -126,7 +126,7 @@ Labels such as P13 are those of [the theory](../theory/equations.md).
 The first row that fits decides. Quantities that are not in the second table are left to the last row. A method
 may have a bound that closes, but not know one of the limits or terms. Then the bound leaves this limit or term out.
 
-*Quantities of elastic mounts* are {of_mounts}.
+The first table calls these the *quantities of elastic mounts*: {of_mounts}.
 
 | method | open | quantities may be | its bound proves |
 | --- | --- | --- | --- |
