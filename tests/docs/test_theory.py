@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from laufruhe.extensions.torsion.machine import Disc, Section, Torsion
+from laufruhe.extensions.torsion.physics import critical_speed, natural_modes
+from laufruhe.machine import Cycle, Engine, OperatingPoint, Seiliger, SliderCrank
+from laufruhe.physics.bearing_loads import beam_shares, lever_shares
+from laufruhe.physics.order_coefficients import piston_acceleration_orders
+from laufruhe.physics.shaking_loads import shaking_loads
+from laufruhe.physics.torque import swing_of, torque_facts
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -16,6 +27,7 @@ sys.path.append(str(DOCS / "extensions"))
 from figures import FIGURES, PICTURES  # noqa: E402
 from mathml import mathml  # noqa: E402
 
+SPEED, KP_CM2 = 2500.0 * math.pi / 30.0, 98066.5
 PAGES = sorted(DOCS.glob("theory/*.md"))
 LABEL = re.compile(r"\*\*([A-Z]\d+[a-z]?)\b|\\tag\{([A-Z]\d+[a-z]?)\}")
 
@@ -49,6 +61,58 @@ def test_labels_that_the_code_cites_are_there() -> None:
     }
     assert len(cited) > 100
     assert sorted(cited - set(labels())) == []
+
+
+def piston(mass: float) -> Engine:
+    part = SliderCrank("cylinder", 0.0, 0.06, 0.06 / 0.26, mass, bore=0.1)
+    return Engine("one cylinder", Cycle.FOUR_STROKE, (part,))
+
+
+def size_of_orders() -> list[str]:
+    sizes = np.abs(piston_acceleration_orders(0.26, 0.0, 6))
+    return [f"| size | {sizes[1]:.0f} | {sizes[2]:.5f} | {sizes[4]:.7f} | {sizes[6]:.7f} |",
+            f"is {100.0 * (sizes[2] / 0.26 - 1.0):.1f} % low"]  # fmt: skip
+
+
+def loads_of_a_piston() -> list[str]:
+    wrench = shaking_loads(piston(2.0), OperatingPoint("run", SPEED))
+    return [
+        f"| {name} | " + " | ".join(f"{abs(wrench.at(order)[row]):.0f}" for order in (1, 2, 3, 4)) + " |"
+        for name, row in (("force along the axis [N]", 2), ("roll moment [N m]", 3))
+    ]
+
+
+def torque_of_a_cylinder() -> list[str]:
+    gas = Seiliger(peak_pressure=80.0 * KP_CM2, imep=5.5 * KP_CM2)
+    point = OperatingPoint("run", SPEED, gas)
+    facts, swing = torque_facts(piston(2.0), point), swing_of(piston(2.0), point)
+    return [f"{facts.mean:.1f} N m", f"{1e-3 * facts.power:.1f} kW", f"{facts.largest:.0f} N m",
+            f"{facts.excursion:.0f} J", f"{swing.irregularity(1.0):.5f}", f"{facts.excursion / SPEED**2:.5f}",
+            f"{swing.irregularity(2.0):.5f}"]  # fmt: skip
+
+
+def mode_of_two_discs() -> list[str]:
+    chain = Torsion(discs=(Disc("crank", 0.05), Disc("flywheel", 0.5)), sections=(Section("shaft", 1e5),))
+    modes = natural_modes(chain)
+    assert modes.shapes[:, 0] == pytest.approx([1.0, -0.1])
+    (frequency,) = modes.frequencies
+    return [f"{frequency:.1f} Hz", f"{critical_speed(frequency, 4.0) * 30.0 / math.pi:.0f} rpm"]
+
+
+def shares_of_bearings() -> list[str]:
+    cut, beam = (100.0 * rule([0.0, 0.1, 0.2], [0.04])[:, 0] for rule in (lever_shares, beam_shares))
+    return [f"{abs(share):.1f} %" for share in (*cut[:2], *beam)]
+
+
+@pytest.mark.parametrize(
+    ("page", "numbers"),
+    [("kinematics", size_of_orders), ("loads", loads_of_a_piston), ("torque", torque_of_a_cylinder),
+     ("torsion", mode_of_two_discs), ("bearings", shares_of_bearings)],
+)  # fmt: skip
+def test_small_examples_are_what_the_package_computes(page: str, numbers: Callable[[], list[str]]) -> None:
+    text = (DOCS / "theory" / f"{page}.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"\*A small example\.\*.*?\n(?=## |\*\*)", text, flags=re.DOTALL)
+    assert [number for number in numbers() if number not in example] == []
 
 
 @pytest.mark.parametrize(
