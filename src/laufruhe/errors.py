@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from numbers import Integral
 
 
-def printed(text: str, most: int = 2000) -> str:
+def printed(text: str, maximum: int = 2000) -> str:
     """Return one line with escapes for characters that are not printed, cut if it is long."""
-    shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text[:most])
-    return shown if len(text) <= most and len(shown) <= most else shown[: most - 3] + "..."
+    shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text[:maximum])
+    return shown if len(text) <= maximum and len(shown) <= maximum else shown[: maximum - 3] + "..."
 
 
 def plural(name: str, count: int) -> str:

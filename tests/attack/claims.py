@@ -116,12 +116,12 @@ def told_of(error: Exception) -> str:
     return f"{type(error).__name__} at {Path(last.filename).name}:{last.lineno}: {str(error)[:200]}"
 
 
-def try_problem(family: str, seed: int, table: Table, rng: np.random.Generator, folder: Path, most: int) -> Verdict:
+def try_problem(family: str, seed: int, table: Table, rng: np.random.Generator, folder: Path, maximum: int) -> Verdict:
     """Solve a problem and attack what is claimed of it.
 
     Parameters
     ----------
-    most
+    maximum
         Stars that are solved each by itself, and a hundredth of the calls of a local search.
     """
     verdict, started = Verdict(family, seed), time.perf_counter()
@@ -143,27 +143,27 @@ def try_problem(family: str, seed: int, table: Table, rng: np.random.Generator, 
     if result.certificate is not None:
         verdict.bound = float(result.certificate.lower_bound)
     if family not in OWN_FAMILIES and family not in OWN_CROSSINGS:
-        judge(verdict, table, result, rng, most)
+        judge(verdict, table, result, rng, maximum)
     if family not in PLAIN_CROSSINGS and own_judge.knows(table):
-        judge_by_own(verdict, table, result, rng, most)
+        judge_by_own(verdict, table, result, rng, maximum)
     verdict.own_seconds = time.perf_counter() - started
     return verdict
 
 
-def judge_by_own(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator, most: int) -> None:
+def judge_by_own(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator, maximum: int) -> None:
     """Complaints about a result by the own model."""
     verdict.status = result.status.value
     if result.certificate is not None:
         verdict.kind, verdict.gap = result.certificate.kind.value, result.certificate.gap
-    own_judge.judge(verdict, table, result, rng, 300 * most)
+    own_judge.judge(verdict, table, result, rng, 300 * maximum)
 
 
-def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator, most: int) -> None:
+def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator, maximum: int) -> None:
     """Complaints about a result."""
     if result.certificate is not None and (isinstance(table["objective"], list) or "robust" in table):
         verdict.status, verdict.kind = result.status.value, result.certificate.kind.value
         verdict.gap = result.certificate.gap
-        judge_ranks(verdict, table, result) if "robust" not in table else judge_robust(verdict, table, result, most)
+        judge_ranks(verdict, table, result) if "robust" not in table else judge_robust(verdict, table, result, maximum)
         return
     openings = Openings(table)
     verdict.status = result.status.value
@@ -172,7 +172,7 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
     if verdict.status in ("infeasible", "failed"):
         if result.objective is not None or result.certificate is not None:
             verdict.wrong.append(f"{verdict.status}, yet a value and a certificate are told")
-        _judge_infeasible(verdict, openings, rng, most)
+        _judge_infeasible(verdict, openings, rng, maximum)
         return
     certificate = result.certificate
     verdict.kind, verdict.gap = certificate.kind.value, certificate.gap
@@ -183,7 +183,7 @@ def judge(verdict: Verdict, table: Table, result: Any, rng: np.random.Generator,
     reading = KINKED if "gas" in table else SAMPLED
     reading *= STEEP if "gas" in table and table["engine"]["layout"] == "rotary" else 1.0
     _judge_value(verdict, result, scene, value, reading, floor)
-    rival = _rival(openings, vector, told, value, rng, most)
+    rival = _rival(openings, vector, told, value, rng, maximum)
     verdict.rivals = rival.looked_at if rival else 0
     bound, reading = certificate.lower_bound, reading + result.error_estimate
     if bound > scene.objective * (1.0 + reading) + floor and scene.worst <= 0.0:
@@ -251,25 +251,25 @@ def _judge_value(verdict: Verdict, result: Any, scene: Any, value: float, readin
 
 
 def _rival(
-    openings: Openings, vector: np.ndarray, told: Table, value: float, rng: np.random.Generator, most: int
+    openings: Openings, vector: np.ndarray, told: Table, value: float, rng: np.random.Generator, maximum: int
 ) -> Rival | None:
     enough = value * (1.0 - 0.2 * GAP)
     optional = any(shaft.get("optional") for shaft in openings.table.get("balancer_shafts", []))
     if optional or (openings.numbers and openings.table["engine"].get("throws") == "open"):
-        return best_of_choices(openings.table, rng, (vector, told), 100 * most, enough)
+        return best_of_choices(openings.table, rng, (vector, told), 100 * maximum, enough)
     if openings.numbers:
-        return local_rival(openings, rng, [vector], 100 * most, told)
+        return local_rival(openings, rng, [vector], 100 * maximum, told)
     if openings.table["engine"].get("throws") == "open":
-        return best_star(openings, 10 * most, enough)
+        return best_star(openings, 10 * maximum, enough)
     return convex_rival(openings, vector, told, enough)
 
 
-def _judge_infeasible(verdict: Verdict, openings: Openings, rng: np.random.Generator, most: int) -> None:
+def _judge_infeasible(verdict: Verdict, openings: Openings, rng: np.random.Generator, maximum: int) -> None:
     """A design that keeps every limit must not exist."""
     if openings.numbers:
-        rival = local_rival(openings, rng, [openings.nearest(np.zeros(openings.size))], 100 * most)
+        rival = local_rival(openings, rng, [openings.nearest(np.zeros(openings.size))], 100 * maximum)
     else:
-        rival = least_broken(openings, 10 * most)
+        rival = least_broken(openings, 10 * maximum)
     if rival is None:
         return
     verdict.rivals = rival.looked_at

@@ -76,11 +76,11 @@ def at_a_share(rng: Generator, table: Table, told: Table) -> Table:
     own = Own(table, 256, 1e-9)
     low, high = own.box.T
     has = own.designs(low + (high - low) * rng.random((20, len(low)))).measure(told)
-    most = has[0] * rng.uniform(1.0, 1.1) if rng.random() < 0.6 else np.quantile(has, rng.uniform(0.05, 0.4))
+    maximum = has[0] * rng.uniform(1.0, 1.1) if rng.random() < 0.6 else np.quantile(has, rng.uniform(0.05, 0.4))
     unit = {"transmissibility": "", "static sag": "m"}[told["quantity"]]
     rest = {key: value for key, value in told.items() if key != "quantity"}
     return {
-        "limit": told["quantity"], "max": q(float(most), unit, 9) if unit else float(f"{most:.9g}"), "name": "l0",
+        "limit": told["quantity"], "max": q(float(maximum), unit, 9) if unit else float(f"{maximum:.9g}"), "name": "l0",
         **rest,
     }  # fmt: skip
 
@@ -243,8 +243,8 @@ def choices(table: Table) -> Iterator[Table]:
     """The table with every choice of its optional shafts, as many as may be built."""
     shafts = table.get("balancer_shafts", [])
     optional = [k for k, shaft in enumerate(shafts) if shaft.get("optional")]
-    most = min(table.get("phasing", {}).get("most_shafts", len(optional)), len(optional))
-    for built in itertools.combinations(optional, most):
+    maximum = min(table.get("phasing", {}).get("most_shafts", len(optional)), len(optional))
+    for built in itertools.combinations(optional, maximum):
         kept = [shaft for k, shaft in enumerate(shafts) if k not in optional or k in built]
         yield {**table, "balancer_shafts": kept}
 
@@ -285,7 +285,7 @@ def worst(openings: Openings, vector: np.ndarray, told: Table) -> float:
     return max(values)
 
 
-def judge_robust(verdict: Any, table: Table, result: Any, most: int) -> None:
+def judge_robust(verdict: Any, table: Table, result: Any, maximum: int) -> None:
     openings = Openings(table)
     vector, star = openings.read(result.final.engine, {d.name: d.value for d in result.decisions})
     value, bound = result.objective.value, result.certificate.lower_bound
@@ -298,7 +298,7 @@ def judge_robust(verdict: Any, table: Table, result: Any, most: int) -> None:
         for start in (openings.nearest(np.zeros(openings.size)), vector):
             found = minimize(
                 lambda x, told=told: worst(openings, x, told), start, method="Nelder-Mead",
-                options={"maxfev": 20 * most},
+                options={"maxfev": 20 * maximum},
             )  # fmt: skip
             best = min(best, float(found.fun))
             verdict.rivals += int(found.nfev)
@@ -322,13 +322,13 @@ def judge_ranks(verdict: Any, table: Table, result: Any) -> None:
             verdict.wrong.append(f"{rank.name} is said to be {rank.final:.9g} and is {own.objective:.9g}")
         if own.worst > 3e-5:
             verdict.wrong.append(f"a limit is passed by {own.worst:.2e} of itself")
-        rival = convex_rival(stage, vector, {}, rank.least * (1.0 - 2e-5))
+        rival = convex_rival(stage, vector, {}, rank.minimum * (1.0 - 2e-5))
         verdict.rivals += rival.looked_at
         if rival.excess <= 1e-6:
             if rank.lower_bound > rival.value * (1.0 + reading) + floor:
                 verdict.wrong.append(f"{rank.name}: bound {rank.lower_bound:.9g}, a rival has {rival.value:.9g}")
-            if str(rank.proof) == "global" and rank.least > rival.value * (1.0 + 1e-4 + reading) + floor:
-                verdict.wrong.append(f"{rank.name}: global {rank.least:.9g}, a rival has {rival.value:.9g}")
+            if str(rank.proof) == "global" and rank.minimum > rival.value * (1.0 + 1e-4 + reading) + floor:
+                verdict.wrong.append(f"{rank.name}: global {rank.minimum:.9g}, a rival has {rival.value:.9g}")
         if rank.limit is not None:
             quantity = told["minimise"]
             rest = {key: value for key, value in told.items() if key != "minimise"}

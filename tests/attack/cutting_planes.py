@@ -86,11 +86,11 @@ class Mass:
             span = slice(at, at + w.entries)
             if w.entries == 2:
                 size = math.hypot(*part)
-                value += times * w.most * size
-                slope[span] += times * w.most * part / (size or 1.0)
+                value += times * w.maximum * size
+                slope[span] += times * w.maximum * part / (size or 1.0)
             elif not w.follows:
                 value += times * abs(w.unbalance(part))
-                slope[span] += times * (w.most - w.least)
+                slope[span] += times * (w.maximum - w.minimum)
             at += w.entries
         return [(value, slope)]
 
@@ -139,11 +139,16 @@ class Program:
         terms, limits = terms_of(openings.table), openings.table.get("constraints", [])
         self.factors = [t.get("weight", 1.0) for t in terms]
         self.terms = [function_of(openings, t, told, order) for t in terms]
-        self.most = [number(c["max"]) for c in limits]
+        self.maximum = [number(c["max"]) for c in limits]
         self.limits = [function_of(openings, {**c, "quantity": c["limit"]}, told, order) for c in limits]
 
-    def least(
-        self, start: np.ndarray, accuracy: float = 2e-6, most: int = 250, charge: float = 1e3, enough: float = math.inf
+    def minimum(
+        self,
+        start: np.ndarray,
+        accuracy: float = 2e-6,
+        maximum: int = 250,
+        charge: float = 1e3,
+        enough: float = math.inf,
     ) -> Found:
         """Least objective; what cannot be kept is broken as little as the charge makes it.
 
@@ -153,11 +158,11 @@ class Program:
             The search ends when no design under this value can be left.
         """
         value = sum(f * max(p[0] for p in t.planes(start)) for f, t in zip(self.factors, self.terms, strict=True))
-        return _Search(self, value or 1.0, charge).run(start, accuracy, most, enough / (value or 1.0))
+        return _Search(self, value or 1.0, charge).run(start, accuracy, maximum, enough / (value or 1.0))
 
-    def least_excess(self, start: np.ndarray, accuracy: float = 1e-6, most: int = 250) -> Found:
+    def least_excess(self, start: np.ndarray, accuracy: float = 1e-6, maximum: int = 250) -> Found:
         """Least largest excess of the limits, as shares of them; its bound above zero proves that no design exists."""
-        return _Search(self, 1.0, 1.0, only_limits=True).run(start, accuracy, most, 1e-6)
+        return _Search(self, 1.0, 1.0, only_limits=True).run(start, accuracy, maximum, 1e-6)
 
 
 class _Search:
@@ -211,12 +216,12 @@ class _Search:
                 row[: self.q], row[self.q + k] = slope / self.unit, -1.0
                 self._row(-1, row, float(slope @ x - height) / self.unit)
         excess = -1.0
-        for j, (limit, most) in enumerate(zip(self.p.limits, self.p.most, strict=True)):
+        for j, (limit, maximum) in enumerate(zip(self.p.limits, self.p.maximum, strict=True)):
             for height, slope in limit.planes(x):
-                excess = max(excess, height / most - 1.0)
+                excess = max(excess, height / maximum - 1.0)
                 row = np.zeros(self.columns)
-                row[: self.q], row[-2] = slope / most, -1.0
-                self._row(j, row, 1.0 + float(slope @ x - height) / most)
+                row[: self.q], row[-2] = slope / maximum, -1.0
+                self._row(j, row, 1.0 + float(slope @ x - height) / maximum)
         at = 0
         for w, part in self.p.openings.parts(x):
             size = math.hypot(*part) if w.entries == 2 else 0.0
@@ -240,11 +245,11 @@ class _Search:
         bounds += [(-1.0 if self.only_limits else 0.0, None), (0.0, None)]
         return linprog(cost, A_ub=rows, b_ub=rights, bounds=bounds, method="highs")
 
-    def run(self, start: np.ndarray, accuracy: float, most: int, enough: float) -> Found:
+    def run(self, start: np.ndarray, accuracy: float, maximum: int, enough: float) -> Found:
         x = best = self.p.openings.nearest(start.copy())
         charged, value, excess = self.look(x)
         bound, prices = -math.inf, tuple(0.0 for _ in self.p.limits)
-        for _ in range(most):
+        for _ in range(maximum):
             under = self._solve(self.cost)
             if under.status == 0:
                 bound = max(bound, float(under.fun))
@@ -289,4 +294,6 @@ class _Search:
     def _prices(self, solved: Any) -> tuple[float, ...]:
         """Fall of the objective per unit of each limit."""
         found, of = -solved.ineqlin.marginals, np.array(self.of_limit)
-        return tuple(float(found[: len(of)][of == j].sum()) * self.unit / most for j, most in enumerate(self.p.most))
+        return tuple(
+            float(found[: len(of)][of == j].sum()) * self.unit / maximum for j, maximum in enumerate(self.p.maximum)
+        )

@@ -199,13 +199,13 @@ def rigid_mounts(rng: Generator) -> Table:
     }
 
 
-def points(rng: Generator, most: int = 2, low: float = 50.0, high: float = 400.0) -> list[Table]:
+def points(rng: Generator, maximum: int = 2, low: float = 50.0, high: float = 400.0) -> list[Table]:
     return [
         {
             "name": f"p{k}", "speed": q(rng.uniform(low, high), "rad/s"),
             "weight": float(round(rng.uniform(0.3, 3.0), 3)),
         }
-        for k in range(int(rng.integers(1, most + 1)))
+        for k in range(int(rng.integers(1, maximum + 1)))
     ]  # fmt: skip
 
 
@@ -278,8 +278,8 @@ def objective(terms: list[Table]) -> Table:
     return {"terms": terms}
 
 
-def with_objective(rng: Generator, table: Table, most: int = 2, **kinds: Any) -> Table:
-    count = int(rng.integers(1, most + 1))
+def with_objective(rng: Generator, table: Table, maximum: int = 2, **kinds: Any) -> Table:
+    count = int(rng.integers(1, maximum + 1))
     terms = [{**asked(rng, table, **kinds), "weight": float(round(rng.uniform(0.2, 3.0), 3))} for _ in range(count)]
     return {**table, "objective": objective(terms)}
 
@@ -410,7 +410,7 @@ def crankcase(rng: Generator) -> Table:
         *([("rms shaft twist", "1.0 rad")] if twists else []), ("degree of irregularity", 1.9),
     )  # fmt: skip
     chosen = [kinds[k] for k in sorted(rng.choice(len(kinds), 2, replace=False))]
-    table["constraints"] = [{"limit": name, "max": most, "name": name} for name, most in chosen]
+    table["constraints"] = [{"limit": name, "max": maximum, "name": name} for name, maximum in chosen]
     return with_objective(rng, table, channels=("main-bearing force", "mount force"))
 
 
@@ -575,10 +575,10 @@ OF_FORCES = [
 ]
 
 
-def few_stiffnesses(least: int, most: int) -> Callable[[Generator], Table]:
+def few_stiffnesses(minimum: int, maximum: int) -> Callable[[Generator], Table]:
     def made(rng: Generator) -> Table:
         table = elastic_scene(rng)
-        opened_stiffness(rng, table["mounts"], int(rng.integers(least, most + 1)))
+        opened_stiffness(rng, table["mounts"], int(rng.integers(minimum, maximum + 1)))
         if rng.random() < 0.15:
             table["objective"] = {"minimise": "transmissibility", "orders": [1]}
         else:
@@ -713,10 +713,10 @@ def shared_leads(rng: Generator) -> Table:
     """Opposed pistons with gas between them, the lead of one crank open."""
     engine = opposed_piston(rng)
     engine.pop("rod_inertia_deficit", None)
-    least = -float(round(rng.uniform(1.0, 25.0), 1)) if rng.random() < 0.5 else 0.0
+    minimum = -float(round(rng.uniform(1.0, 25.0), 1)) if rng.random() < 0.5 else 0.0
     engine |= {
         "cycle": "two-stroke", "bore": q(rng.uniform(0.06, 0.1), "m"), "throws": throws(rng, int(rng.integers(1, 3))),
-        "crank_lead": {"between": [least, float(round(rng.uniform(10.0, 40.0), 1))]},
+        "crank_lead": {"between": [minimum, float(round(rng.uniform(10.0, 40.0), 1))]},
     }  # fmt: skip
     peak = rng.uniform(75.0, 110.0)
     table: Table = {
@@ -792,7 +792,7 @@ def rotary(rng: Generator) -> Table:
     ]  # fmt: skip
     kinds = kinds if "gas" in table else kinds[:2]
     chosen = [kinds[k] for k in sorted(rng.choice(len(kinds), 2, replace=False))]
-    table["constraints"] = [{"limit": name, "max": most, "name": name} for name, most in chosen]
+    table["constraints"] = [{"limit": name, "max": maximum, "name": name} for name, maximum in chosen]
     if rng.random() < 0.25:
         # what is left of force and couple, by as little mass as may be
         table["objective"] = {"minimise": "counterweight mass"}
@@ -937,16 +937,16 @@ def with_limits(rng: Generator, table: Table, share: float = 0.6) -> Table:
     for k in range(int(rng.integers(1, 3))):
         if rng.random() < 0.35:
             ask, high = {"quantity": "added mass"}, best.mass("added mass")
-            most = high * rng.uniform(0.3, 0.9)
+            maximum = high * rng.uniform(0.3, 0.9)
         else:
             ask = asked(rng, table)
             low, high = best.measure(ask), given.measure(ask)
-            most = low * rng.uniform(0.8, 0.98) if rng.random() < 0.5 else low + (high - low) * rng.uniform(0.1, 0.6)
+            maximum = low * rng.uniform(0.8, 0.98) if rng.random() < 0.5 else low + (high - low) * rng.uniform(0.1, 0.6)
         # what vanishes by itself is no limit
-        if most > 1e-4 * high > 1e-7:
+        if maximum > 1e-4 * high > 1e-7:
             narrowed = {key: value for key, value in ask.items() if key != "quantity"}
             quantity = ask["quantity"]
-            limits.append({"limit": quantity, "max": q(most, unit_of(quantity), 9), "name": f"l{k}", **narrowed})
+            limits.append({"limit": quantity, "max": q(maximum, unit_of(quantity), 9), "name": f"l{k}", **narrowed})
     return {**table, "constraints": limits} if limits else table
 
 

@@ -41,7 +41,7 @@ class Weight:
 
     Attributes
     ----------
-    least, most
+    minimum, maximum
         Of its size [kg m].
     sector
         Bounds of its angle [rad]; None where it is open wholly.
@@ -55,22 +55,22 @@ class Weight:
     ratio: float
     radius: float
     role: str
-    least: float
-    most: float
+    minimum: float
+    maximum: float
     sector: tuple[float, float] | None
     follows: tuple[str, float, bool] | None = None
 
     @property
     def entries(self) -> int:
         """How many of the vector are its."""
-        if self.follows or self.least == self.most:
+        if self.follows or self.minimum == self.maximum:
             return 0
         return 1 if self.sector and self.sector[0] == self.sector[1] else 2
 
     def unbalance(self, entries: np.ndarray) -> complex:
         if self.entries == 2:
-            return self.most * complex(*entries)
-        size = self.least if self.entries == 0 else self.least + (self.most - self.least) * float(entries[0])
+            return self.maximum * complex(*entries)
+        size = self.minimum if self.entries == 0 else self.minimum + (self.maximum - self.minimum) * float(entries[0])
         return size * cmath.exp(1j * (self.sector or (0.0, 0.0))[0])
 
 
@@ -111,15 +111,15 @@ class Openings:
             how = told["coupled"]["as"]
             follows = (leader.name, SIGNS[how], how.startswith("mirrored"))
             radius = number(told.get("radius", leader.radius))
-            return Weight(told["name"], where, shaft, ratio, radius, role, 0.0, leader.most, None, follows)
+            return Weight(told["name"], where, shaft, ratio, radius, role, 0.0, leader.maximum, None, follows)
         radius = number(told.get("radius", 1.0))
         size = told["mass"] if "mass" in told else told["unbalance"]
         gain = radius if "mass" in told else 1.0
-        least, most = (number(v) * gain for v in (size["between"] if is_open(size) else (size, size)))
+        minimum, maximum = (number(v) * gain for v in (size["between"] if is_open(size) else (size, size)))
         angle = told.get("angle", 0.0)
         low, high = (math.radians(v) for v in (angle["between"] if is_open(angle) else (angle, angle)))
         sector = None if high - low > 6.28 else (low, high)
-        return Weight(told["name"], where, shaft, ratio, radius, role, least, most, sector)
+        return Weight(told["name"], where, shaft, ratio, radius, role, minimum, maximum, sector)
 
     @cached_property
     def numbers(self) -> tuple[tuple[Path, float, float], ...]:
@@ -224,10 +224,10 @@ class Openings:
         for w in self.weights:
             u = rotors[w.name].unbalance if w.name in rotors else 0j
             if w.entries == 2:
-                values += [u.real / w.most, u.imag / w.most]
+                values += [u.real / w.maximum, u.imag / w.maximum]
             elif w.entries == 1:
                 assert w.sector is not None
-                values.append(((u * cmath.exp(-1j * w.sector[0])).real - w.least) / (w.most - w.least))
+                values.append(((u * cmath.exp(-1j * w.sector[0])).real - w.minimum) / (w.maximum - w.minimum))
         return np.array(values), self._star(engine)
 
     def _star(self, engine: Any) -> Table:

@@ -193,13 +193,17 @@ def limits(rng: Generator, table: Table, count: int) -> list[Table]:
             told = frequency_limit(rng, one, many, hard)
         else:
             told = asked_load(rng, table) if chance < 0.6 else asked_number(rng, table)
-            most = float(one.measure(told)[0]) * rng.uniform(1.0, 1.08)
+            maximum = float(one.measure(told)[0]) * rng.uniform(1.0, 1.08)
             if hard and rng.random() < 0.6:
-                most = float(many.measure(told).min()) * rng.uniform(0.85, 1.01)
-            if most < 1e-9:
+                maximum = float(many.measure(told).min()) * rng.uniform(0.85, 1.01)
+            if maximum < 1e-9:
                 continue
             unit = unit_of(told["quantity"])
-            told = {"limit": told.pop("quantity"), **told, "max": q(most, unit, 9) if unit else float(f"{most:.9g}")}
+            told = {
+                "limit": told.pop("quantity"),
+                **told,
+                "max": q(maximum, unit, 9) if unit else float(f"{maximum:.9g}"),
+            }
         found.append({**told, "name": f"l{k}"})
     return found
 
@@ -210,14 +214,16 @@ def frequency_limit(rng: Generator, one: Designs, many: Designs, hard: bool) -> 
     if chance < 0.2:
         motions = [str(m) for m in rng.choice(["roll", "bounce", "pitch", "lateral"], 2, replace=False)]
         told: Table = {"quantity": "kinetic-energy decoupling", "motions": motions}
-        least = float(many.measure(told).max()) * 1.01 if hard else float(one.measure(told)[0]) * rng.uniform(0.92, 1.0)
-        return {"limit": told.pop("quantity"), **told, "min": float(f"{min(least, 0.999):.9g}")}
+        minimum = (
+            float(many.measure(told).max()) * 1.01 if hard else float(one.measure(told)[0]) * rng.uniform(0.92, 1.0)
+        )
+        return {"limit": told.pop("quantity"), **told, "min": float(f"{min(minimum, 0.999):.9g}")}
     if chance < 0.45:
-        least = every.min(axis=1).max() * rng.uniform(0.98, 1.05) if hard else f[0] * rng.uniform(0.93, 1.0)
-        return {"limit": "natural frequencies", "min": q(least, "Hz", 9)}
+        minimum = every.min(axis=1).max() * rng.uniform(0.98, 1.05) if hard else f[0] * rng.uniform(0.93, 1.0)
+        return {"limit": "natural frequencies", "min": q(minimum, "Hz", 9)}
     if chance < 0.7:
-        most = every.max(axis=1).min() * rng.uniform(0.95, 1.02) if hard else f[-1] * rng.uniform(1.0, 1.07)
-        return {"limit": "natural frequencies", "max": q(most, "Hz", 9)}
+        maximum = every.max(axis=1).min() * rng.uniform(0.95, 1.02) if hard else f[-1] * rng.uniform(1.0, 1.07)
+        return {"limit": "natural frequencies", "max": q(maximum, "Hz", 9)}
     k, share = int(np.argmax(np.diff(f))), rng.uniform(0.0, 0.2)
     inset = share * (f[k + 1] - f[k])
     return {"limit": "natural frequencies", "outside": [q(f[k] + inset, "Hz", 9), q(f[k + 1] - inset, "Hz", 9)]}
@@ -269,9 +275,9 @@ def run_ups(rng: Generator) -> Table:
         own = Own(table, 256, 1e-9)
         low, high = own.box.T
         has = own.designs(low + (high - low) * rng.random((12, len(low)))).measure({"quantity": measure})
-        most = has[0] * rng.uniform(1.0, 1.05) if rng.random() < 0.6 else has.min() * rng.uniform(0.8, 1.02)
+        maximum = has[0] * rng.uniform(1.0, 1.05) if rng.random() < 0.6 else has.min() * rng.uniform(0.8, 1.02)
         table["objective"] = {"minimise": f"{rng.choice(['mean', 'maximum', 'rms'])} mount force"}
-        table["constraints"] = [{"limit": measure, "max": q(float(most), unit_of(measure), 9), "name": "l0"}]
+        table["constraints"] = [{"limit": measure, "max": q(float(maximum), unit_of(measure), 9), "name": "l0"}]
     return {**table, "search": {"boxes": 60, "starts": 3}}
 
 

@@ -100,18 +100,18 @@ class Search:
         limits = "constraints" in self.table
         goals = [self._charged(unit), *([self._excess] if limits else [])]
         ends = list(starts)
-        for goal, slope in zip(goals, (self._least, self._least_excess), strict=False):
+        for goal, slope in zip(goals, (self._minimum, self._least_excess), strict=False):
             for start in [*starts, *self._evolved(goal)]:
                 found = slope(start, unit)
                 ends += [start, found, self._simplex(found, goal)]
         if limits:
             kept = min(ends, key=lambda z: float(self._excess(z)[0]))
-            ends.append(self._least(kept, unit))
+            ends.append(self._minimum(kept, unit))
         told = [(*self.evaluate_design(z), z) for z in ends]
-        least = min(over for _, over, _ in told)
+        minimum = min(over for _, over, _ in told)
         kept_all = [each for each in told if each[1] <= 0.0]
-        best = min(kept_all, key=lambda each: each[0]) if kept_all else (math.inf, least, ends[0])
-        return (*best, least)
+        best = min(kept_all, key=lambda each: each[0]) if kept_all else (math.inf, minimum, ends[0])
+        return (*best, minimum)
 
     def _charged(self, unit: float) -> Callable[[np.ndarray], np.ndarray]:
         def value(shares: np.ndarray) -> np.ndarray:
@@ -155,7 +155,7 @@ class Search:
 
         return told
 
-    def _least(self, start: np.ndarray, unit: float) -> np.ndarray:
+    def _minimum(self, start: np.ndarray, unit: float) -> np.ndarray:
         told = self._slopes(unit)
         kept = {"type": "ineq", "fun": lambda z: -told(z)[2] - 1e-12, "jac": lambda z: -told(z)[3]}
         found = minimize(
@@ -201,12 +201,12 @@ def judge(verdict: Any, table: Table, result: Any, rng: np.random.Generator, cal
     search = Search(table, rng, calls)
     values = {d.name: d.value for d in result.decisions}
     if result.objective is None:
-        _, _, _, least = search.best([search.shares(search.own.given)], 1.0)
+        _, _, _, minimum = search.best([search.shares(search.own.given)], 1.0)
         verdict.rivals += search.looked_at
-        if verdict.status == "infeasible" and least < -SPARED:
-            verdict.wrong.append(f"infeasible, but a design keeps every limit with {-least:.2e} to spare")
-        elif least < -SPARED:
-            verdict.notes.append(f"note: {verdict.status}, but a design keeps every limit with {-least:.2e} to spare")
+        if verdict.status == "infeasible" and minimum < -SPARED:
+            verdict.wrong.append(f"infeasible, but a design keeps every limit with {-minimum:.2e} to spare")
+        elif minimum < -SPARED:
+            verdict.notes.append(f"note: {verdict.status}, but a design keeps every limit with {-minimum:.2e} to spare")
         return
     x = vector(search.own, values)
     start = search.shares(x)

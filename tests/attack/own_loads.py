@@ -208,17 +208,17 @@ def torque(gas: Table, point: Table, s: Stroke) -> np.ndarray:
     whole = 2.0 * math.pi * s.turns
     high, low = float(s.height(top)), float(s.height(bottom))
     ratio = float(gas.get("compression_ratio", 17.0))
-    least, most = 1.0 / (ratio - 1.0), ratio / (ratio - 1.0)
+    minimum, maximum = 1.0 / (ratio - 1.0), ratio / (ratio - 1.0)
     entering, leaving = (si(gas.get(f"{k}_pressure", AIR)) for k in ("intake", "exhaust"))
     wanted = si(point.get("imep", gas.get("imep", 0.0))) - (entering - leaving if s.turns == 2 else 0.0)
 
     def volume(a: Any) -> Any:
-        return least + (high - s.height(a)) / (high - low)
+        return minimum + (high - s.height(a)) / (high - low)
 
     bends = [top, bottom, top + 2 * math.pi, bottom + 2 * math.pi]
     make = {"seiliger": _mixed, "wiebe": _released}[gas["model"]]
     pressure, more = make(
-        gas, bool(point.get("motored", False)), wanted, volume, (top, bottom), (least, most), entering
+        gas, bool(point.get("motored", False)), wanted, volume, (top, bottom), (minimum, maximum), entering
     )
     a, w = _panels([*bends, *more], whole)
     g = a.copy()
@@ -238,25 +238,29 @@ def torque(gas: Table, point: Table, s: Stroke) -> np.ndarray:
 def _mixed(gas: Table, motored: bool, wanted: float, volume: Any, dead: Any, ends: Any, entering: float) -> Any:
     """Pressure of the closed part of a Seiliger cycle, and where it bends besides."""
     top, bottom = dead
-    least, most = ends
+    minimum, maximum = ends
     n1, n2 = float(gas.get("compression_exponent", 1.35)), float(gas.get("expansion_exponent", 1.30))
-    peak = entering * (most / least) ** n1
+    peak = entering * (maximum / minimum) ** n1
     if motored:
-        return lambda a, w: entering * (most / volume(a)) ** n1, []
+        return lambda a, w: entering * (maximum / volume(a)) ** n1, []
 
     def work(n: float, p: float, v: float, to: float) -> float:
         return p * v * math.log(to / v) if n == 1.0 else p * v * (1.0 - (v / to) ** (n - 1.0)) / (n - 1.0)
 
-    spent, peak = work(n1, peak, least, most), si(gas["peak_pressure"])
+    spent, peak = work(n1, peak, minimum, maximum), si(gas["peak_pressure"])
     cut = brentq(
-        lambda v: peak * (v - least) + work(n2, peak, v, most) - spent - wanted, least, most, xtol=1e-16, rtol=1e-15
+        lambda v: peak * (v - minimum) + work(n2, peak, v, maximum) - spent - wanted,
+        minimum,
+        maximum,
+        xtol=1e-16,
+        rtol=1e-15,
     )
     at = brentq(lambda a: float(volume(a)) - cut, top, bottom, xtol=1e-15, rtol=1e-15)
 
     def pressure(a: np.ndarray, w: np.ndarray) -> np.ndarray:
         v = volume(a)
         burnt = peak * np.minimum(1.0, cut / v) ** n2
-        return np.where(a < top, entering * (most / v) ** n1, burnt)
+        return np.where(a < top, entering * (maximum / v) ** n1, burnt)
 
     return pressure, [at]
 
@@ -264,10 +268,10 @@ def _mixed(gas: Table, motored: bool, wanted: float, volume: Any, dead: Any, end
 def _released(gas: Table, motored: bool, wanted: float, volume: Any, dead: Any, ends: Any, entering: float) -> Any:
     """The same with finite heat release: p v^k grows by (k - 1) q v^(k - 1) db."""
     _, bottom = dead
-    _, most = ends
+    _, maximum = ends
     k = float(gas.get("heat_ratio", 1.35))
     if motored:
-        return lambda a, w: entering * (most / volume(a)) ** k, []
+        return lambda a, w: entering * (maximum / volume(a)) ** k, []
     start, long = (
         math.radians(float(gas[key])) if not isinstance(gas[key], str) else si(gas[key])
         for key in ("start", "duration")
@@ -288,7 +292,7 @@ def _released(gas: Table, motored: bool, wanted: float, volume: Any, dead: Any, 
         before = np.concatenate([[0.0], np.cumsum((source * w[order]).sum(axis=1))[:-1]])
         gained = np.empty_like(v)
         gained[order] = before[:, None] + inner
-        cold, hot = entering * (most / v) ** k, gained / v**k
+        cold, hot = entering * (maximum / v) ** k, gained / v**k
         closed = a < bottom
         # the work of either part over what is closed
         rise = volume(a + 1e-40j).imag / 1e-40

@@ -74,7 +74,7 @@ def _one(
         return np.concatenate([np.zeros_like(load), load], axis=1)
 
     y, now = np.zeros((designs.count, 12)), push(0.0)
-    most = {key: np.zeros(designs.count) for key in MEASURES}
+    maximum = {key: np.zeros(designs.count) for key in MEASURES}
     held: list[np.ndarray] = []
     for step in range(count):
         middle, after = push((step + 0.5) * dt), push((step + 1.0) * dt)
@@ -85,17 +85,17 @@ def _one(
         y, now = y + dt / 6.0 * (a + 2.0 * b + 2.0 * d + e), after
         held.append(y)
         if len(held) == 256 or step == count - 1:
-            _read(most, np.array(held), by_motion, by_speed, designs)
+            _read(maximum, np.array(held), by_motion, by_speed, designs)
             held = []
-    return most
+    return maximum
 
 
 def _read(
-    most: dict[str, np.ndarray], states: np.ndarray, by_motion: np.ndarray, by_speed: np.ndarray, designs: Designs
+    maximum: dict[str, np.ndarray], states: np.ndarray, by_motion: np.ndarray, by_speed: np.ndarray, designs: Designs
 ) -> None:
     q, v = states[..., :6, None], states[..., 6:, None]
     joined = designs.blocks.joined((by_motion @ q[:, :, None] + by_speed @ v[:, :, None])[..., 0])
     travel = (designs.blocks.moves @ q[:, :, None])[..., 0]
     sizes = (np.linalg.norm(joined, axis=-1), np.linalg.norm(travel, axis=-1), np.abs(q[..., 3, :]))
     for key, size in zip(MEASURES, sizes, strict=True):
-        most[key] = np.maximum(most[key], size.max(axis=(0, 2)))
+        maximum[key] = np.maximum(maximum[key], size.max(axis=(0, 2)))

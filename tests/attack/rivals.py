@@ -50,22 +50,22 @@ def designs_told(openings: Openings) -> Iterator[Table]:
 def convex_rival(openings: Openings, start: np.ndarray, told: Table, enough: float = np.inf) -> Rival:
     """Where unbalances alone are open; looked for until none under `enough` can be left."""
     program = Program(openings, told)
-    found = program.least(start, enough=enough)
+    found = program.minimum(start, enough=enough)
     if found.excess > KEPT:
-        least = program.least_excess(found.vector)
-        if least.excess <= KEPT:
-            found = program.least(least.vector, charge=1e6)
+        minimum = program.least_excess(found.vector)
+        if minimum.excess <= KEPT:
+            found = program.minimum(minimum.vector, charge=1e6)
         else:
-            scene = openings.scene(least.vector, told)
-            return Rival(scene.objective, least.excess, least.vector, told, least_excess=least.bound)
+            scene = openings.scene(minimum.vector, told)
+            return Rival(scene.objective, minimum.excess, minimum.vector, told, least_excess=minimum.bound)
     scene = openings.scene(found.vector, told)
     return Rival(scene.objective, scene.worst, found.vector, told, bound=found.bound)
 
 
-def best_star(openings: Openings, most: int, enough: float = np.inf) -> Rival | None:
+def best_star(openings: Openings, maximum: int, enough: float = np.inf) -> Rival | None:
     """Every star by itself; None where there are too many, or none."""
     told = list(designs_told(openings))
-    if not told or len(told) > most:
+    if not told or len(told) > maximum:
         return None
     rivals = [convex_rival(openings, openings.nearest(np.zeros(openings.size)), star, enough) for star in told]
     kept = [r for r in rivals if r.excess <= KEPT]
@@ -73,10 +73,10 @@ def best_star(openings: Openings, most: int, enough: float = np.inf) -> Rival | 
     return Rival(best.value, best.excess, best.vector, best.told, len(told), min(r.bound for r in rivals))
 
 
-def least_broken(openings: Openings, most: int) -> Rival | None:
+def least_broken(openings: Openings, maximum: int) -> Rival | None:
     """The design, of any star, that passes its limits least."""
     told = list(designs_told(openings))
-    if not told or len(told) > most:
+    if not told or len(told) > maximum:
         return None
     best: Rival | None = None
     for star in told:

@@ -31,7 +31,7 @@ def raised(result: Result) -> Result:
     assert result.certificate is not None
     assert result.objective is not None
     bound = 1.01 * result.objective.value
-    ranks = tuple(replace(rank, lower_bound=1.01 * rank.least) for rank in result.ranks)
+    ranks = tuple(replace(rank, lower_bound=1.01 * rank.minimum) for rank in result.ranks)
     return replace(result, certificate=replace(result.certificate, lower_bound=bound), ranks=ranks)
 
 

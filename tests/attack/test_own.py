@@ -51,14 +51,14 @@ def test_a_random_design_is_worth_the_same(family: str, seed: int, tmp_path: Pat
     path.write_text(toml(given(table, x, own)), encoding="utf-8")
     result, design = laufruhe.evaluate(laufruhe.load(path)), own.designs(x)
     asked = own_judge.reading([term["quantity"] for term in terms_of(table)], table)
-    most = max(asked, 1.5 * result.error_estimate)
-    assert result.objective.value == pytest.approx(float(design.objective[0]), rel=most)
+    maximum = max(asked, 1.5 * result.error_estimate)
+    assert result.objective.value == pytest.approx(float(design.objective[0]), rel=maximum)
     limits = {limit.name: limit for limit in result.limits}
     for told in table.get("constraints", []):
         if told["limit"] != "natural frequencies":
             limit, value = limits[told["name"]], float(design.measure({**told, "quantity": told["limit"]})[0])
-            most = max(own_judge.reading([told["limit"]], table), 1.5 * limit.error_estimate)
-            assert limit.value == pytest.approx(value, rel=most), told
+            maximum = max(own_judge.reading([told["limit"]], table), 1.5 * limit.error_estimate)
+            assert limit.value == pytest.approx(value, rel=maximum), told
 
 
 @pytest.mark.slow

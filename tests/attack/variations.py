@@ -45,9 +45,9 @@ def prices(table: Table, rng: np.random.Generator, folder: Path) -> Complaints:
     for k, told in enumerate(table.get("constraints", [])):
         side = "max" if "max" in told else "min"
         priced = next(limit for limit in result.limits if limit.name == told["name"])
-        sign, most = (1.0 if side == "max" else -1.0), number(told[side])
+        sign, maximum = (1.0 if side == "max" else -1.0), number(told[side])
         looser, tighter = (solved(_moved(table, k, side, 1.0 + sign * s), folder) for s in (STEP, -STEP))
-        step, unit = STEP * most, result.objective.value / most
+        step, unit = STEP * maximum, result.objective.value / maximum
         slack = doubt(result) / step + 0.02 * priced.shadow_price
         low = (result.objective.value - looser.objective.value - doubt(looser)) / step
         high = (

@@ -214,8 +214,8 @@ def full_disk(folder: Path) -> list[str]:
 def grown(folder: Path, evaluations: int, solves: int) -> tuple[list[Cost], list[Cost]]:
     """Random designs and random scenes of growing numbers, in one process."""
     found: tuple[list[Cost], list[Cost]] = [], []
-    for which, part, most in ((0, "designs", evaluations), (1, "engines", solves)):
-        for size in (most // 100, most // 10, most):
+    for which, part, maximum in ((0, "designs", evaluations), (1, "engines", solves)):
+        for size in (maximum // 100, maximum // 10, maximum):
             words = {"draws": size, "chunk": 10_000} if which == 0 else {"scenes": size, "few": min(size, 100)}
             here = clusters.prepared(folder / f"{part}{size}", **{**{"draws": 1, "scenes": 1, "points": 2}, **words})
             wall, cores, memory = timed(here, "--jobs", "1")
@@ -268,8 +268,8 @@ def drawn(sizes: tuple[list[Cost], list[Cost]], counts: list[tuple[int, float, f
                                         (3, "core-seconds of the client", "purple", "D"))
     ]  # fmt: skip
     across = p.Axis("workers", ticks=[(count, str(count)) for count in x])
-    most = max(max(one[2:]) for one in counts)
-    right = p.Panel(marks, across, p.Axis("core-seconds", (0.0, 1.2 * most)), "Workers, the same study")
+    maximum = max(max(one[2:]) for one in counts)
+    right = p.Panel(marks, across, p.Axis("core-seconds", (0.0, 1.2 * maximum)), "Workers, the same study")
     words = "Random designs and random scenes of one cylinder; Dask workers on one machine."
     credit = "Computed with Laufruhe."
     picture = p.Picture("Many designs: what they cost", words, [left, right], credit, columns=2, gap=0.7)
@@ -286,12 +286,12 @@ def asked() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def at_least(least: int) -> Callable[[str], int]:
+def at_least(minimum: int) -> Callable[[str], int]:
     """Numbers so large that what one more takes shows beside what starting takes."""
 
     def number(word: str) -> int:
-        if int(float(word)) < least:
-            raise argparse.ArgumentTypeError(f"{word} is too few to tell growth from what starting takes: {least}")
+        if int(float(word)) < minimum:
+            raise argparse.ArgumentTypeError(f"{word} is too few to tell growth from what starting takes: {minimum}")
         return int(float(word))
 
     return number

@@ -34,10 +34,10 @@ SLSQP_SECONDS = 60.0
 SAMPLES = 96
 
 
-def seconds(work: Callable[[], object], least: float = 0.5) -> float:
+def seconds(work: Callable[[], object], minimum: float = 0.5) -> float:
     """Best time of one call over at least half a second of calls."""
     best, whole = math.inf, 0.0
-    while whole < least:
+    while whole < minimum:
         last = spent(work)
         best, whole = min(best, last), whole + last
     return best

@@ -46,12 +46,12 @@ def main() -> None:
     built = BuiltEngines(problem, unbalances_of(problem, result), result.final.samples)
     worst, rows = result.objective.value, []
     for how in LAWS:
-        random, started, most, over = np.random.default_rng(2026), time.process_time(), 0.0, 0
+        random, started, maximum, over = np.random.default_rng(2026), time.process_time(), 0.0, 0
         for _ in range(ENGINES // PIECE):
             found = objective_values(built.terms, drawn(tolerances_of(problem), random, PIECE, how))
-            most, over = max(most, float(found.max())), over + int((found > worst).sum())
+            maximum, over = max(maximum, float(found.max())), over + int((found > worst).sum())
         rows.append(
-            [how, f"{ENGINES:,}", f"{most:.3f}", f"{worst:.3f}", f"{over}", f"{time.process_time() - started:.0f}"]
+            [how, f"{ENGINES:,}", f"{maximum:.3f}", f"{worst:.3f}", f"{over}", f"{time.process_time() - started:.0f}"]
         )
     c = result.certificate
     head = ["errors", "engines", "worst drawn [N]", "bound [N]", "above it", "core-seconds"]

@@ -21,7 +21,7 @@ def problem() -> Problem:
     return laufruhe.load(INPUTS / "transmissibility-beside-weights.toml")
 
 
-def _least(problem: Problem, count: int = 400) -> float:
+def _minimum(problem: Problem, count: int = 400) -> float:
     """Objective of the best of evenly spaced weights that keep the limits, by the exact model."""
     (decision,) = problem.decisions
     values = []
@@ -40,7 +40,7 @@ def test_a_limit_with_room_takes_nothing_from_the_proof(problem: Problem) -> Non
     assert found.certificate.kind is Proof.GLOBAL
     assert found.certificate.gap < 1e-4
     assert found.objective.value == pytest.approx(38.3224, rel=1e-5)
-    assert found.certificate.lower_bound <= _least(problem) * (1.0 + 1e-9)
+    assert found.certificate.lower_bound <= _minimum(problem) * (1.0 + 1e-9)
     assert [limit.name for limit in found.limits] == [limit.name for limit in problem.limits]
 
 
@@ -60,7 +60,7 @@ def test_a_limit_that_holds_leaves_at_least_the_bound_without_it(problem: Proble
     assert found.objective is not None
     assert free.objective is not None
     # boxes of the weight may show more than that
-    assert free.objective.value * (1.0 - 1e-4) <= found.certificate.lower_bound <= _least(tight)
+    assert free.objective.value * (1.0 - 1e-4) <= found.certificate.lower_bound <= _minimum(tight)
     assert found.final.excess(tight.limits) <= 1e-5
 
 
@@ -72,8 +72,8 @@ def test_a_term_that_no_closing_method_knows_takes_its_own_share_alone(problem: 
     assert found.certificate is not None
     assert alone.objective is not None
     assert found.objective is not None
-    assert alone.objective.value * (1.0 - 1e-4) <= found.certificate.lower_bound <= _least(both)
-    assert found.objective.value <= _least(both) * (1.0 + 1e-6)
+    assert alone.objective.value * (1.0 - 1e-4) <= found.certificate.lower_bound <= _minimum(both)
+    assert found.objective.value <= _minimum(both) * (1.0 + 1e-6)
 
 
 @pytest.mark.slow

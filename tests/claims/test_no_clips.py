@@ -13,25 +13,25 @@ import laufruhe
 SOURCE = Path(laufruhe.__file__).parent
 ROOMS = ("prove", "solvers")
 LEAST, MOST = {"min", "minimum", "fmin", "clip"}, {"max", "maximum", "fmax"}
-VALUES = {"value", "enough", "known", "best", "level", "most"}
+VALUES = {"value", "enough", "known", "best", "level", "maximum"}
 """Names of what is known of designs."""
-BOUNDS = ("bound", "divide", "floor", "found", "least", "looked", "total")
+BOUNDS = ("bound", "divide", "floor", "found", "minimum", "looked", "total")
 """What names of bounds have in them."""
 ALLOWED = {
     # what is shown of designs under a level is so of all up to it, and parts that are cut off are not under theirs
     "min(looked[0], first.level)",
     "min(best, self.level)",
-    "min(self._least, found.level)",
-    "min(queue[0].bound if queue else math.inf, self._least, self.level)",
+    "min(self._minimum, found.level)",
+    "min(queue[0].bound if queue else math.inf, self._minimum, self.level)",
     # the least of the bounds of several stars
     "min(known, float(star_bounds(costs, stars[[np.argmin(bounds)]])[0]))",
     "min(known, float(bounds.min(initial=math.inf)))",
     # of an objective in ranks the least value that is known, when a walk finds a better one
-    "min(rank.least, value)",
+    "min(rank.minimum, value)",
     # what springs do at most, and how much is worth looking at
-    "min(most, line.largest)",
-    "min(firing.most, firing.cycle.angle - (len(constants) - 1) * firing.least)",
-    "min(most, bounds[name].work(value / term.weight))",
+    "min(maximum, line.largest)",
+    "min(firing.maximum, firing.cycle.angle - (len(constants) - 1) * firing.minimum)",
+    "min(maximum, bounds[name].work(value / term.weight))",
     "min(first, enough)",
     "min(second, enough)",
 }
@@ -89,14 +89,14 @@ def test_no_bound_is_brought_to_a_value(room: str) -> None:
     "line",
     [
         "bound = float(min(max(bound, 0.0), value))",
-        "return min(max(found, 0.0), most), pull, middle",
-        "bound = max(min(bound + mean.constant, self.most), mean.floor)",
+        "return min(max(found, 0.0), maximum), pull, middle",
+        "bound = max(min(bound + mean.constant, self.maximum), mean.floor)",
         "return min(total, self.value), pull",
-        "found = Searched(min(bound, search.cut(found.value)), found.design)",
+        "found = ThrowBound(min(bound, search.cut(found.value)), found.design)",
         "shown = ProofData(bound=min(bound, design.value))",
         "return min(self.divide(root, 10), self._enough.value)",
         "return WorstCase(errors, value, max(value, -bound), seen)",
-        "least = np.minimum(bounds, value)",
+        "minimum = np.minimum(bounds, value)",
     ],
 )
 def test_clips_are_found(line: str) -> None:

@@ -154,8 +154,8 @@ def test_a_star_alone_has_no_prices() -> None:
         "firing_order": "open",
     }  # fmt: skip
     table = {"title": "star", "engine": engine, "operating_points": [{"speed": "2500 rpm"}]}
-    least = value(table | {"objective": {"minimise": "maximum rocking couple"}})
-    limit = {"limit": "maximum rocking couple", "max": f"{least * (1.0 + 2e-6)!r} N m"}
+    minimum = value(table | {"objective": {"minimise": "maximum rocking couple"}})
+    limit = {"limit": "maximum rocking couple", "max": f"{minimum * (1.0 + 2e-6)!r} N m"}
     result = laufruhe.solve(table | {"objective": {"minimise": "mean rocking couple"}, "constraints": [limit]})
     assert result.status == "optimal"
     assert result.limits[0].active

@@ -21,7 +21,7 @@ def test_a_sacrifice_that_is_allowed_is_no_gap() -> None:
     """The first may rise by a tenth for the second: it does, by 0.67 %."""
     result = laufruhe.solve(INPUTS / "ranks-with-a-sacrifice.toml")
     first, second = result.ranks
-    assert first.final > 1.005 * first.least
+    assert first.final > 1.005 * first.minimum
     assert result.certificate.kind is Proof.GLOBAL
     assert result.certificate.gap == max(first.gap, second.gap) <= result.problem.tolerance
     assert result.status == "optimal"
@@ -33,9 +33,9 @@ def test_a_first_objective_that_cancels_is_zero() -> None:
     result = laufruhe.solve(INPUTS / "ranks-with-a-zero.toml")
     first, second = result.ranks
     assert first.initial == pytest.approx(5.827, abs=1e-3)
-    assert first.least < 1e-12
+    assert first.minimum < 1e-12
     assert first.final < 1e-12
-    assert second.least == pytest.approx(979.28, abs=0.02)
+    assert second.minimum == pytest.approx(979.28, abs=0.02)
     assert result.certificate.kind is Proof.GLOBAL
     assert result.status == "optimal"
 
@@ -48,7 +48,7 @@ def test_what_cancels_is_global_wherever_it_stands(seed: int) -> None:
     table["engine"]["stroke"] = f"{rng.uniform(50.0, 120.0)} mm"
     table["engine"]["reciprocating_mass"] = f"{rng.uniform(0.3, 2.0)} kg"
     ranked = laufruhe.solve(table)
-    assert ranked.ranks[0].least < 1e-12 * ranked.ranks[0].initial
+    assert ranked.ranks[0].minimum < 1e-12 * ranked.ranks[0].initial
     assert ranked.ranks[0].proof is Proof.GLOBAL
     alone = laufruhe.solve(table | {"objective": {k: v for k, v in table["objective"][0].items() if k != "within"}})
     assert alone.objective.value < 1e-12 * alone.objective.initial

@@ -197,8 +197,8 @@ class WorstTwentieth(Maximum):
 
     def dual_norm(self, grid: Grid, z: Array) -> float:
         size, shares = lengths(z), grid.weights / grid.weights.sum()
-        most = np.divide(0.05 * size, shares, out=np.zeros_like(size), where=shares > 0.0)
-        return float(max(most.max(initial=0.0), size.sum()))
+        maximum = np.divide(0.05 * size, shares, out=np.zeros_like(size), where=shares > 0.0)
+        return float(max(maximum.max(initial=0.0), size.sum()))
 
     def of_lengths(self, lengths: Array, weights: Array) -> Array:
         count = max(lengths.shape[-1] // 20, 1)

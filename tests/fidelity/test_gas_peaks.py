@@ -212,18 +212,18 @@ def test_force_on_a_pin_jumps_with_the_pressure(seed: int) -> None:
 
 def test_a_limited_peak_keeps_its_limit_at_the_bend(tmp_path: Path) -> None:
     """The mean would have it at 2208 N; the peak stands at the cut-off, between two steps."""
-    path, most = tmp_path / "limit.toml", 2100.0
+    path, maximum = tmp_path / "limit.toml", 2100.0
     text = (
         BEND.replace("SAMPLES", "360").replace("[0, 0.4]", "[0, 1]").replace("maximum mount force", "mean mount force")
     )
-    limit = f'[[constraints]]\nlimit = "maximum mount force"\nmax = "{most} N"\n'
+    limit = f'[[constraints]]\nlimit = "maximum mount force"\nmax = "{maximum} N"\n'
     path.write_text(text + limit, encoding="utf-8")
     problem = laufruhe.load(path)
     result = laufruhe.solve(problem)
     peak = Measure(channels.MOUNT_FORCE, NORMS["maximum"])
     held = _truth(replace(problem, engine=result.final.engine, objective=(Term(peak),)))
     assert result.limits[0].active
-    assert held <= most * (1.0 + 1e-5)
+    assert held <= maximum * (1.0 + 1e-5)
     assert result.limits[0].value == pytest.approx(held, rel=1e-6)
 
 

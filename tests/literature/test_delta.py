@@ -138,9 +138,9 @@ def test_no_star_of_the_eighteen_has_less_couple() -> None:
 
     rest = sorted(round(t, 6) for t in throws[1:])
     even = [throws[0] + 60.0 * k for k in range(1, 6)]
-    least = min(couple((throws[0], *each)) for steps in (rest, even) for each in itertools.permutations(steps))
-    assert result.ranks[1].final == pytest.approx(least, rel=1e-5)
-    assert couple(tuple(throws)) == pytest.approx(least, rel=1e-9)
+    minimum = min(couple((throws[0], *each)) for steps in (rest, even) for each in itertools.permutations(steps))
+    assert result.ranks[1].final == pytest.approx(minimum, rel=1e-5)
+    assert couple(tuple(throws)) == pytest.approx(minimum, rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -136,9 +136,9 @@ class TestTwoStrokeFour:
     def test_best_star_without_a_shaft(self) -> None:
         """Text below eq. 30: Fig. 26 is the cross of the least couple of first order; one of second remains."""
         every = [self.couples((0.0, *rest)) for rest in permutations((QUARTER, math.pi, -QUARTER))]
-        least = min(every)
-        assert least == pytest.approx((math.sqrt(2), 4.0), rel=1e-13)
-        assert self.couples((0.0, math.pi, QUARTER, -QUARTER)) == pytest.approx(least, rel=1e-13)
+        minimum = min(every)
+        assert minimum == pytest.approx((math.sqrt(2), 4.0), rel=1e-13)
+        assert self.couples((0.0, math.pi, QUARTER, -QUARTER)) == pytest.approx(minimum, rel=1e-13)
 
     def test_best_star_with_a_shaft(self) -> None:
         """Text below eq. 31: the cross of Fig. 27 alone is free of second order; its first order is the largest."""

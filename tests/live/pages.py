@@ -49,9 +49,9 @@ mass = { between = ["0 kg", "2 kg"] }
     + shaft("left", 2, "100 mm", open_unbalance())
     + '[objective]\nminimise = "mean mount force"\n'
     + "".join(
-        f'[[constraints]]\nlimit = "{norm} {load}"\nmax = "{most}"\n'
+        f'[[constraints]]\nlimit = "{norm} {load}"\nmax = "{maximum}"\n'
         for norm in NORMS
-        for load, most in (("mount force", "3 kN"), ("rocking couple", "400 N m"))
+        for load, maximum in (("mount force", "3 kN"), ("rocking couple", "400 N m"))
     )
     + '[[constraints]]\nlimit = "maximum mount force"\nname = "second order"\norders = [2]\n'
     + 'mounts = ["mount 2"]\noperating_points = ["fast"]\nmax = "3 kN"\n'

@@ -22,7 +22,7 @@ def slots(cycle, throws, angle, deviation, sides=(0.5, -0.5)):
 def least_deviation(cycle, throws, angle):
     """Of cranks on a grid of angles, every cylinder on any turn of the cycle [deg]."""
     layout = vee(2 * throws, 0.1, math.radians(angle))
-    count, least = 2 * throws, math.inf
+    count, minimum = 2 * throws, math.inf
     for rest in itertools.product(range(0, 360, GRID), repeat=throws - 1):
         centres = [
             math.degrees(float(layout.own_turn(k)) * math.tau) - (0, *rest)[layout.pins[k]] for k in range(count)
@@ -32,8 +32,8 @@ def least_deviation(cycle, throws, angle):
                 [(c + 360.0 * lap) % (360.0 * cycle.turns) for c, lap in zip(centres, (0, *laps), strict=True)]
             )
             steps = np.diff([*moments, moments[0] + 360.0 * cycle.turns])
-            least = min(least, float(np.abs(steps - 360.0 * cycle.turns / count).max()))
-    return least
+            minimum = min(minimum, float(np.abs(steps - 360.0 * cycle.turns / count).max()))
+    return minimum
 
 
 @pytest.mark.parametrize("angle", [0, 20, 45, 60, 66, 90, 120, 174])
@@ -60,8 +60,8 @@ def test_moments_keep_banks_apart_and_bounds(cycle, throws, angle):
             assert math.remainder(apart, math.tau) == pytest.approx(0.0, abs=1e-7)
         if pattern.broken <= 1e-7:
             intervals = pattern.intervals(cycle)
-            assert own.least - 1e-7 <= min(intervals)
-            assert max(intervals) <= own.most + 1e-7
+            assert own.minimum - 1e-7 <= min(intervals)
+            assert max(intervals) <= own.maximum + 1e-7
 
 
 def test_cylinders_in_line_fire_evenly():

@@ -46,18 +46,18 @@ def engine(cycle: Cycle, layout: Layout, throws: tuple[float, ...], order: list[
 
 class TestPlaces:
     @pytest.mark.parametrize(
-        ("layout", "own", "most"),
+        ("layout", "own", "maximum"),
         [
             ("inline", {}, 1),
             ("vee", {"bank_angle": 90}, 2),
             ("boxer", {"bank_stagger": "40 mm", "firing_order": [1, 2]}, 2),
         ],
     )
-    def test_neighbours_alone_need_a_spacing(self, layout: str, own: dict[str, object], most: int) -> None:
+    def test_neighbours_alone_need_a_spacing(self, layout: str, own: dict[str, object], maximum: int) -> None:
         """Cylinders of one place along the crank have no distance to a next place."""
         shared = {"cycle": "four-stroke", "stroke": "90 mm", "rod_ratio": 0.3, "reciprocating_mass": "0.5 kg"}
         asked = {"title": "t", "operating_points": [{"speed": "3000 rpm"}]}
-        engine = {"layout": layout, **own, **shared, "cylinders": most}
+        engine = {"layout": layout, **own, **shared, "cylinders": maximum}
         found = laufruhe.load({**asked, "engine": engine}).engine
         away = laufruhe.load({**asked, "engine": {**engine, "cylinder_spacing": "1 m"}}).engine
         assert [part.x for part in found.cylinders] == [part.x for part in away.cylinders]

@@ -76,8 +76,8 @@ def written(document: Document, values: Mapping[str, float] | None = None) -> st
 # layouts: keys of [engine], throws as given where an engine has some that may be open
 
 
-def _line(rng: Generator, layout: str = "inline", most: int = 4) -> Document:
-    count = int(rng.integers(1, most + 1))
+def _line(rng: Generator, layout: str = "inline", maximum: int = 4) -> Document:
+    count = int(rng.integers(1, maximum + 1))
     return {"layout": layout, "throws": _throws(rng, count), "cylinder_spacing": "100 mm"}
 
 
@@ -357,10 +357,10 @@ def _channel(measure: str) -> Channel:
 
 def _add_mounts(document: Document, cell: Cell, rng: Generator) -> None:
     needs = _channel(cell.measure).needs
-    least = 1 if needs is Needs.MOUNTS else 0
+    minimum = 1 if needs is Needs.MOUNTS else 0
     if needs is Needs.ELASTIC or cell.decision in OF_MOUNTS:
-        least = 2
-    kind = ("none", "rigid", "elastic")[int(rng.integers(least, 3))]
+        minimum = 2
+    kind = ("none", "rigid", "elastic")[int(rng.integers(minimum, 3))]
     if kind == "none":
         return
     places: list[Document] = [

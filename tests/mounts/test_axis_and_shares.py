@@ -43,9 +43,9 @@ def test_the_best_square_of_given_stiffness_is_that_of_a_search(seed, band):
     mounting = random_mounting(seed)
     k, m, q = _given(mounting)
     low, high = ((math.tau * f) ** 2 for f in (band[0], min(band[1], 200.0)))
-    least = minimize_scalar(lambda s: np.linalg.norm(k @ q - s * (m @ q)), bounds=(low, high), method="bounded").fun
-    least = min(least, *(float(np.linalg.norm(k @ q - s * (m @ q))) for s in (low, high)))
-    assert residual_of(mounting, raw_residual(mounting.block, band)) == pytest.approx(least, rel=1e-6)
+    minimum = minimize_scalar(lambda s: np.linalg.norm(k @ q - s * (m @ q)), bounds=(low, high), method="bounded").fun
+    minimum = min(minimum, *(float(np.linalg.norm(k @ q - s * (m @ q))) for s in (low, high)))
+    assert residual_of(mounting, raw_residual(mounting.block, band)) == pytest.approx(minimum, rel=1e-6)
 
 
 def test_a_block_that_turns_about_its_axis_in_a_mode_leaves_nothing():
@@ -114,11 +114,11 @@ def test_no_design_of_a_box_is_under_its_bound(tmp_path, asked):
         middle = model.lower + generator.random(2) * (model.upper - model.lower)
         half = 0.5 * size * (model.upper - model.lower)
         lower, upper = np.maximum(middle - half, model.lower), np.minimum(middle + half, model.upper)
-        (least,), _ = RANGES[measure.channel](model, measure, lower[None], upper[None])
+        (minimum,), _ = RANGES[measure.channel](model, measure, lower[None], upper[None])
         drawn = lower + generator.random((40, 2)) * (upper - lower)
         values = [evaluate(problem, problem.design(list(x))).value(measure) for x in drawn]
-        assert least <= min(values) * (1.0 + 1e-9)
-        told += least > 0.5 * min(values)
+        assert minimum <= min(values) * (1.0 + 1e-9)
+        told += minimum > 0.5 * min(values)
     assert told
 
 
@@ -162,14 +162,14 @@ def test_no_shares_of_a_box_are_over_what_it_has_at_most(tmp_path, size):
     crossing = drawn[np.argsort((np.diff(squares) / squares[:, 1:]).min(axis=1))[:20]]
     middle, half = np.concatenate([crossing, drawn[:20]]), 0.5 * size * generator.random((40, 2)) * wide
     lower, upper = np.maximum(middle - half, low), np.minimum(middle + half, model.upper)
-    least, most = shortfall(model, measure, lower, upper), most_shares(model, measure, lower, upper)
+    minimum, maximum = shortfall(model, measure, lower, upper), most_shares(model, measure, lower, upper)
     inside = lower + generator.random((30, 1, 1)) * (upper - lower)
     inside[:4] = lower, upper, np.stack([lower[:, 0], upper[:, 1]], 1), np.stack([upper[:, 0], lower[:, 1]], 1)
     modes = np.linalg.eigh(model.stiffness(inside.reshape(-1, 2)))[1]
     along = model.root.T @ modes * (np.linalg.inv(model.root) @ modes)
     shares = along[:, motion_indices(measure)].max(axis=2).reshape(30, 40, -1)
-    assert np.all(shares <= most.T + 1e-10)
-    assert np.all(np.maximum(0.9 - shares, 0.0).sum(axis=2) >= least - 1e-10)
+    assert np.all(shares <= maximum.T + 1e-10)
+    assert np.all(np.maximum(0.9 - shares, 0.0).sum(axis=2) >= minimum - 1e-10)
 
 
 def test_the_shortfall_is_what_shares_lack(decoupled):

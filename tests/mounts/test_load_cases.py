@@ -149,7 +149,7 @@ def test_no_design_of_a_box_is_under_its_bound(name: str, gap: str, tmp_path: Pa
         # the linear function itself is under every design, not its least alone
         lines = found.value + (2.0 * shares - 1.0) @ found.slopes[0] - found.rest
         assert np.all(lines <= values * (1.0 + 1e-9))
-        ratios.append(float(found.least[0]) / values.min())
+        ratios.append(float(found.minimum[0]) / values.min())
     assert max(ratios) <= 1.0 + 1e-9
     assert max(ratios) > 0.99
 
@@ -171,8 +171,8 @@ def test_joined_and_hydraulic_mounts_with_stops_are_bounded_too(name: str, asked
         low, high = (np.clip(centre * (1.0 + side * width), model.lower, model.upper) for side in (-1.0, 1.0))
         shares = generator.random((4, len(low)))
         drawn = [problem.design((low + s * (high - low)).tolist()) for s in (*shares, *np.round(shares))]
-        least = min(remounted(still, engine).value(measure) for engine in drawn)
-        ratios.append(float(static_loads(model, measure, low[None], high[None]).least[0]) / least)
+        minimum = min(remounted(still, engine).value(measure) for engine in drawn)
+        ratios.append(float(static_loads(model, measure, low[None], high[None]).minimum[0]) / minimum)
     assert max(ratios) <= 1.0 + 1e-9
     assert np.median(ratios) > 0.95
 

@@ -221,9 +221,9 @@ def test_what_is_convex_in_a_sum_is_bounded_by_its_own_optimum(tmp_path):
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, FORCE.format(measure="rms"), "[fidelity]\nsamples = 72\n")
     sag = Term(Measure(channels.SAG), 200.0)
     stiffest = problem.design([d.upper for d in problem.decisions])
-    least = 200.0 * evaluate(problem, stiffest).value(sag.measure)
+    minimum = 200.0 * evaluate(problem, stiffest).value(sag.measure)
     bound = mounts_bound(replace(problem, objective=(*problem.objective, sag)))
-    assert least * (1.0 - 1e-4) <= bound <= least * (1.0 + 1e-12)
+    assert minimum * (1.0 - 1e-4) <= bound <= minimum * (1.0 + 1e-12)
     assert mounts_bound(problem) == 0.0
 
 
@@ -353,9 +353,9 @@ def test_few_starts_find_the_best_known_optimum_of_the_powertrain(seed):
 
 
 def test_a_limit_that_is_left_out_at_first_comes_back_where_it_is_felt(tmp_path, monkeypatch):
-    def found(most: float, room: float):
+    def found(maximum: float, room: float):
         monkeypatch.setattr("laufruhe.solvers.mounts.search.ROOM", room)
-        limits = f'[[constraints]]\nlimit = "rms mount force"\nmax = "{most} N"\n'
+        limits = f'[[constraints]]\nlimit = "rms mount force"\nmax = "{maximum} N"\n'
         return solve(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], limits, SEARCH))
 
     whole, felt = found(3.0, math.inf), found(3.0, -math.inf)
@@ -399,9 +399,9 @@ def test_limits_with_room_at_every_start_are_no_rows(tmp_path):
     problem = problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, SAG.split("[[")[0], limit, own)
     (held,) = problem.limits
     designs = [problem.design(mounts) for mounts, _ in start_points(problem)[0]]
-    most = max(evaluate(problem, engine).value(held.measure) for engine in designs)
+    maximum = max(evaluate(problem, engine).value(held.measure) for engine in designs)
     sides = {"wide": 2.1, "near": 1.9, "broken": 0.5}
-    limits = tuple(replace(held, name=name, maximum=share * most) for name, share in sides.items())
+    limits = tuple(replace(held, name=name, maximum=share * maximum) for name, share in sides.items())
     search = MountSearch(replace(problem, limits=limits), evaluate(problem))
     assert [each.name for each in search._ignored] == ["wide"]
     assert set(search.joint.program.constraint_names) == {"near", "broken"}

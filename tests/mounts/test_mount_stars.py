@@ -131,8 +131,8 @@ def test_every_star_keeps_its_own_design_when_it_is_bounded(tmp_path, monkeypatc
     out = _bounded(found, phasing, len(found))
     assert [star.candidate for star in out] == [star.candidate for star in found]
     assert [star.bound for star in out] == pytest.approx([0.9 * star.value for star in found])
-    least = found[0].value
-    assert asked == [(least, math.inf, True), *[(least, 0.9 * least, True)] * 2]
+    minimum = found[0].value
+    assert asked == [(minimum, math.inf, True), *[(minimum, 0.9 * minimum, True)] * 2]
     assert _bounded(found, phasing, len(found) + 1) is found
 
 
@@ -232,12 +232,12 @@ def test_a_limit_that_only_throws_move_has_the_price_of_a_looser_one(tmp_path):
     """No mount moves the torque of the crank: its limit would cost nothing but for the throws."""
     engine = ENGINE.partition("[[counterweights]]")[0]
 
-    def found(most):
-        force = f'{FORCE}[[constraints]]\nlimit = "rms crank torque"\nmax = "{most} N m"\n'
+    def found(maximum):
+        force = f'{FORCE}[[constraints]]\nlimit = "rms crank torque"\nmax = "{maximum} N m"\n'
         force = changed(force, ("mean mount force", "rms mount force"))
         return solve(problem_of(tmp_path, engine, changed(BLOCK, HEAVY_END), MOUNTS, force, UNBOUNDED, UNEVEN))
 
-    low, middle, high = (found(most) for most in (41.83, 41.84, 41.85))
+    low, middle, high = (found(maximum) for maximum in (41.83, 41.84, 41.85))
     (limit,) = (one for one in middle.limits if one.name == "rms crank torque")
     slope = (low.objective.value - high.objective.value) / 0.02
     assert slope > 0.05

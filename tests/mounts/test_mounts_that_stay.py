@@ -15,13 +15,13 @@ GIVEN = MOUNTS.replace(OPEN, '"400 N/mm"')
 CHEAPEST = '[objective]\nminimise = "rms mount force"\n'
 
 
-def limited(limit: str, most: str) -> str:
+def limited(limit: str, maximum: str) -> str:
     """A limit of a problem file."""
-    return f'[[constraints]]\nlimit = "{limit}"\nmax = "{most}"\n'
+    return f'[[constraints]]\nlimit = "{limit}"\nmax = "{maximum}"\n'
 
 
 @pytest.mark.parametrize(
-    ("limit", "most", "status"),
+    ("limit", "maximum", "status"),
     [
         ("static sag", "50 mm", Status.FEASIBLE),
         ("static sag", "0.1 mm", Status.INFEASIBLE),
@@ -29,9 +29,9 @@ def limited(limit: str, most: str) -> str:
     ],
 )
 def test_a_design_with_nothing_open_is_held_to_its_limits(
-    tmp_path: Path, limit: str, most: str, status: Status
+    tmp_path: Path, limit: str, maximum: str, status: Status
 ) -> None:
-    parts = (ENGINE, BLOCK, GIVEN, CHEAPEST, limited(limit, most))
+    parts = (ENGINE, BLOCK, GIVEN, CHEAPEST, limited(limit, maximum))
     result = solve(problem_of(tmp_path, *parts))
     assert result.status is status
     assert [entry.name for entry in result.limits] == [limit]

@@ -176,8 +176,8 @@ def test_bounds_know_joined_springs(tmp_path: Path) -> None:
     low, high = boxes(problem, 8, 2)
     ratios = []
     for ends in zip(low, high, strict=True):
-        least = min(designs(problem, *ends, 3))
-        ratios.append(float(plain.bounds(ends[0][None], ends[1][None])[0][0]) / least)
+        minimum = min(designs(problem, *ends, 3))
+        ratios.append(float(plain.bounds(ends[0][None], ends[1][None])[0][0]) / minimum)
     assert max(ratios) <= 1.0 + 1e-9
     assert max(ratios) > 0.99
 

@@ -302,7 +302,7 @@ class TestForms:
         """Never over the norm, and under it by no more than the share of the unit (N3, E22)."""
         weights, v, _ = data
         grid, share, program = Grid((weights + 0.1) / (weights + 0.1).sum(), len(weights)), 1e-3, AtItsValues()
-        exact, smooth = norm.value(grid, v), float(norm.least(program, grid, ca.DM(v), unit, share))
+        exact, smooth = norm.value(grid, v), float(norm.minimum(program, grid, ca.DM(v), unit, share))
         slack = ROUNDING * (exact + unit)
         assert exact - share * unit - slack <= smooth
         assert smooth <= exact + slack or program.has_free
@@ -319,9 +319,9 @@ class TestForms:
         for factor in (0.999, 1.001):
             rows = ca.DM(size * v / whole)
             program = AtItsValues()
-            value, most, _ = norm.limited(program, grid, rows, factor * size, 1e-7)
+            value, maximum, _ = norm.limited(program, grid, rows, factor * size, 1e-7)
             if factor < 1.0 or not program.has_free:
-                assert (float(ca.mmax(value)) <= most) == (factor > 1.0)
+                assert (float(ca.mmax(value)) <= maximum) == (factor > 1.0)
         sides = [norm.limited(AtItsValues(), grid, rows, size + step, 1e-7)[1] for step in (-1e-4, 1e-4)]
         slope = norm.limited(AtItsValues(), grid, rows, size, 1e-7)[2]
         assert (sides[1] - sides[0]) / 2e-4 == pytest.approx(slope, rel=2e-6)

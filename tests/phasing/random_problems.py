@@ -139,9 +139,9 @@ class Writer:
             if self.layout in ("inline", "vee") and self.chance(0.3):
                 place, angle = "opposite_throw = 1", ""
             angle = angle and f"\nangle = {angle}"
-            most = self.pick("0.001", "0.05", "0.3")
+            maximum = self.pick("0.001", "0.05", "0.3")
             out.append(f'[[counterweights]]\nname = "c{k}"\n{place}\nradius = "60 mm"\n'
-                       f'unbalance = {{ between = ["0 kg m", "{most} kg m"] }}{angle}')  # fmt: skip
+                       f'unbalance = {{ between = ["0 kg m", "{maximum} kg m"] }}{angle}')  # fmt: skip
         for k in range(self.shafts):
             out.append(f'[[balancer_shafts]]\nname = "s{k}"\nratio = {self.pick(-1, 2, -2)}\n'
                        f'position = ["{self.number(-90, 90)} mm", "-80 mm"]\n'

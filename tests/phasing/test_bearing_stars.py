@@ -109,17 +109,17 @@ def test_the_best_order_is_that_of_all_solved_one_by_one(name: str) -> None:
     samples = {"samples": found.samples, "gas_samples": found.gas_steps}
     every = one_by_one({**whole, "fidelity": {**whole["fidelity"], **samples}})
     values = {order: value_of(each) for order, each in every.items()}
-    least = min(values.values())
+    minimum = min(values.values())
     assert result.status in (Status.OPTIMAL, Status.FEASIBLE)
     assert result.certificate.kind in (Proof.GLOBAL, Proof.WITHIN_GAP)
-    assert result.objective.value == pytest.approx(least, rel=3e-4)
-    assert result.certificate.lower_bound <= least * (1.0 + 1e-6)
+    assert result.objective.value == pytest.approx(minimum, rel=3e-4)
+    assert result.certificate.lower_bound <= minimum * (1.0 + 1e-6)
     # limits are counted at few angles here
-    assert result.certificate.lower_bound >= least * (1.0 - (5e-2 if "constraints" in whole else 5e-3))
+    assert result.certificate.lower_bound >= minimum * (1.0 - (5e-2 if "constraints" in whole else 5e-3))
     best = result.phasing.ranking[0].firing_orders[0].order
     assert values[best] == pytest.approx(result.objective.value, rel=1e-4)
     # orders differ, so that the choice means something
-    assert max(values.values()) > 1.004 * least
+    assert max(values.values()) > 1.004 * minimum
 
 
 @pytest.mark.slow

@@ -49,8 +49,8 @@ class Scene:
         orders = str(rng.choice(("", "orders = [1]", "orders = [1, 2]")))
         weights = [
             f'[[counterweights]]\nname = "c{k}"\nx = "{self.front * l * x} m"\n'
-            f'unbalance = {{ between = ["0 kg m", "{m * l * most} kg m"] }}\nangle = {{ between = [0, 360] }}'
-            for k, (x, most) in enumerate(zip(rng.uniform(-0.3, 0.3, 2), rng.uniform(0.01, 0.1, 2), strict=True))
+            f'unbalance = {{ between = ["0 kg m", "{m * l * maximum} kg m"] }}\nangle = {{ between = [0, 360] }}'
+            for k, (x, maximum) in enumerate(zip(rng.uniform(-0.3, 0.3, 2), rng.uniform(0.01, 0.1, 2), strict=True))
         ]
         places = [(0.3, 0.25, 0.0), (0.28, -0.21, 0.0), (-0.4, 0.03, -0.1)]
         mounts = [f'["{self.front * l * x} m", "{self.left * l * y} m", "{l * z} m"]' for x, y, z in places]

@@ -127,14 +127,14 @@ def test_least_couples_of_in_line_engines(cycle, cylinders):
     found = enumerate_stars(
         StarSpace(steps, space.patterns, space.places, mirror=True, reflect=True), objective, 1
     )  # fmt: skip
-    least = math.inf
+    minimum = math.inf
     # every star, images included, scored without the objective's own code
     whole = space if cylinders < 11 else StarSpace(steps, space.patterns, space.places, True, False)
     for block in whole.blocks():
         couples = np.abs(star_sums(block, steps, layout.throw_positions, (1, 2))[..., 1])
-        least = min(least, float(np.sqrt(couples[:, 0] ** 2 + (0.25 * couples[:, 1]) ** 2).min()))
+        minimum = min(minimum, float(np.sqrt(couples[:, 0] ** 2 + (0.25 * couples[:, 1]) ** 2).min()))
     assert found.complete
-    assert found.values[0] == pytest.approx(least, rel=1e-9, abs=1e-9)
+    assert found.values[0] == pytest.approx(minimum, rel=1e-9, abs=1e-9)
 
 
 def test_published_couples():

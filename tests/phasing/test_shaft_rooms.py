@@ -63,8 +63,8 @@ def test_a_shaft_without_room_is_left_out(name: str, throws: Any) -> None:
 
 def test_shafts_that_are_wanted_and_have_no_room_are_named() -> None:
     """Where the force is limited too, no choice is left."""
-    most = {"limit": "rms shaking force", "max": "1000 N", "name": "force"}
-    result = _solved([LIMITS["one is beyond the envelope"][0], most])
+    maximum = {"limit": "rms shaking force", "max": "1000 N", "name": "force"}
+    result = _solved([LIMITS["one is beyond the envelope"][0], maximum])
     assert str(result.status) == "infeasible"
 
 

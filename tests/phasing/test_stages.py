@@ -13,9 +13,9 @@ from laufruhe.solvers.throws.throw_search import Stage, missed_peak
 from phasing import engines
 
 
-def stage(make=lambda samples: samples, most=768, enough=0.03, left_out=lambda _: 4.0) -> Stage:
+def stage(make=lambda samples: samples, maximum=768, enough=0.03, left_out=lambda _: 4.0) -> Stage:
     """Return one of 96 steps that lose a tenth of a value of 1000, twice as many half of that."""
-    return Stage(make, 96, lambda samples: 9600.0 / samples, 1000.0, left_out, most, enough)
+    return Stage(make, 96, lambda samples: 9600.0 / samples, 1000.0, left_out, maximum, enough)
 
 
 def test_steps_double_until_they_cost_little_enough():
@@ -26,7 +26,7 @@ def test_steps_double_until_they_cost_little_enough():
     assert first.next.cost == pytest.approx(0.054)
     assert first.last.programs == 384
     assert first.last.cost == pytest.approx(0.029)
-    assert stage(most=200).last.programs == 192
+    assert stage(maximum=200).last.programs == 192
     assert stage(enough=0.2).next is None
     # what is left out grows faster than steps lose less
     assert stage(left_out=lambda samples: 2.0 * samples).next is None

@@ -158,8 +158,8 @@ def test_smooth_model_equals_the_exact_one(tmp_path, layout, name):
     design = exact.design([d.complex_value(columns) for d in model.domains])
     assert smooth == pytest.approx(evaluate(exact, design).value(quantity), rel=tolerance)
     rows, grid = model.rows(quantity, at)
-    value, most, _ = quantity.norm.limited(AtItsValues(), grid, rows, smooth, 1e-9)
-    assert float(ca.mmax(value)) == pytest.approx(most, rel=1e-6)
+    value, maximum, _ = quantity.norm.limited(AtItsValues(), grid, rows, smooth, 1e-9)
+    assert float(ca.mmax(value)) == pytest.approx(maximum, rel=1e-6)
 
 
 def test_throws_between_bounds_of_their_own(tmp_path):
@@ -208,9 +208,9 @@ def test_no_uneven_star_goes_under_the_bound(tmp_path, cycle, cylinders):
     (family,), _ = families_of(phasing)
     objective = amplitude_objective(problem, phasing, family.layout)
     costs = throw_costs(phasing, family.space, objective, phasing.intervals)
-    least = uneven_bound(phasing, family.space, objective, phasing.intervals)
+    minimum = uneven_bound(phasing, family.space, objective, phasing.intervals)
     every = replace(family.space, mirror=True, reflect=True).blocks()
-    assert least == pytest.approx(max(min(star_bounds(costs, block).min() for block in every), 0.0), rel=1e-12)
+    assert minimum == pytest.approx(max(min(star_bounds(costs, block).min() for block in every), 0.0), rel=1e-12)
     rng = np.random.default_rng(cylinders)
     x, orders = np.array(family.space.places), np.array(objective.orders)
     for _ in range(60):
@@ -227,7 +227,7 @@ def test_no_uneven_star_goes_under_the_bound(tmp_path, cycle, cylinders):
         value = sum(t.weight * np.linalg.norm(np.multiply(t.couple, couples)) for t in objective.terms)
         own = star_bounds(costs, steps[None])[0]
         assert own <= value * (1.0 + 1e-9)
-        assert least <= max(own, 0.0) * (1.0 + 1e-9)
+        assert minimum <= max(own, 0.0) * (1.0 + 1e-9)
     even_only = Intervals(phasing.even_interval, phasing.even_interval)
     tight = uneven_bound(phasing, family.space, objective, even_only)
     best = enumerate_stars(replace(family.space, mirror=True, reflect=True), objective).values[0]

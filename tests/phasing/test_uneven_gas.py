@@ -156,9 +156,9 @@ def test_one_open_throw_is_where_a_fine_grid_is_least(tmp_path, cycle):
         tail = (math.radians(240.0),) if count == 3 else ()
         exact = replace(phasing.realise(Candidate((0.0, *middle, *tail), order)), phasing=None)
         grid[degrees] = objective_value(exact, evaluate(exact))
-    least = min(grid, key=grid.get)
-    assert result.objective.value <= grid[least] * (1.0 + 2e-4)
-    assert abs(math.degrees(result.decisions[1].value) - least) < 2.0
+    minimum = min(grid, key=grid.get)
+    assert result.objective.value <= grid[minimum] * (1.0 + 2e-4)
+    assert abs(math.degrees(result.decisions[1].value) - minimum) < 2.0
     assert result.objective.value < result.objective.initial
     # gas is what decides here
     motored = solve(engines.problem(tmp_path, count, cycle, engine, allowed, MOUNT_FORCE + few))

@@ -163,14 +163,14 @@ def test_no_crank_of_a_grid_goes_under_the_bound(quantity: str) -> None:
     weights = bool(problem.unbalances)
     phasing, steps = problem.phasing, 3 if weights else 9
     bounds = [np.linspace(*pair, steps if pair[0] < pair[1] else 1) for pair in phasing.throw_bounds]
-    least = math.inf
+    minimum = math.inf
     for throws in itertools.product(*bounds):
         candidate = replace(starts_of(phasing, None, True)[0], throws=tuple(map(float, throws)))
         own = replace(phasing.realise(candidate), phasing=None)
-        least = min(least, solve_fixed(own).objective.value if weights else objective_value(own, evaluate(own)))
+        minimum = min(minimum, solve_fixed(own).objective.value if weights else objective_value(own, evaluate(own)))
     assert result.status in (Status.OPTIMAL, Status.FEASIBLE)
-    assert result.certificate.lower_bound <= least * (1.0 + 1e-5)
-    assert result.objective.value <= least * (1.0 + 1e-4)
+    assert result.certificate.lower_bound <= minimum * (1.0 + 1e-5)
+    assert result.objective.value <= minimum * (1.0 + 1e-4)
     # of the peaks of a pressure that jumps few samples know little
     assert result.certificate.gap < (0.3 if "maximum main" in quantity else 0.1)
 
@@ -198,23 +198,23 @@ def test_a_limit_on_the_degree_of_irregularity_beside_bearings() -> None:
     """Between what the best bearings and the most even crank have: kept, and not far from the best of a grid."""
     even = decided("degree of irregularity")[1]
     degree = even.problem.objective[0].measure
-    most = 0.3 * even.objective.initial + 0.7 * even.objective.value
-    limit = [{"limit": "degree of irregularity", "max": most}]
+    maximum = 0.3 * even.objective.initial + 0.7 * even.objective.value
+    limit = [{"limit": "degree of irregularity", "max": maximum}]
     result = laufruhe.solve(
         problem := problem_of(BETWEEN, "rms main-bearing force", counterweights=None, constraints=limit)
     )
-    assert result.limits[0].value <= most * (1.0 + 1e-6)
-    assert result.limits[0].value >= 0.95 * most
-    phasing, start, least = problem.phasing, starts_of(problem.phasing, None, True)[0], math.inf
+    assert result.limits[0].value <= maximum * (1.0 + 1e-6)
+    assert result.limits[0].value >= 0.95 * maximum
+    phasing, start, minimum = problem.phasing, starts_of(problem.phasing, None, True)[0], math.inf
     for throws in itertools.product(
         *(np.linspace(*pair, 8 if pair[0] < pair[1] else 1) for pair in phasing.throw_bounds)
     ):
         own = replace(phasing.realise(replace(start, throws=tuple(map(float, throws)))), phasing=None)
         found = evaluate(own)
-        if found.value(degree) <= most:
-            least = min(least, objective_value(own, found))
-    assert result.certificate.lower_bound <= least * (1.0 + 1e-5)
-    assert result.objective.value <= least * (1.0 + 1e-4)
+        if found.value(degree) <= maximum:
+            minimum = min(minimum, objective_value(own, found))
+    assert result.certificate.lower_bound <= minimum * (1.0 + 1e-5)
+    assert result.objective.value <= minimum * (1.0 + 1e-4)
     told = laufruhe.solve(
         problem_of(
             BETWEEN,
@@ -241,10 +241,10 @@ def test_stored_work_bounds_the_degree_of_irregularity(inertia: float) -> None:
         own = replace(own, points=tuple(replace(point, speed=speed) for point in own.points))
         found, point = evaluate(own), own.points[0]
         work = found.value(Measure(CHANNELS["stored work"], NORMS["peak to peak"]))
-        least = StoredWorkBound.from_engine(own.engine, point, own.fidelity, inertia).degree(work)
+        minimum = StoredWorkBound.from_engine(own.engine, point, own.fidelity, inertia).degree(work)
         exact = found.value(own.objective[0].measure)
-        assert least <= exact
-        shares.append(least / exact)
+        assert minimum <= exact
+        shares.append(minimum / exact)
     if inertia > 10.0:
         assert min(shares) > 0.93
 

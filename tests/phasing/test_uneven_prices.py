@@ -33,15 +33,15 @@ orders = [1, 2]
 """
 
 
-def solved(folder: Path, most: float) -> laufruhe.solvers.result.Result:
+def solved(folder: Path, maximum: float) -> laufruhe.solvers.result.Result:
     path = folder / "five.toml"
-    path.write_text(f'{FIVE}max = "{most} N"\n[search]\nboxes = 2\n', encoding="utf-8")
+    path.write_text(f'{FIVE}max = "{maximum} N"\n[search]\nboxes = 2\n', encoding="utf-8")
     return laufruhe.solve(laufruhe.load(path))
 
 
 @pytest.mark.slow
 def test_price_is_what_a_looser_limit_brings(tmp_path: Path) -> None:
-    low, middle, high = (solved(tmp_path, most) for most in (95.0, 100.0, 105.0))
+    low, middle, high = (solved(tmp_path, maximum) for maximum in (95.0, 100.0, 105.0))
     assert low.objective is not None
     assert high.objective is not None
     slope = (low.objective.value - high.objective.value) / 10.0

@@ -153,9 +153,9 @@ class TestSeiliger:
     ) -> None:
         gas = Seiliger(1.0, 0.0, *exponents, compression_ratio=ratio, exhaust_pressure=exhaust * BAR)
         gas = replace(gas, peak_pressure=rise * compression_end_pressure(gas))
-        least, most = seiliger_imep(gas, cycle, 1.0), seiliger_imep(gas, cycle, ratio)
-        assert least < most
-        gas = replace(gas, imep=least + share * (most - least))
+        minimum, maximum = seiliger_imep(gas, cycle, 1.0), seiliger_imep(gas, cycle, ratio)
+        assert minimum < maximum
+        gas = replace(gas, imep=minimum + share * (maximum - minimum))
         found = seiliger_cut_off(gas, cycle)
         assert 1.0 <= found <= ratio
         # volumes are in displacements: at a ratio near 1 the clearance is many of them
@@ -558,16 +558,16 @@ class TestRefusals:
 
     def test_range_told_is_the_range_that_can_be_reached(self) -> None:
         """What lies just inside either end is met, what lies just outside is refused."""
-        least, most = (seiliger_imep(DIESEL, Cycle.FOUR_STROKE, ratio) for ratio in (1.0, 17.0))
-        for inside in (least + 1.0, most - 1.0):
+        minimum, maximum = (seiliger_imep(DIESEL, Cycle.FOUR_STROKE, ratio) for ratio in (1.0, 17.0))
+        for inside in (minimum + 1.0, maximum - 1.0):
             seiliger_cut_off(replace(DIESEL, imep=inside), Cycle.FOUR_STROKE)
-        for outside in (least - 1.0, most + 1.0):
-            with pytest.raises(ModelError, match=f"{least * 1e-5:.6g} bar and {most * 1e-5:.6g} bar"):
+        for outside in (minimum - 1.0, maximum + 1.0):
+            with pytest.raises(ModelError, match=f"{minimum * 1e-5:.6g} bar and {maximum * 1e-5:.6g} bar"):
                 seiliger_cut_off(replace(DIESEL, imep=outside), Cycle.FOUR_STROKE)
 
     def test_rounding_of_a_range_is_not_refused(self) -> None:
-        least, most = (seiliger_imep(DIESEL, Cycle.FOUR_STROKE, ratio) for ratio in (1.0, 17.0))
-        below, above = least * (1 - 1e-14), most * (1 + 1e-14)
+        minimum, maximum = (seiliger_imep(DIESEL, Cycle.FOUR_STROKE, ratio) for ratio in (1.0, 17.0))
+        below, above = minimum * (1 - 1e-14), maximum * (1 + 1e-14)
         assert seiliger_cut_off(replace(DIESEL, imep=below), Cycle.FOUR_STROKE) == 1.0
         assert seiliger_cut_off(replace(DIESEL, imep=above), Cycle.FOUR_STROKE) == 17.0
         end = compression_end_pressure(DIESEL)
@@ -582,10 +582,10 @@ class TestRefusals:
         gas = replace(BURN, completeness=completeness)
         part, cycle = PARTS["plain"], Cycle.TWO_STROKE
         unit = wiebe_heat(gas, part, cycle) / gas.imep
-        most = 50 * gas.intake_pressure * 17 / 16 / completeness / unit
-        wiebe_heat(replace(gas, imep=most * (1 - 1e-12)), part, cycle)
+        maximum = 50 * gas.intake_pressure * 17 / 16 / completeness / unit
+        wiebe_heat(replace(gas, imep=maximum * (1 - 1e-12)), part, cycle)
         with pytest.raises(ModelError, match="that fuel and air can hold"):
-            wiebe_heat(replace(gas, imep=most * (1 + 1e-12)), part, cycle)
+            wiebe_heat(replace(gas, imep=maximum * (1 + 1e-12)), part, cycle)
 
     def test_burn_past_a_dead_centre_that_the_offset_moved(self) -> None:
         gas = replace(BURN, start=math.radians(-170), duration=math.radians(30), imep=0.0)

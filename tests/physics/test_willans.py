@@ -209,14 +209,14 @@ def test_a_limit_on_the_worst_mean_is_one_on_every_point(tmp_path: Path) -> None
     text = (PROBLEMS / "car-four-willans.toml").read_text(encoding="utf-8")
     text = text[: text.index("[objective]")].replace("unbalance = {", 'radius = "30 mm"\nunbalance = {')
     (tmp_path / "car-four-fuel.csv").write_text((PROBLEMS / "car-four-fuel.csv").read_text("utf-8"), encoding="utf-8")
-    least = text + '[fidelity]\nsamples = 120\n[objective]\nminimise = "balancer mass"\n'
-    most = 'max = "700 N"\n'
-    joint = laufruhe.solve(loaded(tmp_path, least + f'[[constraints]]\nlimit = "worst mean mount force"\n{most}'))
+    minimum = text + '[fidelity]\nsamples = 120\n[objective]\nminimise = "balancer mass"\n'
+    maximum = 'max = "700 N"\n'
+    joint = laufruhe.solve(loaded(tmp_path, minimum + f'[[constraints]]\nlimit = "worst mean mount force"\n{maximum}'))
     each = "".join(
-        f'[[constraints]]\nname = "{k}"\nlimit = "mean mount force"\n{most}operating_points = ["{point.name}"]\n'
+        f'[[constraints]]\nname = "{k}"\nlimit = "mean mount force"\n{maximum}operating_points = ["{point.name}"]\n'
         for k, point in enumerate(problem.points)
     )
-    apart = laufruhe.solve(loaded(tmp_path, least + each))
+    apart = laufruhe.solve(loaded(tmp_path, minimum + each))
     assert joint.certificate.kind is apart.certificate.kind is Proof.GLOBAL
     assert joint.objective.value == pytest.approx(apart.objective.value, rel=2e-4)
     prices = sum(limit.shadow_price for limit in apart.limits)

@@ -58,9 +58,9 @@ class TestLeast:
         gradient = vector(d, factors)
         brute = float((points(d) @ gradient[d.columns]).min())
         size = d.scale * float(np.abs(gradient[d.columns]).max()) * 1.5
-        least = d.least(gradient)
-        assert least <= brute + 1e-12 * size
-        assert brute - least <= 2e-6 * size + 1e-300
+        minimum = d.minimum(gradient)
+        assert minimum <= brute + 1e-12 * size
+        assert brute - minimum <= 2e-6 * size + 1e-300
 
     @given(DOMAINS, FACTORS)
     def test_is_attained_in_the_set(self, d: Domain, factors: tuple[float, float]) -> None:
@@ -69,7 +69,7 @@ class TestLeast:
         if float(np.hypot.reduce(gradient[d.columns])) < 1e-3:
             return
         found = d.project(-1e9 * gradient)
-        assert float(found @ gradient[d.columns]) == pytest.approx(d.least(gradient), abs=1e-6 * (1.0 + d.scale))
+        assert float(found @ gradient[d.columns]) == pytest.approx(d.minimum(gradient), abs=1e-6 * (1.0 + d.scale))
 
 
 class TestProject:

@@ -58,12 +58,12 @@ def test_it_ends_at_the_least_of_all(seed: int, at_once: int) -> None:
     assert at_once > 1 or search.looked == sorted(search.looked)
 
 
-@pytest.mark.parametrize("most", [1, 2, 7, 20])
-def test_what_is_left_bounds_all_that_was_not_looked_at(most: int) -> None:
+@pytest.mark.parametrize("maximum", [1, 2, 7, 20])
+def test_what_is_left_bounds_all_that_was_not_looked_at(maximum: int) -> None:
     numbers = np.random.default_rng(5).normal(size=64)
     search = Least(numbers)
-    bound = search.divide(search.bound((0, 64)), most)
-    assert most <= search.seen <= most + 1
+    bound = search.divide(search.bound((0, 64)), maximum)
+    assert maximum <= search.seen <= maximum + 1
     assert not search.complete
     assert min(bound, search.value) <= numbers.min()
     assert [one.bound for one in search.coming(3)] == sorted(one.bound for one in search.waiting)[:3]

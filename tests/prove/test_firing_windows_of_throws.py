@@ -18,10 +18,10 @@ from phasing import engines
 def ends_of(count: int, cycle: float, low: float, high: float) -> set[tuple[float, ...]]:
     """Intervals that are least or most but for one of them, and add up to a cycle, in every order."""
     found = set()
-    for most in range(count):
-        left = cycle - most * high - (count - 1 - most) * low
+    for maximum in range(count):
+        left = cycle - maximum * high - (count - 1 - maximum) * low
         if low <= left <= high:
-            found |= set(itertools.permutations([high] * most + [left] + [low] * (count - 1 - most)))
+            found |= set(itertools.permutations([high] * maximum + [left] + [low] * (count - 1 - maximum)))
     return found
 
 
@@ -40,6 +40,6 @@ def test_windows_are_those_of_the_most_uneven_firing(tmp_path, count: int, cycle
                 own = seen[-lattice.slots[s] % lattice.steps]
                 own[:] = min(own[0], s * even - fires), max(own[1], s * even - fires)
         held = 0 if phasing.cycle is Cycle.TWO_STROKE or count % 2 else None
-        for p, (least, most) in seen.items():
-            expected = (0.0, 0.0) if p == held else (least, most)
+        for p, (minimum, maximum) in seen.items():
+            expected = (0.0, 0.0) if p == held else (minimum, maximum)
             assert (lower[p], upper[p]) == pytest.approx(expected, abs=1e-12)

@@ -27,15 +27,15 @@ def test_no_leads_of_a_box_are_under_its_bound(size: float, turned: float, seed:
     columns = sum(domain.width for domain in DOMAINS)
     gradient, slopes, tilts = rng.normal(size=columns), rng.normal(size=2), turned * rng.normal(size=(2, 2, columns))
     bound = least_on_arcs(DOMAINS, RATIOS, half, gradient, slopes, tilts)
-    least = np.inf
+    minimum = np.inf
     for shares in itertools.product(np.linspace(-1.0, 1.0, 41), repeat=2):
         d = np.array(shares) * half
         pull = gradient + (np.cos(RATIOS * d) - 1.0) @ tilts[0] + (np.sin(RATIOS * d) / RATIOS) @ tilts[1]
         # an interval is least at an end, a disc opposite to its gradient
         own = min(-0.3 * pull[0], 0.7 * pull[0]) - 0.4 * float(np.hypot(*pull[1:]))
-        least = min(least, float(d @ slopes) + own)
-    assert bound <= least + 1e-12
-    assert least - bound <= 3.0 * size**2
+        minimum = min(minimum, float(d @ slopes) + own)
+    assert bound <= minimum + 1e-12
+    assert minimum - bound <= 3.0 * size**2
 
 
 def test_leads_alone_are_least_at_a_corner() -> None:

@@ -274,9 +274,9 @@ def test_where_boxes_are_least_is_a_design_too(tmp_path: Path) -> None:
     assert result.certificate.kind is Proof.GLOBAL
     low, high = problem.decisions[0].lower, problem.decisions[0].upper
     found = [evaluate_design_at(problem, [x]) for x in np.geomspace(low, high, 60)]
-    least = min(design.value for design in found if design is not None)
+    minimum = min(design.value for design in found if design is not None)
     assert result.objective is not None
-    assert result.objective.value <= least * (1.0 + problem.tolerance)
+    assert result.objective.value <= minimum * (1.0 + problem.tolerance)
     assert "no search ended at this design" in explained(result) or result.certificate.kkt_residual < 1e-3
 
 
@@ -315,7 +315,7 @@ def test_prices_of_limits_are_never_over_what_a_box_has() -> None:
         boxes = LinearRelaxation(
             np.array([value]), slopes[None], [(overs[k : k + 1], by[k : k + 1]) for k in range(limits)]
         )
-        found = float(boxes.least[0])
+        found = float(boxes.minimum[0])
         exact = linprog(slopes, A_ub=by, b_ub=-overs, bounds=[(-1.0, 1.0)] * n)
         if exact.status == 2:
             continue

@@ -294,8 +294,8 @@ def test_wear_and_forces_on_the_crank_are_those_of_the_forces() -> None:
     place = np.degrees(np.arctan2(across, along)) + turned
     sizes = np.hypot(along, across)
     sums = {at: sizes[np.abs((place - at + 180.0) % 360.0 - 180.0) <= 60.0].sum() for at in shares}
-    most = max(sums.values())
-    assert {at: total / most for at, total in sums.items()} == pytest.approx(shares, abs=2e-3)
+    maximum = max(sums.values())
+    assert {at: total / maximum for at, total in sums.items()} == pytest.approx(shares, abs=2e-3)
 
 
 @pytest.mark.slow

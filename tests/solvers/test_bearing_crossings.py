@@ -115,10 +115,10 @@ def test_places_of_balancer_shafts_beside_bearings() -> None:
     row = [
         laufruhe.solve(problem_of({**told, "balancer_shafts": _shaft(f"{x} mm")}, "")) for x in range(-200, 201, 100)
     ]
-    least = min(result.objective.value for result in row)
-    assert found.objective.value <= least * (1.0 + 1e-3)
-    assert found.certificate.lower_bound <= least
-    assert least <= 1.05 * found.objective.value
+    minimum = min(result.objective.value for result in row)
+    assert found.objective.value <= minimum * (1.0 + 1e-3)
+    assert found.certificate.lower_bound <= minimum
+    assert minimum <= 1.05 * found.objective.value
     # of a weight on the crank itself bearings feel the place, along a line between two of them (P20)
     moved = [{**WEBS[0], "x": open_place, "mass": "1 kg"}, *WEBS[1:]]
     carried = laufruhe.solve(problem_of({**told, "counterweights": moved}, ""))
@@ -127,5 +127,5 @@ def test_places_of_balancer_shafts_beside_bearings() -> None:
         laufruhe.solve(problem_of({**told, "counterweights": [{**moved[0], "x": f"{x} mm"}, *moved[1:]]}, ""))
         for x in (-200, -100, 0, 100, 200)
     ]
-    least = min(one.objective.value for one in fixed)
-    assert carried.certificate.lower_bound <= carried.objective.value <= least * (1.0 + 1e-3)
+    minimum = min(one.objective.value for one in fixed)
+    assert carried.certificate.lower_bound <= carried.objective.value <= minimum * (1.0 + 1e-3)

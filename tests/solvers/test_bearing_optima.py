@@ -51,8 +51,8 @@ def asked(quantity: str, narrowed: str = "") -> str:
     return f'[objective]\nminimise = "{quantity}"\n{narrowed}\n'
 
 
-def limited(quantity: str, most: str) -> str:
-    return f'[[constraints]]\nlimit = "{quantity}"\nmax = "{most}"\n'
+def limited(quantity: str, maximum: str) -> str:
+    return f'[[constraints]]\nlimit = "{quantity}"\nmax = "{maximum}"\n'
 
 
 WEBS = web(1) + web(2) + web(3)
@@ -112,11 +112,11 @@ def test_no_search_finds_less(tmp_path: Path, norm: str) -> None:
 
 
 def test_price_of_mass_is_what_more_of_it_brings(tmp_path: Path) -> None:
-    def solved(most: float) -> laufruhe.Result:
-        text = THREE + WEBS + asked("mean main-bearing force") + limited("counterweight mass", f"{most} kg")
+    def solved(maximum: float) -> laufruhe.Result:
+        text = THREE + WEBS + asked("mean main-bearing force") + limited("counterweight mass", f"{maximum} kg")
         return laufruhe.solve(read(tmp_path, text + "\n"))
 
-    low, middle, high = (solved(most) for most in (3.9, 4.0, 4.1))
+    low, middle, high = (solved(maximum) for maximum in (3.9, 4.0, 4.1))
     slope = (low.objective.value - high.objective.value) / 0.2
     assert slope > 100.0
     assert middle.limits[0].shadow_price == pytest.approx(slope, rel=0.02)
@@ -139,8 +139,8 @@ def test_mounts_and_bearings_limit_each_other(tmp_path: Path) -> None:
     first = laufruhe.solve(
         read(tmp_path, near + asked("mean main-bearing force") + limited("mean mount force", "600 N"))
     )
-    most = first.objective.value
-    text = near + asked("mean mount force") + limited("mean main-bearing force", f"{most} N")
+    maximum = first.objective.value
+    text = near + asked("mean mount force") + limited("mean main-bearing force", f"{maximum} N")
     second = laufruhe.solve(read(tmp_path, text))
     assert first.limits[0].active
     assert second.objective.value == pytest.approx(first.limits[0].value, rel=3e-4)

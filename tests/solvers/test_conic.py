@@ -134,8 +134,8 @@ def test_a_peak_is_limited_at_few_angles_as_at_all(share: float, monkeypatch: py
     peak = replace(problem.objective[0].measure, norm=NORMS["maximum"])
     free = AffineModel(problem).at(480)
     loose = AffineModel(replace(problem, limits=(Limit("peak", peak, 1e9),))).at(480)
-    least = solve_cones(AffineModel(replace(problem, objective=(Term(peak),))).at(480)).x
-    at_mean, at_peak = (loose.limits[0][1].value(x) for x in (solve_cones(free).x, least))
+    minimum = solve_cones(AffineModel(replace(problem, objective=(Term(peak),))).at(480)).x
+    at_mean, at_peak = (loose.limits[0][1].value(x) for x in (solve_cones(free).x, minimum))
     maximum = at_peak + share * (at_mean - at_peak) + 1e-3 * at_peak
     limited_so = replace(loose, limits=((maximum, loose.limits[0][1]),))
     rows = []
@@ -158,8 +158,8 @@ def test_a_peak_is_limited_at_few_angles_as_at_all(share: float, monkeypatch: py
 
 def contradicted() -> AffineProblem:
     problem = limited(0.5)
-    least = Limit("force", problem.objective[0].measure, 1.0)
-    return AffineModel(replace(problem, limits=(*problem.limits, least))).at(96)
+    minimum = Limit("force", problem.objective[0].measure, 1.0)
+    return AffineModel(replace(problem, limits=(*problem.limits, minimum))).at(96)
 
 
 def test_contradiction_is_told() -> None:

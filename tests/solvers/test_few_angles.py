@@ -127,12 +127,12 @@ def test_a_proof_stands_against_what_few_angles_read() -> None:
     assert told.limit < told.value == pytest.approx(1071.6627, abs=1e-4)
 
 
-@pytest.mark.parametrize(("samples", "most"), [(48, 1070.7), (48, 1071.6), (60, 1070.591), (60, 1071.6488)])
-def test_a_design_is_none_where_few_angles_alone_allow_it(samples: int, most: float) -> None:
+@pytest.mark.parametrize(("samples", "maximum"), [(48, 1070.7), (48, 1071.6), (60, 1070.591), (60, 1071.6488)])
+def test_a_design_is_none_where_few_angles_alone_allow_it(samples: int, maximum: float) -> None:
     """Over the cycle the least is 1071.66270 N; twice these angles of two turns read as little as 1070 N."""
     left, right = SINGLE["balancer_shafts"]
     turned = {**left, "unbalances": [{**left["unbalances"][0], "angle": 183.1}]}
-    for limit, met in ((most, False), (1071.664, True)):
+    for limit, met in ((maximum, False), (1071.664, True)):
         told = {
             **SINGLE, "engine": {**SINGLE["engine"], "cycle": "four-stroke", "throws": [3.1]},
             "balancer_shafts": [turned, right], "fidelity": {"samples": samples},
@@ -200,10 +200,10 @@ def test_a_limit_that_nothing_open_moves_is_read_at_many_angles() -> None:
     assert limit.value == pytest.approx(964.6277, rel=1e-6)
 
 
-@pytest.mark.parametrize(("most", "excluded"), [("964.7 N", False), ("964.5 N", True)])
-def test_a_star_is_excluded_by_what_the_cycle_has(most: str, excluded: bool) -> None:
+@pytest.mark.parametrize(("maximum", "excluded"), [("964.7 N", False), ("964.5 N", True)])
+def test_a_star_is_excluded_by_what_the_cycle_has(maximum: str, excluded: bool) -> None:
     """The cycle has 964.63 N of second order, 48 angles have 967.06 N."""
-    limits = [{"limit": "mean shaking force", "orders": [2], "max": most}]
+    limits = [{"limit": "mean shaking force", "orders": [2], "max": maximum}]
     told = {**SINGLE, "engine": {**SINGLE["engine"], "throws": [3]}, "balancer_shafts": [], "constraints": limits}
     design = StarDesign(Candidate((0.0,)), state(load_tables(told, Path("single.toml"))))
     assert not design.is_met

@@ -85,10 +85,10 @@ def test_the_least_inertia_has_its_degree_and_is_shown_from_both_sides(tmp_path:
     result = proven(problem)
     assert result.objective is not None
     assert result.certificate is not None
-    least, bound = result.objective.value, result.certificate.lower_bound
+    minimum, bound = result.objective.value, result.certificate.lower_bound
     engine, point = problem.engine, problem.points[0]
-    assert bound <= least <= bound * (1.0 + 1e-6)
-    assert irregularity(engine, point, least, problem.fidelity) <= 0.01
+    assert bound <= minimum <= bound * (1.0 + 1e-6)
+    assert irregularity(engine, point, minimum, problem.fidelity) <= 0.01
     assert irregularity(engine, point, bound * (1.0 - 1e-9), problem.fidelity) > 0.01
     # the price is the slope of the inertia over the degree, told by solving twice more
     ends = [
@@ -123,8 +123,8 @@ def test_a_rim_is_the_best_of_a_grid(tmp_path: Path) -> None:
 def test_boxes_of_a_rim_are_of_its_mass_in_place_of_its_width(tmp_path: Path) -> None:
     """A rim of mean diameter D, width w and height h weighs pi rho D w h; every point is one flywheel, and back."""
     limits = '[[constraints]]\nlimit = "rim stress"\nmax = "18 N/mm^2"\n'
-    least = changed(LEAST, "flywheel inertia", "flywheel mass")
-    problem = loaded(tmp_path, changed(SINGLE, "samples = 360", "samples = 72") + RIM + least + limits)
+    minimum = changed(LEAST, "flywheel inertia", "flywheel mass")
+    problem = loaded(tmp_path, changed(SINGLE, "samples = 360", "samples = 72") + RIM + minimum + limits)
     initial = evaluate(problem)
     boxes, whole = (_Coordinates.from_problem(problem, by_mass) for by_mass in (True, False))
     with_mass, with_width = (each.monotone_problem(initial, problem.limits) for each in (boxes, whole))
@@ -167,8 +167,8 @@ def test_a_sum_of_inertia_and_degree_is_proven(tmp_path: Path) -> None:
 
 
 def test_a_degree_is_minimised_at_the_largest_flywheel_allowed(tmp_path: Path) -> None:
-    least = '[objective]\nminimise = "degree of irregularity"\n[[constraints]]\nlimit = "flywheel inertia"\n'
-    result = proven(loaded(tmp_path, SINGLE + INERTIA + least + 'max = "2 kg m^2"\n'))
+    minimum = '[objective]\nminimise = "degree of irregularity"\n[[constraints]]\nlimit = "flywheel inertia"\n'
+    result = proven(loaded(tmp_path, SINGLE + INERTIA + minimum + 'max = "2 kg m^2"\n'))
     assert result.decisions[0].value == pytest.approx(2.0, rel=1e-6)
     assert result.limits[0].shadow_price > 0.0
 
@@ -315,12 +315,12 @@ def test_two_machines_on_one_shaft_are_best_half_a_turn_apart() -> None:
     """The same engines: the least flywheel is even in the angle between their cranks, and least half a turn apart."""
     tables = tables_of(PROBLEMS / "two-machines.toml")
 
-    def least(angle: float) -> float:
+    def minimum(angle: float) -> float:
         first, second = tables["engine"]["slider_cranks"]
         engine = {**tables["engine"], "slider_cranks": [first, {**second, "throw": angle}]}
         return proven(load_tables({**tables, "engine": engine}, Path("two.toml"))).objective.value
 
-    found = {angle: least(angle) for angle in (0, 90, 150, 180, 210, 270)}
+    found = {angle: minimum(angle) for angle in (0, 90, 150, 180, 210, 270)}
     assert found[90] == pytest.approx(found[270], rel=1e-6)
     assert found[150] == pytest.approx(found[210], rel=1e-6)
     assert found[180] < found[150] < found[90] < found[0]

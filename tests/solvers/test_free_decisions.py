@@ -43,8 +43,8 @@ BLOCK = {"mass": "120 kg", "inertia": ["6 kg m^2", "9 kg m^2", "8 kg m^2"]}
 POINTS = [{"name": "idle", "speed": "800 rpm"}, {"name": "rated", "speed": "2500 rpm", "gas": False}]
 
 
-def web(name: str, most: str = "2 kg", x: str = "0 mm") -> dict[str, Any]:
-    return {"name": name, "x": x, "opposite_throw": 1, "radius": "80 mm", "mass": {"between": ["0 kg", most]}}
+def web(name: str, maximum: str = "2 kg", x: str = "0 mm") -> dict[str, Any]:
+    return {"name": name, "x": x, "opposite_throw": 1, "radius": "80 mm", "mass": {"between": ["0 kg", maximum]}}
 
 
 def problem_of(
@@ -84,9 +84,9 @@ def test_two_weights_in_one_place_are_free_against_each_other(name: str) -> None
     ends = ends_of(result)
     for own, other in (("one", 0.8), ("two", 2.0)):
         low, high = ends[f"{own}.mass"]
-        most = {"one": 2.0, "two": 0.8}[own]
+        maximum = {"one": 2.0, "two": 0.8}[own]
         assert low == pytest.approx(max(whole - other, 0.0), abs=5e-3 * whole)
-        assert high == pytest.approx(min(whole, most), abs=5e-3 * whole)
+        assert high == pytest.approx(min(whole, maximum), abs=5e-3 * whole)
 
 
 def test_what_the_objective_does_not_feel_is_free_from_bound_to_bound() -> None:

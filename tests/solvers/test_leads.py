@@ -41,17 +41,17 @@ def test_the_ready_problem_is_proven_and_the_least_of_a_scan() -> None:
         # the torque that the piston takes from the cranks, and the block from them
         turning.append(force * rate)
     places, shift = (0.0, 0.15, -0.15), mm.STEPS // steps // 2 * 2
-    least = np.inf
+    minimum = np.inf
     for j in range(0, mm.STEPS, shift):
         for k in range(0, mm.STEPS, shift):
             forces = [np.roll(signal, -by) for signal, by in zip(up, (0, j, k), strict=True)]
             torque = sum(np.roll(signal, -by) for signal, by in zip(turning, (0, j, k), strict=True))
             moment = torque + sum(y * force for y, force in zip(places, forces, strict=True))
             left, right = (0.5 * sum(forces) + side * moment / 0.6 for side in (1.0, -1.0))
-            least = min(least, 0.5 * float(np.mean(np.abs(left)) + np.mean(np.abs(right))))
+            minimum = min(minimum, 0.5 * float(np.mean(np.abs(left)) + np.mean(np.abs(right))))
     value = objective_value(problem, result.final)
-    assert value <= least * (1.0 + 1e-6)
-    assert least <= 1.05 * value
+    assert value <= minimum * (1.0 + 1e-6)
+    assert minimum <= 1.05 * value
     assert result.certificate.lower_bound <= value
 
 
@@ -152,9 +152,9 @@ def test_the_angle_between_machines_is_the_least_of_a_scan(asked: str, tmp_path:
     # at as many angles as it was told at
     fine = result.problem.fidelity
     fixed = [loaded(tmp_path, turned(text, angle)).at(fine) for angle in np.linspace(0.0, 354.0, 60)]
-    least = min(objective_value(each, evaluate(each)) for each in fixed)
+    minimum = min(objective_value(each, evaluate(each)) for each in fixed)
     value = objective_value(result.problem, result.final)
-    assert result.certificate.lower_bound <= value <= least * (1.0 + 1e-6)
+    assert result.certificate.lower_bound <= value <= minimum * (1.0 + 1e-6)
     at_best = loaded(tmp_path, turned(text, float(np.degrees(result.decisions[0].value)))).at(fine)
     assert objective_value(at_best, evaluate(at_best)) == pytest.approx(value, rel=1e-6)
 
@@ -178,13 +178,13 @@ def test_on_elastic_mounts_and_over_two_turns_no_angle_is_better(tmp_path: Path)
     soft, longer = changed(BARE, "[mounts]\n", ELASTIC), BARE
     for old, new in LONGER:
         longer = changed(longer, old, new)
-    for text, most in ((soft, 360.0), (longer, 720.0)):
+    for text, maximum in ((soft, 360.0), (longer, 720.0)):
         result = solve(loaded(tmp_path, text))
         assert result.certificate is not None
         assert result.certificate.kind is Proof.GLOBAL
         values = []
-        for angle in np.linspace(0.0, most, 49):
-            each = loaded(tmp_path, changed(text, f"{{ between = [0, {most:.0f}], start = 90 }}", str(float(angle))))
+        for angle in np.linspace(0.0, maximum, 49):
+            each = loaded(tmp_path, changed(text, f"{{ between = [0, {maximum:.0f}], start = 90 }}", str(float(angle))))
             values.append(objective_value(each, evaluate(each)))
         value = objective_value(result.problem, result.final)
         assert result.certificate.lower_bound <= value <= min(values) * (1.0 + 1e-6)
@@ -235,9 +235,9 @@ def test_a_box_near_the_best_design_is_bounded_at_all_angles(tmp_path: Path) -> 
 
 
 def test_limits_that_no_angle_keeps_are_named(tmp_path: Path) -> None:
-    for limit, most in (("degree of irregularity", "1/70"), ("peak to peak stored work", "180 J")):
+    for limit, maximum in (("degree of irregularity", "1/70"), ("peak to peak stored work", "180 J")):
         text = changed(
-            BARE, "[objective]", f'[[constraints]]\nname = "c"\nlimit = "{limit}"\nmax = "{most}"\n[objective]'
+            BARE, "[objective]", f'[[constraints]]\nname = "c"\nlimit = "{limit}"\nmax = "{maximum}"\n[objective]'
         )
         result = solve(loaded(tmp_path, text))
         assert result.status is Status.INFEASIBLE

@@ -156,9 +156,9 @@ def test_a_share_of_the_first_is_given_up_for_the_second(tmp_path: Path) -> None
     pin = mm.crank_pin(RADIUS)
     up = -PISTON * mm.differentiated(mm.piston(pin, ROD, 0.0))[:, None]
     shaken = np.sqrt(np.mean(np.abs(up - masses * AT * np.exp(1j * mm.angles())[:, None]) ** 2, axis=0))
-    least = masses[shaken <= 1.02 * shaken.min()].min()
-    assert result.ranks[1].final == pytest.approx(least, abs=0.004)
-    assert result.ranks[0].final == pytest.approx(1.02 * result.ranks[0].least, rel=1e-5)
+    minimum = masses[shaken <= 1.02 * shaken.min()].min()
+    assert result.ranks[1].final == pytest.approx(minimum, abs=0.004)
+    assert result.ranks[0].final == pytest.approx(1.02 * result.ranks[0].minimum, rel=1e-5)
     # what is given up is allowed, and no gap of the proof
     assert result.certificate.gap == max(rank.gap for rank in result.ranks)
     assert result.certificate.kind is result.ranks[0].proof is result.ranks[1].proof is Proof.GLOBAL

@@ -60,10 +60,10 @@ def _text(seed: int, weights: tuple[tuple[str, str, str], ...], more: str = "") 
     count = int(generator.integers(1, 5))
     throws = [0, *(int(angle) for angle in generator.integers(1, 359, count - 1))]
     measure = f"{list(NORMS)[seed % 4]} {LOADS[int(generator.integers(4))]}"
-    most = generator.uniform(0.05, 1.5)
+    maximum = generator.uniform(0.05, 1.5)
     text = ENGINE.format(mass="0.8 kg", throws=throws, measure=measure)
     for name, (x, mass, angle) in zip("ab", weights, strict=False):
-        told = (each.format(most=most) for each in (x, mass, angle))
+        told = (each.format(maximum=maximum) for each in (x, mass, angle))
         text += WEIGHT.format(**dict(zip(("x", "mass", "angle"), told, strict=True)), name=name)
     return text + more
 
@@ -90,8 +90,8 @@ def test_more_freedom_is_never_worse(seed: int, tmp_path: Path) -> None:
 @pytest.mark.parametrize("seed", first_fast((1, 2, 0, 4, 3), 1, 3))
 def test_fewer_limits_are_never_worse(seed: int, tmp_path: Path) -> None:
     tight, loose, other = (
-        f'[[constraints]]\nlimit = "{limit}"\nmax = "{most}"\n'
-        for limit, most in (("added mass", "0.02 kg"), ("added mass", "0.3 kg"), ("rms shaking force", "1900 N"))
+        f'[[constraints]]\nlimit = "{limit}"\nmax = "{maximum}"\n'
+        for limit, maximum in (("added mass", "0.02 kg"), ("added mass", "0.3 kg"), ("rms shaking force", "1900 N"))
     )
     texts = (_text(seed, FREEDOM[-2], more) for more in (tight + other, loose + other, loose, ""))
     _never_worse([solve(loaded(tmp_path, text)) for text in texts])

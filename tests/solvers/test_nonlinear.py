@@ -246,9 +246,9 @@ def test_workers_at_hand_find_what_one_process_finds():
     with Processes(3) as own:
         for executor in (SERIAL, own):
             with working_on(executor):
-                for program, most in ((bowl, 1), (bowl, 7), (waves(0.3), 13)):
+                for program, maximum in ((bowl, 1), (bowl, 7), (waves(0.3), 13)):
                     ends = solve_nonlinear(
-                        program, starts, enough=lambda some, n=most: sum(o.starts for o in some) >= n
+                        program, starts, enough=lambda some, n=maximum: sum(o.starts for o in some) >= n
                     )
                     found.append([(o.start, o.starts, o.value, *o.x) for o in ends])
         assert len(own.pids) == 3

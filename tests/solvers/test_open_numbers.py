@@ -74,7 +74,7 @@ def _rms_mount_force(stroke: float, offset: float, share: float) -> float:
     return float(np.sqrt(np.mean(np.stack([left**2, right**2]) + (leftward / 2.0) ** 2)))
 
 
-def _least() -> tuple[float, ...]:
+def _minimum() -> tuple[float, ...]:
     """Return the least force of a grid and of a search from its best point, with stroke, offset and share."""
     grid = [
         (_rms_mount_force(stroke, offset, share), stroke, offset, share)
@@ -90,10 +90,10 @@ def _least() -> tuple[float, ...]:
 def test_a_pin_offset_and_a_stroke_are_those_of_an_independent_search(tmp_path: Path) -> None:
     """The offset brings the piston near the middle of the mounts, and the stroke stays what the piston travels."""
     result = searched(loaded(tmp_path, ASIDE))
-    on_grid, least, stroke, offset, share = _least()
+    on_grid, minimum, stroke, offset, share = _minimum()
     decided = {entry.name: entry.value for entry in result.decisions}
     assert result.objective.value <= on_grid
-    assert result.objective.value == pytest.approx(least, rel=1e-5)
+    assert result.objective.value == pytest.approx(minimum, rel=1e-5)
     assert decided["engine.stroke"] == pytest.approx(stroke, rel=1e-6)
     assert decided["engine.offset"] == pytest.approx(offset, abs=2e-5)
     assert decided["web.balance_factor"] == pytest.approx(share, abs=2e-3)

@@ -115,10 +115,10 @@ def test_bound_of_a_mean_holds_over_the_whole_cycle(subject: LoadChannel, sample
     rng = np.random.default_rng(11)
     near = [best + step * rng.standard_normal(4) for step in (0.0, 1e-5, 1e-4) for _ in range(6)]
     designs = [np.concatenate([domain.project(x) for domain in model.domains]) for x in near]
-    least = min(fine.objective(x) for x in designs)
-    assert result.certificate.lower_bound <= least * (1.0 + 1e-9)
+    minimum = min(fine.objective(x) for x in designs)
+    assert result.certificate.lower_bound <= minimum * (1.0 + 1e-9)
     # with many angles it is no idle bound
-    assert samples < 360 or result.certificate.lower_bound >= 0.99 * least
+    assert samples < 360 or result.certificate.lower_bound >= 0.99 * minimum
 
 
 def test_a_wrong_answer_gets_a_wide_gap() -> None:

@@ -127,11 +127,11 @@ def test_a_bound_that_knows_no_bearing_is_false(tmp_path: Path, monkeypatch: pyt
     problem = _loaded({**told, "fidelity": {"samples": 180}}, tmp_path)
     whole = _bound(problem)
     monkeypatch.setattr(Relaxation, "_kinks_of", lambda *_: np.zeros(0))
-    least = min(
+    minimum = min(
         objective_value(problem, evaluate(problem, problem.design([float(x)]))) for x in np.linspace(-0.15, 0.15, 61)
     )
-    assert whole <= least
-    assert _bound(problem) > 1.01 * least
+    assert whole <= minimum
+    assert _bound(problem) > 1.01 * minimum
 
 
 def test_a_beam_is_not_taken_for_a_shaft_that_is_cut(tmp_path: Path) -> None:

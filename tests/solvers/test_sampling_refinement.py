@@ -33,8 +33,8 @@ def problem(told: dict[str, Any], **more: Any) -> Problem:
     return load_tables({**SINGLE, **told, **more}, Path("told.toml"))
 
 
-@pytest.mark.parametrize(("most", "met"), [(5820.0, False), (5821.0, True)])
-def test_leads_keep_limits_over_the_cycle(most: float, met: bool) -> None:
+@pytest.mark.parametrize(("maximum", "met"), [(5820.0, False), (5821.0, True)])
+def test_leads_keep_limits_over_the_cycle(maximum: float, met: bool) -> None:
     """No lead has less than 5820.56 N; 48 angles read 5819.25 N of the best."""
     shaft = {"name": "led", "ratio": -1, "position": ["0 mm", "0 mm"], "lead": {"between": [0, 90], "start": 20}}
     cranks = [
@@ -44,7 +44,7 @@ def test_leads_keep_limits_over_the_cycle(most: float, met: bool) -> None:
     asked = problem(
         {"engine": {**engine, "layout": "parts", "shafts": [shaft], "slider_cranks": cranks}},
         objective={"minimise": "rms rocking couple"},
-        constraints=[{"name": "quiet", "limit": "mean shaking force", "max": f"{most} N"}],
+        constraints=[{"name": "quiet", "limit": "mean shaking force", "max": f"{maximum} N"}],
     )
     result = solve(asked)
     assert result.status is (Status.OPTIMAL if met else Status.INFEASIBLE)

@@ -70,13 +70,13 @@ def test_torque_changes_by_no_more_than_is_told(seed: int) -> None:
         return sum(chamber_torque(gas, part, cycle, angles - part.firing_angle) for part in parts)
 
     for half in (1e-4, 3e-3, 0.05):
-        most = np.repeat(torque_change(gas, pair(ahead, ratio, *told)[0], cycle, half), 3)
+        maximum = np.repeat(torque_change(gas, pair(ahead, ratio, *told)[0], cycle, half), 3)
         here, found = torque(ahead), np.zeros(len(angles))
         for by in (-1.0, -0.6, 0.3, 1.0):
             found = np.maximum(found, np.abs(torque(ahead + by * half) - here))
-        assert (found <= most * (1.0 + 1e-9) + 1e-9 * np.abs(here).max()).all()
+        assert (found <= maximum * (1.0 + 1e-9) + 1e-9 * np.abs(here).max()).all()
         if half < 0.01:
-            assert np.sqrt(np.mean(most**2)) < 3.0 * np.sqrt(np.mean(found**2))
+            assert np.sqrt(np.mean(maximum**2)) < 3.0 * np.sqrt(np.mean(found**2))
 
 
 SPEEDS = [{"name": "loud", "speed": "2400 rpm", "weight": 3}, {"name": "calm", "speed": "900 rpm"}]
@@ -163,8 +163,8 @@ def test_limits_on_a_shared_lead_are_kept_or_excluded() -> None:
     assert found.limits[0].value == pytest.approx(300.0, rel=1e-3)
     assert found.limits[0].value <= 300.0 * (1.0 + 1e-6)
     assert str(found.certificate.kind) == "global"
-    most = objective_value(own, evaluate(own, own.design([math.radians(40.0)])))
-    none = [{"limit": "rms roll moment", "max": f"{0.9 * most} N m"}]
+    maximum = objective_value(own, evaluate(own, own.design([math.radians(40.0)])))
+    none = [{"limit": "rms roll moment", "max": f"{0.9 * maximum} N m"}]
     assert str(laufruhe.solve(problem("rms shaking force", between(0, 40), constraints=none)).status) == "infeasible"
 
 

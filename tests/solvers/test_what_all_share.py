@@ -92,12 +92,12 @@ def test_limits_that_nothing_open_acts_on(what: str, kept: bool, tmp_path: Path)
         assert result.conflict == (broken,)
 
 
-@pytest.mark.parametrize("least", ["1 N", "3500 N"])
-def test_limits_that_unbalances_cannot_keep_whatever_the_mounts(least: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("minimum", ["1 N", "3500 N"])
+def test_limits_that_unbalances_cannot_keep_whatever_the_mounts(minimum: str, tmp_path: Path) -> None:
     """Mounts do not move what the block feels: no search of them is needed to tell what no unbalance keeps."""
     told = {**OPEN["stiffness"], "throws": [0, 0], "more": WEB}
-    result = solve(loaded(tmp_path, BLOCK.format(sag="5 mm", force=least, **told)))
-    if least == "1 N":
+    result = solve(loaded(tmp_path, BLOCK.format(sag="5 mm", force=minimum, **told)))
+    if minimum == "1 N":
         assert result.status is Status.INFEASIBLE
         assert result.conflict == ("rms shaking force",)
     else:

@@ -302,10 +302,10 @@ def _bounded(big: float, small: float) -> tuple[float, float]:
     # the second order turns half forwards and half backwards; only `small` of the latter can go
     each = tractor.MASS * tractor.RADIUS * tractor.LAMBDA / 2.0
     best = min(small, each)
-    least = abs(each - best) * (2.0 * tractor.SPEED) ** 2
+    minimum = abs(each - best) * (2.0 * tractor.SPEED) ** 2
     assert found.objective is not None
     assert found.certificate is not None
-    true_gap = (found.objective.value - least) / found.objective.value if least > 0.0 else 0.0
+    true_gap = (found.objective.value - minimum) / found.objective.value if minimum > 0.0 else 0.0
     plus, minus = (abs(rotor.unbalance) for rotor in found.final.engine.rotors)
     faint = minus == 0.0 and best <= 1e-6 * (each - best)
     errors = [abs(plus / each - 1.0), 0.0 if faint else abs(minus / best - 1.0)]
@@ -379,12 +379,12 @@ def many_optima() -> Entry:
     force = Term(Measure(channels.SHAKING_FORCE, NORMS["mean"]))
     found = solve(tractor.problem(machine, [r.name for r in rotors], objective=(force,)))
     total = sum(abs(rotor.unbalance) for rotor in found.final.engine.rotors)
-    least = tractor.MASS * tractor.RADIUS * tractor.LAMBDA
+    minimum = tractor.MASS * tractor.RADIUS * tractor.LAMBDA
     return Entry(
         "two shafts in one place: a plane of optima",
         "the least sum of unbalances, m r lambda",
         "the lightest optimum, to 1e-6",
-        abs(total / least - 1.0),
+        abs(total / minimum - 1.0),
         1e-6,
     )
 

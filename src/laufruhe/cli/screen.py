@@ -106,8 +106,8 @@ def json_file(json: str | None, problems: Iterable[Path], places: ExitStack) -> 
 def above_zero(option: str, value: float, example: str, below: float = math.inf) -> float:
     """Return an option's value, refused unless it is above zero and below another number."""
     if not 0.0 < value < below:
-        most = "" if math.isinf(below) else f" and below {below:g}"
-        raise refused(option, f"{value:g}", f"must be a number above zero{most}", f"try {example}")
+        maximum = "" if math.isinf(below) else f" and below {below:g}"
+        raise refused(option, f"{value:g}", f"must be a number above zero{maximum}", f"try {example}")
     return value
 
 

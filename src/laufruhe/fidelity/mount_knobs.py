@@ -116,10 +116,10 @@ class _Modes(_OfElasticMounts):
         if scale.mounting is None or not scale.terms:
             return []
         by_strength = sorted(scale.strengths, key=lambda mode: -scale.strengths[mode])
-        most = [tuple(sorted(by_strength[:count])) for count in (1, 3) if count < len(by_strength)]
+        maximum = [tuple(sorted(by_strength[:count])) for count in (1, 3) if count < len(by_strength)]
         return [
             (f"{plural('mode', len(m))} {', '.join(map(str, m))}, 720 steps", Fidelity(samples=720, modes=m))
-            for m in most
+            for m in maximum
         ]
 
 

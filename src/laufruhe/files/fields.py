@@ -80,7 +80,7 @@ class Number:
         SI unit; "" for a plain number.
     openable
         True if `{ between = [low, high] }` is allowed in place of the number.
-    least, above, most, below
+    minimum, above, maximum, below
         Inclusive and exclusive lower bound, inclusive and exclusive upper bound [SI].
     plain
         Factor that turns a bare number into SI, if one is allowed (degrees).
@@ -90,9 +90,9 @@ class Number:
 
     unit: str
     openable: bool = False
-    least: float = -math.inf
+    minimum: float = -math.inf
     above: float = -math.inf
-    most: float = math.inf
+    maximum: float = math.inf
     below: float = math.inf
     plain: float | None = None
     closed: str = ""
@@ -152,12 +152,12 @@ class Number:
             raise refusal(f"must be more than {units.shown(self.above, self.unit)}; {units.advice(self.unit)}")
         if value >= self.below:
             raise refusal(f"must be less than {units.shown(self.below, self.unit)}; give a smaller value")
-        if value < self.least:
-            raise refusal(f"must be at least {units.shown(self.least, self.unit)}; give a larger value")
-        if value > self.most:
-            meant = not self.unit and value <= 100.0 * self.most
+        if value < self.minimum:
+            raise refusal(f"must be at least {units.shown(self.minimum, self.unit)}; give a larger value")
+        if value > self.maximum:
+            meant = not self.unit and value <= 100.0 * self.maximum
             or_share = f', or "{value:g} %" if per cent is meant' if meant else ""
-            raise refusal(f"must be at most {units.shown(self.most, self.unit)}; give a smaller value{or_share}")
+            raise refusal(f"must be at most {units.shown(self.maximum, self.unit)}; give a smaller value{or_share}")
         return value
 
     def _open(self, raw: dict[str, Any]) -> Open:
@@ -267,7 +267,7 @@ _DEG = math.radians(1.0)
 
 Length: TypeAlias = Annotated[float, Number("m")]
 PositiveLength: TypeAlias = Annotated[float, Number("m", above=0.0)]
-Mass: TypeAlias = Annotated[float, Number("kg", least=0.0)]
+Mass: TypeAlias = Annotated[float, Number("kg", minimum=0.0)]
 PositiveMass: TypeAlias = Annotated[float, Number("kg", above=0.0)]
 Inertia: TypeAlias = Annotated[float, Number("kg m^2")]
 OpenInertia: TypeAlias = Annotated[float | Open, Number("kg m^2", above=0.0, openable=True)]
@@ -276,7 +276,7 @@ Pressure: TypeAlias = Annotated[float, Number("Pa")]
 PositivePressure: TypeAlias = Annotated[float, Number("Pa", above=0.0)]
 Moment: TypeAlias = Annotated[float, Number("N m")]
 SignedForce: TypeAlias = Annotated[float, Number("N")]
-Factor: TypeAlias = Annotated[float, Number("", least=-1000.0, most=1000.0)]
+Factor: TypeAlias = Annotated[float, Number("", minimum=-1000.0, maximum=1000.0)]
 PositiveTorque: TypeAlias = Annotated[float, Number("N m", above=0.0)]
 Angle: TypeAlias = Annotated[float, Number("rad", plain=_DEG)]
 OpenAngle: TypeAlias = Annotated[float | Open, Number("rad", plain=_DEG, openable=True)]
@@ -284,32 +284,32 @@ Speed: TypeAlias = Annotated[float, Number("rad/s", above=0.0)]
 PistonSpeed: TypeAlias = Annotated[float, Number("m/s", above=0.0)]
 Time: TypeAlias = Annotated[float, Number("s", above=0.0)]
 _GEARED = "is a ratio of gears, and the orders of loads jump from one ratio to the next"
-Ratio: TypeAlias = Annotated[float, Number("", least=-100.0, most=100.0, closed=_GEARED), AfterValidator(_turning)]
-NonNegative: TypeAlias = Annotated[float, Number("", least=0.0)]
-Part: TypeAlias = Annotated[float, Number("", least=0.0, most=1.0)]
+Ratio: TypeAlias = Annotated[float, Number("", minimum=-100.0, maximum=100.0, closed=_GEARED), AfterValidator(_turning)]
+NonNegative: TypeAlias = Annotated[float, Number("", minimum=0.0)]
+Part: TypeAlias = Annotated[float, Number("", minimum=0.0, maximum=1.0)]
 Positive: TypeAlias = Annotated[float, Number("", above=0.0)]
 Tolerance: TypeAlias = Annotated[
     float, Number("", above=0.0, below=1.0, closed="says how exactly things are computed, not what the engine is")
 ]
-OpenFraction: TypeAlias = Annotated[float | Open, Number("", least=-10.0, most=10.0, openable=True)]
-NonNegativeLength: TypeAlias = Annotated[float, Number("m", least=0.0)]
-Unbalance: TypeAlias = Annotated[float, Number("kg m", least=0.0)]
+OpenFraction: TypeAlias = Annotated[float | Open, Number("", minimum=-10.0, maximum=10.0, openable=True)]
+NonNegativeLength: TypeAlias = Annotated[float, Number("m", minimum=0.0)]
+Unbalance: TypeAlias = Annotated[float, Number("kg m", minimum=0.0)]
 Force: TypeAlias = Annotated[float, Number("N", above=0.0)]
-OpenUnbalance: TypeAlias = Annotated[float | Open, Number("kg m", least=0.0, openable=True)]
-OpenMass: TypeAlias = Annotated[float | Open, Number("kg", least=0.0, openable=True)]
-LossFactor: TypeAlias = Annotated[float, Number("", least=0.0, most=10.0)]
-Stiffness: TypeAlias = Annotated[float, Number("N/m", least=0.0)]
+OpenUnbalance: TypeAlias = Annotated[float | Open, Number("kg m", minimum=0.0, openable=True)]
+OpenMass: TypeAlias = Annotated[float | Open, Number("kg", minimum=0.0, openable=True)]
+LossFactor: TypeAlias = Annotated[float, Number("", minimum=0.0, maximum=10.0)]
+Stiffness: TypeAlias = Annotated[float, Number("N/m", minimum=0.0)]
 PositiveInertia: TypeAlias = Annotated[float, Number("kg m^2", above=0.0)]
 OpenFrequency: TypeAlias = Annotated[float | Open, Number("Hz", above=0.0, openable=True)]
-OpenLossFactor: TypeAlias = Annotated[float | Open, Number("", least=0.0, most=10.0, openable=True)]
+OpenLossFactor: TypeAlias = Annotated[float | Open, Number("", minimum=0.0, maximum=10.0, openable=True)]
 OpenPositiveLength: TypeAlias = Annotated[float | Open, Number("m", above=0.0, openable=True)]
-OpenNonNegativeLength: TypeAlias = Annotated[float | Open, Number("m", least=0.0, openable=True)]
+OpenNonNegativeLength: TypeAlias = Annotated[float | Open, Number("m", minimum=0.0, openable=True)]
 OpenLength: TypeAlias = Annotated[float | Open, Number("m", openable=True)]
-OpenStiffness: TypeAlias = Annotated[float | Open, Number("N/m", least=0.0, openable=True)]
-Damping: TypeAlias = Annotated[float, Number("N s/m", least=0.0)]
-Delay: TypeAlias = Annotated[float, Number("s", least=0.0)]
-OpenDelay: TypeAlias = Annotated[float | Open, Number("s", least=0.0, openable=True)]
-OpenDamping: TypeAlias = Annotated[float | Open, Number("N s/m", least=0.0, openable=True)]
+OpenStiffness: TypeAlias = Annotated[float | Open, Number("N/m", minimum=0.0, openable=True)]
+Damping: TypeAlias = Annotated[float, Number("N s/m", minimum=0.0)]
+Delay: TypeAlias = Annotated[float, Number("s", minimum=0.0)]
+OpenDelay: TypeAlias = Annotated[float | Open, Number("s", minimum=0.0, openable=True)]
+OpenDamping: TypeAlias = Annotated[float | Open, Number("N s/m", minimum=0.0, openable=True)]
 Side: TypeAlias = Annotated[
     str | float, PlainValidator(_side), WithJsonSchema({"anyOf": [{"type": "string"}, {"type": "number"}]})
 ]

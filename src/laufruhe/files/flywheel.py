@@ -14,7 +14,7 @@ from laufruhe.files.fields import Name, Open, Table
 from laufruhe.machine import Arms, Flywheel, GearedInertia, Rim
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
 
-OpenShare: TypeAlias = Annotated[float | Open, f.Number("", least=0.0, most=1.0, openable=True)]
+OpenShare: TypeAlias = Annotated[float | Open, f.Number("", minimum=0.0, maximum=1.0, openable=True)]
 _ROUNDING = 1e-12
 
 
@@ -36,7 +36,7 @@ class RimTable(Table):
     width: f.OpenPositiveLength = f.required("Width along the shaft.")
     height: f.OpenPositiveLength = f.required("Height of the rim along a radius.")
     density: f.Density = f.optional("Density of the rim; by default that of cast iron.", 7250.0)
-    whole: Annotated[float, f.Number("", least=1.0)] = f.optional(
+    whole: Annotated[float, f.Number("", minimum=1.0)] = f.optional(
         "Mass of the whole flywheel over that of its rim.", 1.0
     )
     arms: ArmsTable | None = None
@@ -111,8 +111,8 @@ def geared_of(tables: Sequence[GearedInertiaTable]) -> tuple[tuple[GearedInertia
         share = Open.from_value(table.share)
         inertias.append(GearedInertia(table.name, table.ratio, share.start))
         decisions += share.decisions(f"{table.name}.share", "", NumberDrive(Kind.SHARE, table.name))
-    most = sum(Open.from_value(table.share).upper for table in tables)
-    if most > 1.0 + _ROUNDING:
-        rule = f"add up to {most:g}, and the inertia of all that turns is one"
+    maximum = sum(Open.from_value(table.share).upper for table in tables)
+    if maximum > 1.0 + _ROUNDING:
+        rule = f"add up to {maximum:g}, and the inertia of all that turns is one"
         raise Refused("geared_inertias", None, rule, "let shares, and the largest of open ones, add up to 1 at most")
     return tuple(inertias), decisions

@@ -53,7 +53,7 @@ class FrictionTable(Table):
     speed_unit: str = "rpm"
     load_unit: str = f.optional("Unit of the load in the file: of a torque, or of a mean pressure.", "N m")
     fmep: f.PositivePressure | None = f.optional("Friction mean effective pressure, in place of a file.")
-    deviation: Annotated[float, f.Number("Pa", least=0.0)] | None = f.optional("Standard deviation of fmep.")
+    deviation: Annotated[float, f.Number("Pa", minimum=0.0)] | None = f.optional("Standard deviation of fmep.")
     deviations: f.NonNegative = f.optional(
         "Number of standard deviations to either side for which the load is computed.", 2.0
     )
@@ -109,10 +109,12 @@ class Brake:
             raise Refused(
                 "friction", units.shown(friction.mean, "Pa"), rule, "measure more points, or fewer deviations"
             )
-        lowest, middle, most, loss, off = (f"{1e-5 * p:.4g}" for p in (*pressures, friction.mean, friction.deviation))
+        lowest, middle, maximum, loss, off = (
+            f"{1e-5 * p:.4g}" for p in (*pressures, friction.mean, friction.deviation)
+        )
         self.said.append(
-            f"Indicated mean pressure at {where} {middle} bar, {lowest} to {most} bar: {1e-5 * brake:.4g} bar at the "
-            f"brake and {loss} bar of friction, {self.table.deviations:g} deviations of {off} bar to either side."
+            f"Indicated mean pressure at {where} {middle} bar, {lowest} to {maximum} bar: {1e-5 * brake:.4g} bar at "
+            f"the brake and {loss} bar of friction, {self.table.deviations:g} deviations of {off} bar to either side."
         )
         if self._rows:
             is_motored = self.table.kind == "motoring"

@@ -242,7 +242,7 @@ def _check(phasing: Phasing, engine: EngineTable) -> None:
     if phasing.throw_bounds is not None and phasing.intervals.forbid_unevenness:
         rule = "allows even firing alone, and throws between bounds fire unevenly"
         raise Refused("phasing.intervals", None, rule, 'allow more, leave it out, or write throws = "open"')
-    if phasing.intervals.least > phasing.intervals.most:
+    if phasing.intervals.minimum > phasing.intervals.maximum:
         raise Refused("phasing.intervals.min", None, "is more than max", "swap or relax them")
 
 

@@ -196,8 +196,8 @@ def _check_shape(tables: dict[str, Any], path: Path) -> None:
             rule = f"holds U+{ord(strange.group()):04X}, which is no character to read"
             raise refused(where, "", rule, "take it out; a path has / in place of \\", path)
         if isinstance(node, dict | list) and len(node) > MOST_ENTRIES:
-            most = f"at most {MOST_ENTRIES} are read"
-            raise refused(where or "file", "", f"has {len(node)} entries", most, path)
+            maximum = f"at most {MOST_ENTRIES} are read"
+            raise refused(where or "file", "", f"has {len(node)} entries", maximum, path)
         if isinstance(node, int) and not -LARGEST <= node <= LARGEST:
             raise refused(where, "", "is a whole number of more than 64 bits", "write a smaller one", path)
 

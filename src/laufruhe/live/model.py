@@ -229,7 +229,7 @@ def _reference(result: Result) -> Reference | None:
         return None
     if result.ranks:
         first = result.ranks[0]
-        return Reference.from_proof(first.least, first.proof, first.gap)
+        return Reference.from_proof(first.minimum, first.proof, first.gap)
     return Reference.from_proof(objective.value, certificate.kind, certificate.gap)
 
 

@@ -142,8 +142,8 @@ def _of_load(model: AffineModel, measure: Measure) -> Signal:
 
 def _point(share: float, constant: Spectrum, columns: Sequence[Spectrum], at: Array) -> PointSignal:
     shape = constant.coefficients.shape[1:]
-    most = max((len(column.coefficients) for column in columns), default=1)
-    slope = np.zeros((most, *shape, len(columns)), dtype=complex)
+    maximum = max((len(column.coefficients) for column in columns), default=1)
+    slope = np.zeros((maximum, *shape, len(columns)), dtype=complex)
     for k, column in enumerate(columns):
         slope[: len(column.coefficients), ..., k] = column.coefficients
     bent = tuple((k, _bends(column, at)) for k, column in enumerate(columns) if column.kinks is not None)

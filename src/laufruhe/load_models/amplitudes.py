@@ -50,10 +50,10 @@ class AmplitudeObjective:
     orders: tuple[int, ...]
     terms: tuple[AmplitudeTerm, ...]
 
-    def values(self, space: StarSpace, stars: Stars, most: float = math.inf) -> Array:  # noqa: ARG002
+    def values(self, space: StarSpace, stars: Stars, maximum: float = math.inf) -> Array:  # noqa: ARG002
         """Return the objective of many stars, shape (n,).
 
-        Any number between `most` and a larger value may stand for it.
+        Any number between `maximum` and a larger value may stand for it.
         """
         return self._of_sums(star_sums(stars, space.phases, space.places, self.orders))
 

@@ -108,8 +108,8 @@ class PairObjective:
 
     def below(self, squares: Array) -> float:
         """Return the least objective that rounding allows, from one row of squares."""
-        least = sum(
+        minimum = sum(
             weight * float(np.sqrt(max(squares[k] - table.rounding, 0.0)))
             for k, (weight, table) in enumerate(self.terms)
         )
-        return float(least)
+        return float(minimum)

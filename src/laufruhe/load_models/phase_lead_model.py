@@ -138,7 +138,7 @@ class PhaseLeadModel:
         terms = [(term.weight, norm(term.measure)) for term in self.problem.load_terms]
         limits = [(limit.maximum, norm(limit.measure)) for limit in self.problem.load_limits]
         program = AffineProblem(
-            tuple((weight, led.norm) for weight, led in terms), tuple((most, led.norm) for most, led in limits),
+            tuple((weight, led.norm) for weight, led in terms), tuple((maximum, led.norm) for maximum, led in limits),
             self.domains, samples,
         )  # fmt: skip
         return program, tuple(led for _, led in (*terms, *limits))

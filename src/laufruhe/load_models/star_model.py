@@ -173,8 +173,8 @@ class StarModel:
             own = {place: norms[number][1] for place, norms in moved.items()}
             moves = self._apart({place: norm.constant for place, norm in own.items()}, rest.constant)
             # most turn alike, which is seen before room is made for all of them
-            least = _SAME_SLOPE * np.abs(rest.slope).max(initial=0.0)
-            alike = all(np.abs(norm.slope - rest.slope).max(initial=0.0) <= least for norm in own.values())
+            minimum = _SAME_SLOPE * np.abs(rest.slope).max(initial=0.0)
+            alike = all(np.abs(norm.slope - rest.slope).max(initial=0.0) <= minimum for norm in own.values())
             turned = None if alike else self._apart({place: norm.slope for place, norm in own.items()}, rest.slope)
             out.append((weight, StarNorm(all_of.norm, all_of.constant, moves, all_of.slope, turned, all_of.grid)))
         return tuple(out)

@@ -41,7 +41,7 @@ class ThrowMoves:
 
     def __init__(self, phasing: Phasing, layout: Layout, start: Candidate, intervals: Intervals) -> None:
         self.phasing, self.layout, self.start = phasing, layout, start
-        self.intervals = Intervals(max(intervals.least, min(APART, intervals.most)), intervals.most)
+        self.intervals = Intervals(max(intervals.minimum, min(APART, intervals.maximum)), intervals.maximum)
         self._throws = range(0 if phasing.throw_bounds else 1, len(start.throws))
         self._open_bank, self._open_split = phasing.opened
         self.size = len(self._throws) + self._open_bank + self._open_split

@@ -243,10 +243,10 @@ class ThrowWaves:
             rest = signal.holding(np.where(out[:, None, None], signal.coefficients, 0.0))
             if measure.norm.is_euclidean or measure.norm.averages:
                 # neither is more than the root mean square, nor rows of averages more than their lengths
-                most = np.sqrt(mean_square(rest))
+                maximum = np.sqrt(mean_square(rest))
                 if measure.norm.averages:
-                    most = np.minimum(most, _averaged(signal, out, samples * float(self.base)))
-                total = max(total, float(most.max(initial=0.0)))
+                    maximum = np.minimum(maximum, _averaged(signal, out, samples * float(self.base)))
+                total = max(total, float(maximum.max(initial=0.0)))
                 continue
             whole = amplitudes(rest)
             if averages(self.problem, measure):

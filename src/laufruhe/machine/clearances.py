@@ -55,8 +55,8 @@ def distances(names: Sequence[str] | None, lower: Engine, upper: Engine, swept: 
     for a, b in itertools.combinations((name for name in counted if name in low), 2):
         if low[a].balances or low[b].balances:
             taken = low[a].radius + low[b].radius if swept else 0.0
-            least, most = _apart((low[a].shaft, low[b].shaft), (high[a].shaft, high[b].shaft))
-            out.append((least - taken, most - taken))
+            minimum, maximum = _apart((low[a].shaft, low[b].shaft), (high[a].shaft, high[b].shaft))
+            out.append((minimum - taken, maximum - taken))
     return out
 
 
@@ -66,8 +66,8 @@ def reaches(names: Sequence[str] | None, lower: Engine, upper: Engine) -> list[S
     out = []
     for name in low if names is None else names:
         if name in low and low[name].balances:
-            least, most = _apart((low[name].shaft, origin), (high[name].shaft, origin))
-            out.append((least + low[name].radius, most + low[name].radius))
+            minimum, maximum = _apart((low[name].shaft, origin), (high[name].shaft, origin))
+            out.append((minimum + low[name].radius, maximum + low[name].radius))
     return out
 
 
@@ -75,6 +75,6 @@ def _apart(lower: tuple[Shaft, Shaft], upper: tuple[Shaft, Shaft]) -> Span:
     (a, b), (c, d) = lower, upper
     spans = []
     for own, other in (((a.y, c.y), (b.y, d.y)), ((a.z, c.z), (b.z, d.z))):
-        least, most = min(own) - max(other), max(own) - min(other)
-        spans.append((max(least, -most, 0.0), max(abs(least), abs(most))))
+        minimum, maximum = min(own) - max(other), max(own) - min(other)
+        spans.append((max(minimum, -maximum, 0.0), max(abs(minimum), abs(maximum))))
     return math.hypot(spans[0][0], spans[1][0]), math.hypot(spans[0][1], spans[1][1])

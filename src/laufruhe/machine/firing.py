@@ -113,22 +113,22 @@ def even_patterns(cycle: Cycle, layout: Layout) -> tuple[tuple[int, ...], ...]:
 
 
 def _patterns(lattice: FiringLattice, own: tuple[int, ...], throws: int) -> Iterator[tuple[int, ...]]:
-    steps, most = lattice.steps, lattice.capacity[0]
+    steps, maximum = lattice.steps, lattice.capacity[0]
     # the last place that loads each step: what is not full then stays so
     last = {(step - p) % steps: p for p in range(steps) for step in own}
 
     def grow(counts: list[int], load: list[int], left: int) -> Iterator[tuple[int, ...]]:
         if len(counts) == steps:
-            if left == 0 and all(x == most for x in load):
+            if left == 0 and all(x == maximum for x in load):
                 yield tuple(counts)
             return
         p = len(counts)
-        for count in range(1 if p == 0 else 0, min(left, most) + 1):
+        for count in range(1 if p == 0 else 0, min(left, maximum) + 1):
             after = load.copy()
             for step in own:
                 after[(step - p) % steps] += count
-            full = all(after[j] == most for j in {(step - p) % steps for step in own} if last[j] == p)
-            if full and max(after) <= most:
+            full = all(after[j] == maximum for j in {(step - p) % steps for step in own} if last[j] == p)
+            if full and max(after) <= maximum:
                 yield from grow([*counts, count], after, left - count)
 
     yield from grow([], [0] * steps, throws)

@@ -77,7 +77,7 @@ class FiringSlots:
         Share of bank angle plus split pin by which the dead centre of each cylinder of a throw is late.
     angle
         Least and largest bank angle plus split pin [rad].
-    least, most
+    minimum, maximum
         Bounds of an interval [rad].
     """
 
@@ -85,8 +85,8 @@ class FiringSlots:
     throws: int
     sides: tuple[float, ...]
     angle: tuple[float, float]
-    least: float
-    most: float
+    minimum: float
+    maximum: float
 
     @property
     def count(self) -> int:
@@ -107,24 +107,24 @@ class FiringSlots:
             complete = complete and (slack > 0.0 or all_of)
             found = [pattern for cover in covers if (pattern := self._timed(cover)) is not None]
             found.sort(key=lambda pattern: (round(pattern.broken, 9), self._unevenness(pattern)))
-            least = found[0].broken if found else math.inf
-            if least <= max(slack, 1e-7) or slack > self.cycle.angle:
-                kept = [pattern for pattern in found if pattern.broken <= least + 1e-7]
+            minimum = found[0].broken if found else math.inf
+            if minimum <= max(slack, 1e-7) or slack > self.cycle.angle:
+                kept = [pattern for pattern in found if pattern.broken <= minimum + 1e-7]
                 return kept, complete
             slack = max(0.05 * even, 1.3 * slack)
 
     def _first_covers(self, slack: float, given: Sequence[Sequence[int]] | None) -> tuple[list[Cover], bool]:
         """Return covers in order of unevenness, as many as pay for a program, and True if these are all."""
         even, found = self.cycle.angle / self.count, dict[Cover, None]()
-        most = min(_MOST_COVERS, 300_000 // self.count**2) if slack == 0.0 else _MOST_BROKEN
+        maximum = min(_MOST_COVERS, 300_000 // self.count**2) if slack == 0.0 else _MOST_BROKEN
         complete = False
         for share in _SHARES:
-            low, high = self.least - slack, self.most + slack
-            own = replace(self, least=even - share * (even - low), most=even + share * (high - even))
+            low, high = self.minimum - slack, self.maximum + slack
+            own = replace(self, minimum=even - share * (even - low), maximum=even + share * (high - even))
             budget = _Budget(_MOST_LOOKED_AT)
-            found |= dict.fromkeys(itertools.islice(own._covers(given, budget), most + 1))
-            if len(found) > most or budget.left <= 0:
-                return list(found)[:most], False
+            found |= dict.fromkeys(itertools.islice(own._covers(given, budget), maximum + 1))
+            if len(found) > maximum or budget.left <= 0:
+                return list(found)[:maximum], False
             complete = share == 1.0
         return list(found), complete
 
@@ -135,7 +135,7 @@ class FiringSlots:
     def _shapes(self) -> list[Shape]:
         """Return the shapes of a throw: slot offset, whole turns and angle share of its further cylinders."""
         whole, count = self.cycle.angle, self.count
-        low, high = max(self.least, 0.0), self.most
+        low, high = max(self.minimum, 0.0), self.maximum
         choices = []
         for side in self.sides[1:]:
             apart = side - self.sides[0]
@@ -210,7 +210,7 @@ class FiringSlots:
         uneven[:, count + 1] = 1.0
         broken[:, count + 2] = 1.0
         rows = np.concatenate([steps - uneven, -steps - uneven, steps - broken, -steps - broken])
-        most = np.concatenate([even - turn, turn - even, self.most - turn, turn - self.least])
+        maximum = np.concatenate([even - turn, turn - even, self.maximum - turn, turn - self.minimum])
         fixed, values, members = [], [], []
         for first, shape in cover:
             members.append((first, *((first + d) % count for d, _, _ in shape)))
@@ -222,7 +222,9 @@ class FiringSlots:
         bounds = [(0.0, 0.0), *([(None, None)] * (count - 1)), self.angle, (0.0, None), (0.0, None)]
         cost = np.zeros(size)
         cost[count + 1 :] = 1.0, _BROKEN
-        answer = linprog(cost, rows, most, np.array(fixed) if fixed else None, values or None, bounds, method="highs")
+        answer = linprog(
+            cost, rows, maximum, np.array(fixed) if fixed else None, values or None, bounds, method="highs"
+        )
         if answer.x is None:
             return None
         return FiringPattern(

@@ -52,10 +52,10 @@ class OwnAngles:
     def shortened(self, paths: Array, lower: Array, upper: Array) -> Array | None:
         """Return shortest paths of own angles in a box of throws and open angles, or None if infeasible."""
         count = len(lower) - self.shares.shape[1]
-        least, most = _range(self.shares, lower[count:], upper[count:])
+        minimum, maximum = _range(self.shares, lower[count:], upper[count:])
         paths = paths.copy()
-        paths[-1, :-1] = np.minimum(paths[-1, :-1], upper[self.throws] + most)
-        paths[:-1, -1] = np.minimum(paths[:-1, -1], -(lower[self.throws] + least))
+        paths[-1, :-1] = np.minimum(paths[-1, :-1], upper[self.throws] + maximum)
+        paths[:-1, -1] = np.minimum(paths[:-1, -1], -(lower[self.throws] + minimum))
         first, second = self._differences
         _, ahead = _range(self.shares[second] - self.shares[first], lower[count:], upper[count:])
         paths[first, second] = np.minimum(paths[first, second], ahead)
@@ -67,9 +67,9 @@ class OwnAngles:
         """Tighten a box of throws and open angles by shortest paths."""
         count = len(lower) - self.shares.shape[1]
         low, high = lower.copy(), upper.copy()
-        least, most = _range(self.shares, lower[count:], upper[count:])
-        np.minimum.at(high, self.throws, paths[-1, :-1] - least)
-        np.maximum.at(low, self.throws, -paths[:-1, -1] - most)
+        minimum, maximum = _range(self.shares, lower[count:], upper[count:])
+        np.minimum.at(high, self.throws, paths[-1, :-1] - minimum)
+        np.maximum.at(low, self.throws, -paths[:-1, -1] - maximum)
         first, second = self._differences
         # shares . angles is at most this
         rows = [self.shares[second] - self.shares[first], self.shares, -self.shares]
@@ -145,7 +145,7 @@ class FiringBounds:
 
     Attributes
     ----------
-    least, most
+    minimum, maximum
         Of every firing interval [rad].
     throws
         Bounds of every throw [rad]; None where they are open, and cylinder 1 is at its dead centre at phi = 0.
@@ -157,8 +157,8 @@ class FiringBounds:
 
     cycle: Cycle
     layout: Layout
-    least: float
-    most: float
+    minimum: float
+    maximum: float
     throws: tuple[tuple[float, float], ...] | None
     order: tuple[int, ...] | None
     open_angles: tuple[tuple[float, float], ...] = ()
@@ -167,8 +167,8 @@ class FiringBounds:
     def late(self) -> tuple[float, ...]:
         """c_k of every cylinder, open angles at zero [rad]."""
         found = lateness(self.layout)
-        least = sum(low for low, _ in self.open_angles)
-        return tuple(late + self.layout.side(k) * least for k, late in enumerate(found)) if least else found
+        minimum = sum(low for low, _ in self.open_angles)
+        return tuple(late + self.layout.side(k) * minimum for k, late in enumerate(found)) if minimum else found
 
     def share(self, k: int) -> float:
         """Return the share of an open angle in the own angle of cylinder k, from cylinder 1 if throws are open."""
@@ -208,7 +208,7 @@ class FiringBounds:
     def windows(self) -> Iterator[FiringWindow]:
         """Yield the window of every order and choice of dead centres that some throws keep."""
         firsts = [self.order[0] - 1] if self.order else [0]
-        if self.order is None and self.most > math.tau + SLACK:
+        if self.order is None and self.maximum > math.tau + SLACK:
             # whose first dead centre comes more than a turn after the last of the others need not be cylinder 1
             firsts = list(range(len(self.layout.positions)))
         for first in firsts:
@@ -258,8 +258,8 @@ class FiringBounds:
     def _laps(self, k: int, before: int, lap_before: int, back: float, there: float) -> Sequence[int]:
         # 2 pi l = interval + theta_own + c_own + t_before
         still = self.late[k] - self.late[before] + math.tau * lap_before
-        low = self.least + still - back
-        high = min(self.most, math.tau) + still + there
+        low = self.minimum + still - back
+        high = min(self.maximum, math.tau) + still + there
         return range(math.ceil((low - SLACK) / math.tau), math.floor((high + SLACK) / math.tau) + 1)
 
     def _apart(
@@ -269,12 +269,12 @@ class FiringBounds:
         late = self.late
         still = math.tau * (lap_after - lap_before) - late[after] + late[before]
         still += self.cycle.angle if wrapped else 0.0
-        most = self.most if wrapped else min(self.most, math.tau)
+        maximum = self.maximum if wrapped else min(self.maximum, math.tau)
         # of orders that are one another turned on, the one with cylinder 1 first, unless only this one says it
-        least = max(self.least, math.tau) if wrapped and after and self.order is None else self.least
+        minimum = max(self.minimum, math.tau) if wrapped and after and self.order is None else self.minimum
         p, q = self._own_of[before], self._own_of[after]
         # least <= theta_p - theta_q + still <= most
-        ahead, behind = most - still + SLACK, still - least + SLACK
+        ahead, behind = maximum - still + SLACK, still - minimum + SLACK
         if p == q:
             return paths if min(ahead, behind) >= -_ROUNDING else None
         there, back = float(paths[q, p]), float(paths[p, q])
@@ -284,7 +284,7 @@ class FiringBounds:
         return _tightened(_tightened(paths, q, p, ahead), p, q, behind)
 
 
-def _tightened(paths: Array, i: int, j: int, most: float) -> Array:
-    if most >= paths[i, j]:
+def _tightened(paths: Array, i: int, j: int, maximum: float) -> Array:
+    if maximum >= paths[i, j]:
         return paths
-    return np.minimum(paths, paths[:, i : i + 1] + most + paths[j : j + 1, :])
+    return np.minimum(paths, paths[:, i : i + 1] + maximum + paths[j : j + 1, :])

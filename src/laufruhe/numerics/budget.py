@@ -53,9 +53,9 @@ def in_time(items: Iterable[T]) -> Iterator[T]:
         yield item
 
 
-def rounds(most: int) -> Iterator[int]:
+def rounds(maximum: int) -> Iterator[int]:
     """Yield numbers of optional rounds while time is left."""
-    for k in range(most):
+    for k in range(maximum):
         if passed():
             return
         yield k

@@ -185,6 +185,6 @@ def _rounding(count: int) -> float:
     return (count + 2) * _EPS
 
 
-def _flushed(sums: NDArray[np.float64], least: NDArray[np.float64]) -> NDArray[np.complex128]:
-    sums[np.abs(sums) <= least] = 0.0
+def _flushed(sums: NDArray[np.float64], minimum: NDArray[np.float64]) -> NDArray[np.complex128]:
+    sums[np.abs(sums) <= minimum] = 0.0
     return sums.view(complex)

@@ -210,9 +210,9 @@ def find_kinks(signal: Callable[[Array], Array], breaks: Array, period: float) -
     values = values.reshape(len(at), 2, _NODES, *values.shape[1:])
     found = np.zeros((*stretches.shape, DEGREES, *values.shape[3:]))
     longest = math.inf
-    for least, degree in _DEGREES_OF:
-        own = (least <= stretches) & (stretches < longest)
-        longest, count = least, min(degree + 1, DEGREES)
+    for minimum, degree in _DEGREES_OF:
+        own = (minimum <= stretches) & (stretches < longest)
+        longest, count = minimum, min(degree + 1, DEGREES)
         series = np.tensordot(values[own], _fit(degree)[:count], axes=(1, 1))
         # shapes (n, ..., degrees): a power of the stretch, with its side, below every one
         signed = (sides * stretches)[own].reshape(-1, *(1,) * (series.ndim - 1))

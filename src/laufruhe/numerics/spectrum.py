@@ -359,7 +359,7 @@ def spectrum_of(samples: NDArray[np.float64], base: Fraction) -> Spectrum:
 
 def spectrum_with_kinks(
     signal: Callable[[NDArray[np.float64]], NDArray[np.float64]], samples: int, base: Fraction,
-    breaks: NDArray[np.float64], most: int = MOST_SIGNAL_KINKS,
+    breaks: NDArray[np.float64], maximum: int = MOST_SIGNAL_KINKS,
 ) -> Spectrum:  # fmt: skip
     """Return the spectrum of a function of the angle whose derivatives jump (L5a).
 
@@ -376,7 +376,7 @@ def spectrum_with_kinks(
     angles = period * np.arange(samples) / samples
     kinks = find_kinks(signal, breaks, period)
     if kinks is not None:
-        kinks = kinks.strongest(most)
+        kinks = kinks.strongest(maximum)
     if kinks is None:
         return spectrum_of(signal(angles), base)
     # a step on a jump is taken behind it

@@ -83,13 +83,13 @@ def current_executor() -> Executor | None:
 
 
 @contextmanager
-def executor_for(most: int | None = None) -> Iterator[Executor]:
-    """Yield the current executor, or else up to `most` processes of this machine."""
+def executor_for(maximum: int | None = None) -> Iterator[Executor]:
+    """Yield the current executor, or else up to `maximum` processes of this machine."""
     executor = _current.get()
     if executor is not None:
         yield executor
         return
-    with Processes(most) as processes:
+    with Processes(maximum) as processes:
         yield processes
 
 

@@ -278,12 +278,12 @@ class ElasticMounting:
 def _refuse_singular(omegas: Array, impedance: ComplexArray, drive: ComplexArray) -> None:
     """Refuse a frequency at which the block and the fluid of its mounts move by themselves."""
     driven = np.flatnonzero((omegas > 0.0) & drive.any(axis=1))
-    matrices, least = impedance[driven], RESONANCE * omegas[driven] ** 2
+    matrices, minimum = impedance[driven], RESONANCE * omegas[driven] ** 2
     with suppress(np.linalg.LinAlgError):
         # no singular value is less than one over the Frobenius norm of the inverse, which is found sooner
-        doubtful = ~(np.linalg.norm(np.linalg.inv(matrices), axis=(1, 2)) * least < 1.0)
-        driven, matrices, least = driven[doubtful], matrices[doubtful], least[doubtful]
-    struck = driven[np.linalg.svd(matrices, compute_uv=False)[:, -1] <= least]
+        doubtful = ~(np.linalg.norm(np.linalg.inv(matrices), axis=(1, 2)) * minimum < 1.0)
+        driven, matrices, minimum = driven[doubtful], matrices[doubtful], minimum[doubtful]
+    struck = driven[np.linalg.svd(matrices, compute_uv=False)[:, -1] <= minimum]
     if len(struck):
         raise ResonanceError(
             f"block and fluid tracks are driven at {omegas[struck[0]] / math.tau:.6g} Hz, a natural frequency of "

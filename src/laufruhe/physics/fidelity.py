@@ -113,9 +113,9 @@ class Fidelity:
         """Return the gas torque without truncated orders."""
         return torque if self.gas_orders is None else torque.kept(self.gas_orders)
 
-    def kept(self, loads: Spectrum, least: float = 1.0) -> Spectrum:
-        """Return the loads without truncated orders; those up to `least` stay."""
-        return loads if self.orders is None else loads.kept(max(self.orders, least))
+    def kept(self, loads: Spectrum, minimum: float = 1.0) -> Spectrum:
+        """Return the loads without truncated orders; those up to `minimum` stay."""
+        return loads if self.orders is None else loads.kept(max(self.orders, minimum))
 
     def local_orders(self, ratio: float) -> int | None:
         """Return the last order in the angle of a crank of this ratio, or None."""

@@ -61,15 +61,15 @@ class AxisResidual:
         Shape (6, 6).
     right, mass
         Shape (6,).
-    least, most
+    minimum, maximum
         Of s.
     """
 
     left: Array
     right: Array
     mass: Array
-    least: float
-    most: float
+    minimum: float
+    maximum: float
 
     def answer(self, matrix: Any) -> Any:
         """Return left A right, also for symbols."""
@@ -77,7 +77,7 @@ class AxisResidual:
 
     def nearest(self, answer: Array) -> float:
         """Return the s with the least residual."""
-        return float(np.clip(self.mass @ answer / (self.mass @ self.mass), self.least, self.most))
+        return float(np.clip(self.mass @ answer / (self.mass @ self.mass), self.minimum, self.maximum))
 
     def rows(self, matrix: Array) -> Array:
         """Return left A right - s mass at the best s, shape (6,)."""
@@ -88,10 +88,10 @@ class AxisResidual:
         """Return y, |y| <= 1, and c such that y' left A right - c never exceeds the residual (E19, E46)."""
         y = z / max(float(np.linalg.norm(z)), 1.0)
         along = float(y @ self.mass)
-        if self.most == np.inf and along > 0.0:
+        if self.maximum == np.inf and along > 0.0:
             y = y - along / float(self.mass @ self.mass) * self.mass
             along = 0.0
-        return y, along * (self.most if along > 0.0 else self.least)
+        return y, along * (self.maximum if along > 0.0 else self.minimum)
 
 
 Band: TypeAlias = tuple[float, float]

@@ -58,18 +58,18 @@ def seiliger_cut_off(gas: Seiliger, cycle: Cycle) -> float:
             f"from {in_bar(gas.intake_pressure)}); raise peak_pressure or lower compression_ratio",
             "gas.peak_pressure",
         )
-    least, most = seiliger_imep(gas, cycle, 1.0), seiliger_imep(gas, cycle, gas.compression_ratio)
+    minimum, maximum = seiliger_imep(gas, cycle, 1.0), seiliger_imep(gas, cycle, gas.compression_ratio)
     slack = _ROUNDING * gas.peak_pressure
-    if not least - slack <= gas.imep <= most + slack:
-        remedy = "raise peak_pressure" if gas.imep > most else "lower peak_pressure"
+    if not minimum - slack <= gas.imep <= maximum + slack:
+        remedy = "raise peak_pressure" if gas.imep > maximum else "lower peak_pressure"
         raise ModelError(
             f"imep {in_bar(gas.imep)} cannot be reached with peak_pressure {in_bar(gas.peak_pressure)}: from no to "
-            f"full cut-off it is between {in_bar(least)} and {in_bar(most)}; {remedy} or change imep",
+            f"full cut-off it is between {in_bar(minimum)} and {in_bar(maximum)}; {remedy} or change imep",
             "gas.imep",
         )
-    if gas.imep <= least:
+    if gas.imep <= minimum:
         return 1.0
-    if gas.imep >= most:
+    if gas.imep >= maximum:
         return gas.compression_ratio
     return rising_root(lambda ratio: seiliger_imep(gas, cycle, ratio) - gas.imep, 1.0, gas.compression_ratio)
 

@@ -84,12 +84,12 @@ def speed_map(
     inertia: Spectrum,
     gas: Spectrum | None,
     speeds: Array,
-    least: float = 1e-7,
+    minimum: float = 1e-7,
     wanted: Sequence[float] | None = None,
 ) -> SpeedMap:
     """Return the mount forces at many speeds under the loads of `split_loads`, all orders and speeds solved together.
 
-    Orders under the share `least` of the largest, at every speed, are left out, and those that are not `wanted`.
+    Orders under the share `minimum` of the largest, at every speed, are left out, and those that are not `wanted`.
     """
     spectra = [inertia] if gas is None else [inertia, gas]
     base = common_base([spectrum.base for spectrum in spectra])
@@ -99,7 +99,7 @@ def speed_map(
     # inertia grows with the square of speed, gas does not
     growth = [np.asarray(speeds, dtype=float) ** 2, np.ones(len(speeds))][: len(spectra)]
     size = sum(np.abs(c).max(axis=1) * g.max(initial=0.0) for c, g in zip(padded, growth, strict=True))
-    kept = np.flatnonzero(size > least * np.max(size, initial=0.0))
+    kept = np.flatnonzero(size > minimum * np.max(size, initial=0.0))
     if wanted is not None:
         kept = kept[orders_equal(kept * float(base), wanted)]
     orders: Array = np.asarray(kept, dtype=float) * float(base)

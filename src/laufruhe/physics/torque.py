@@ -46,7 +46,7 @@ class TorqueFacts:
         What the load takes [N m].
     power
         Mean torque times speed [W].
-    least, largest
+    minimum, largest
         Over the cycle [N m].
     excursion
         Work that is stored and given back within the cycle [J] (T2).
@@ -56,7 +56,7 @@ class TorqueFacts:
 
     mean: float
     power: float
-    least: float
+    minimum: float
     largest: float
     excursion: float
     irregularity: float | None

@@ -68,17 +68,20 @@ def wiebe_heat(gas: Wiebe, part: SliderCrank, cycle: Cycle) -> float:
         return np.asarray(-np.expm1((gas.heat_ratio - 1.0) * np.log(volume / cylinder.largest)))
 
     efficiency = float(np.sum(weights * _burn_rate(gas, places) * worked(places)))
-    least = gas_exchange_pressure(gas, cycle)
+    minimum = gas_exchange_pressure(gas, cycle)
     charge = gas.intake_pressure * cylinder.largest
-    most = least + MAX_CHARGE_HEAT * charge * efficiency / gas.completeness
+    maximum = minimum + MAX_CHARGE_HEAT * charge * efficiency / gas.completeness
     slack = _ROUNDING * max(gas.intake_pressure, gas.exhaust_pressure)
-    if not least - slack <= gas.imep <= most:
-        remedy = "raise intake_pressure or burn earlier" if gas.imep > most else "raise imep or lower exhaust_pressure"
+    if not minimum - slack <= gas.imep <= maximum:
+        remedy = (
+            "raise intake_pressure or burn earlier" if gas.imep > maximum else "raise imep or lower exhaust_pressure"
+        )
         raise ModelError(
             f"imep {in_bar(gas.imep)} is out of reach with intake_pressure {in_bar(gas.intake_pressure)}: from no "
-            f"heat to the most that fuel and air can hold it is between {in_bar(least)} and {in_bar(most)}; {remedy}"
+            f"heat to the most that fuel and air can hold it is between {in_bar(minimum)} and {in_bar(maximum)}; "
+            f"{remedy}"
         )
-    return max(gas.imep - least, 0.0) / efficiency
+    return max(gas.imep - minimum, 0.0) / efficiency
 
 
 def _burn_rate(gas: Wiebe, x: Array) -> Array:

@@ -112,8 +112,8 @@ def page(
             left, bottom = column * (panel[0] + across), (rows - 1 - row) * (panel[1] + lead + gap)
             panels.append(figure.add_axes((left / wide, bottom / high, panel[0] / wide, panel[1] / high)))
             for axis in (panels[-1].xaxis, panels[-1].yaxis):
-                most = 6 if axis is panels[-1].yaxis else min(max(int(panel[0] / _PER_TICK), 3), 7)
-                round_ticks(axis, most)
+                maximum = 6 if axis is panels[-1].yaxis else min(max(int(panel[0] / _PER_TICK), 3), 7)
+                round_ticks(axis, maximum)
     return Page(figure, tuple(panels))
 
 

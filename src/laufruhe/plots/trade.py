@@ -66,8 +66,8 @@ def _drawn(trade: Trade) -> Figure:
         axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(_PLAIN)
     # the band under the axis has its own label
-    least = 1.01 * LEAST_ERROR if min(row.error for row in rows) < LEAST_ERROR else 0.0
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _power(value) if value > least else ""))
+    minimum = 1.01 * LEAST_ERROR if min(row.error for row in rows) < LEAST_ERROR else 0.0
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _power(value) if value > minimum else ""))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_minor_formatter(FuncFormatter(lambda *_: ""))
     _name(axes, rows, times, errors)
@@ -93,16 +93,16 @@ def _places(axes: Axes, errors: Array, times: Array) -> Array:
         taken = {levels[other] for other in order[:j] if across[k] - across[other] < DOT}
         levels[k] = next(level for level in range(len(errors)) if level not in taken)
     band = DOT * (levels.max(initial=0) + 1.5) if small.any() else 0.0
-    least = LEAST_ERROR if small.any() else 0.5 * errors.min()
-    top = 2.0 * max(errors.max(), 2.0 * least)
-    decades = (math.log10(top) - math.log10(least)) / max(high - band, 0.5 * high)
-    axes.set_ylim(least * 10.0 ** (-decades * band), top)
+    minimum = LEAST_ERROR if small.any() else 0.5 * errors.min()
+    top = 2.0 * max(errors.max(), 2.0 * minimum)
+    decades = (math.log10(top) - math.log10(minimum)) / max(high - band, 0.5 * high)
+    axes.set_ylim(minimum * 10.0 ** (-decades * band), top)
     if small.any():
-        axes.axhspan(axes.get_ylim()[0], least, color="#f0f2f4", linewidth=0.0, zorder=0.4)
-        middle = math.sqrt(least * axes.get_ylim()[0])
-        axes.text(-0.02, middle, f"under {_power(least)}", transform=axes.get_yaxis_transform(), ha="right",
+        axes.axhspan(axes.get_ylim()[0], minimum, color="#f0f2f4", linewidth=0.0, zorder=0.4)
+        middle = math.sqrt(minimum * axes.get_ylim()[0])
+        axes.text(-0.02, middle, f"under {_power(minimum)}", transform=axes.get_yaxis_transform(), ha="right",
                   va="center", color=FAINT, size=SMALL)  # fmt: skip
-    return np.where(small, least * 10.0 ** (-decades * DOT * (levels + 0.75)), errors)
+    return np.where(small, minimum * 10.0 ** (-decades * DOT * (levels + 0.75)), errors)
 
 
 def _colour_bar(drawn: Page, dots: PathCollection) -> None:

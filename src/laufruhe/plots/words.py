@@ -98,12 +98,12 @@ def _luminance(colour: str) -> float:
     return float(np.dot((0.2126, 0.7152, 0.0722), linear))
 
 
-def spread(places: Array, least: float, low: float = 0.0, high: float = 1.0) -> Array:
+def spread(places: Array, minimum: float, low: float = 0.0, high: float = 1.0) -> Array:
     """Move places by least squares to a minimum distance within two ends, keeping their order."""
     if len(places) == 0:
         return places
     order = np.argsort(places, kind="stable")
-    steps = least * np.arange(len(places))
+    steps = minimum * np.arange(len(places))
     moved = np.clip(_rising(places[order] - steps), low, max(high - steps[-1], low))
     result = np.empty(len(places))
     result[order] = moved + steps
@@ -124,8 +124,8 @@ def _rising(values: Array) -> Array:
 def label_lines(axes: Axes, heights: Sequence[float], texts: Sequence[str]) -> None:
     """Write names of horizontal lines to the right of the panel, without overlaps."""
     low, high = axes.get_ylim()
-    least = 1.3 * SMALL / _POINTS / (axes.bbox.height / axes.figure.dpi)
-    places = spread((np.asarray(heights, dtype=float) - low) / (high - low), least)
+    minimum = 1.3 * SMALL / _POINTS / (axes.bbox.height / axes.figure.dpi)
+    places = spread((np.asarray(heights, dtype=float) - low) / (high - low), minimum)
     for height, place, text in zip(heights, places, texts, strict=True):
         # the leader ends at the middle of the text's left side
         leader = {"arrowstyle": "-", "color": FAINT, "lw": 0.6, "shrinkA": 0.0, "shrinkB": 0.0, "relpos": (0.0, 0.5)}
@@ -152,11 +152,11 @@ def empty(axes: Axes, words: str) -> None:
     axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", va="center", color=FAINT, size=SMALL)
 
 
-def omitted_words(largest: float, most: float, unit: str) -> str:
+def omitted_words(largest: float, maximum: float, unit: str) -> str:
     """Return what is said of a load too small to draw; empty if it is drawn."""
-    if largest > UNSEEN * most:
+    if largest > UNSEEN * maximum:
         return ""
-    return "zero" if largest <= NOTHING * most else f"at most {number(largest, 2)} {unit}"
+    return "zero" if largest <= NOTHING * maximum else f"at most {number(largest, 2)} {unit}"
 
 
 def separate_texts(texts: Sequence[Text]) -> None:
@@ -170,8 +170,8 @@ def separate_texts(texts: Sequence[Text]) -> None:
                 group.append((text, box))
                 left.remove((text, box))
         heights = np.array([0.5 * (box.y0 + box.y1) for _, box in group])
-        least = 1.15 * max(box.height for _, box in group)
-        moved = spread(heights, least, -math.inf, math.inf)
+        minimum = 1.15 * max(box.height for _, box in group)
+        moved = spread(heights, minimum, -math.inf, math.inf)
         for (text, _), up in zip(group, moved - heights, strict=True):
             if abs(up) > 0.1:
                 text.set_transform(text.get_transform() + Affine2D().translate(0.0, up))
@@ -220,7 +220,7 @@ def grouped(number: str) -> str:
     return integer[: len(integer) - len(digits)] + f"{int(digits):,}".replace(",", THIN_SPACE) + point + rest
 
 
-def round_ticks(axis: Axis, most: int, **more: Any) -> None:
+def round_ticks(axis: Axis, maximum: int, **more: Any) -> None:
     """Set ticks at steps of 1, 2 or 5, their numbers in full."""
-    axis.set_major_locator(MaxNLocator(most, steps=_ROUND, **more))
+    axis.set_major_locator(MaxNLocator(maximum, steps=_ROUND, **more))
     axis.set_major_formatter(PlainNumbers())

@@ -55,8 +55,8 @@ PICTURES: Mapping[str, ResultPicture] = extended(
 )
 
 
-def rows_of(count: int, most: int) -> tuple[list[range], int]:
-    """Split `count` items into rows of at most `most`, of similar length; return the rows and their length."""
-    rows = max(-(-count // max(most, 1)), 1)
+def rows_of(count: int, maximum: int) -> tuple[list[range], int]:
+    """Split `count` items into rows of at most `maximum`, of similar length; return the rows and their length."""
+    rows = max(-(-count // max(maximum, 1)), 1)
     side = max(-(-count // rows), 1)
     return [range(first, min(first + side, count)) for first in range(0, count, side)], side

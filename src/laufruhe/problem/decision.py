@@ -438,9 +438,9 @@ class Domain:
             return np.array([(u * self.set.directions[0].conjugate()).real])
         return np.array([u.real, u.imag])
 
-    def least(self, gradient: Array) -> float:
+    def minimum(self, gradient: Array) -> float:
         """Return min g . x over the set (P4)."""
-        return self.set.least(gradient[self.columns])
+        return self.set.minimum(gradient[self.columns])
 
     def project(self, x: Array) -> Array:
         """Return the point of the set nearest to the columns of x."""

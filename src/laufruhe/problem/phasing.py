@@ -42,22 +42,22 @@ class OrderCriterion(StrEnum):
 class Intervals:
     """Bounds on every firing interval [rad]."""
 
-    least: float
-    most: float
+    minimum: float
+    maximum: float
 
     def holds(self, intervals: Sequence[float], slack: float = 1e-7) -> bool:
         """Return True if all intervals lie within the bounds."""
-        return min(intervals) >= self.least - slack and max(intervals) <= self.most + slack
+        return min(intervals) >= self.minimum - slack and max(intervals) <= self.maximum + slack
 
     @property
     def shown(self) -> str:
         """Text of the bounds."""
-        return f"{math.degrees(self.least):g} to {math.degrees(self.most):g} deg"
+        return f"{math.degrees(self.minimum):g} to {math.degrees(self.maximum):g} deg"
 
     @property
     def forbid_unevenness(self) -> bool:
         """True if the bounds allow equal intervals only."""
-        return self.most - self.least <= 1e-9
+        return self.maximum - self.minimum <= 1e-9
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class ShaftChoice:
         Sets of shafts with coupled unbalances, built together or not at all.
     masses
         Mass of each set without its unbalances [kg].
-    most
+    maximum
         Largest number of shafts; infinite without a limit.
     most_mass
         Largest mass of the shafts [kg].
@@ -106,7 +106,7 @@ class ShaftChoice:
 
     optional: tuple[tuple[str, ...], ...] = ()
     masses: tuple[float, ...] = ()
-    most: float = math.inf
+    maximum: float = math.inf
     most_mass: float = math.inf
     clashes: tuple[tuple[int, ...], ...] = ()
 
@@ -127,7 +127,7 @@ class ShaftChoice:
         number = sum(len(self.optional[k]) for k in built)
         if any(set(clash) <= set(built) for clash in self.clashes):
             return False
-        return number <= self.most and sum(self.masses[k] for k in built) <= self.most_mass * (1.0 + 1e-12)
+        return number <= self.maximum and sum(self.masses[k] for k in built) <= self.most_mass * (1.0 + 1e-12)
 
 
 @dataclass(frozen=True, eq=False)

@@ -55,7 +55,7 @@ class Interval:
         """Return the size and angle [rad] of a value."""
         return (u * self.directions[0].conjugate()).real, self.angle
 
-    def least(self, g: Array) -> float:
+    def minimum(self, g: Array) -> float:
         """Return min g . x over the set."""
         return float(min(g[0] * self.lower, g[0] * self.upper))
 
@@ -115,7 +115,7 @@ class Sector:
         low = self.angles[0]
         return abs(u), low + (cmath.phase(u) - low) % math.tau if u != 0 else low
 
-    def least(self, g: Array) -> float:
+    def minimum(self, g: Array) -> float:
         """Return min g . x over the set: the negative support function of -g (P4)."""
         if self._inside_cone(-g):
             return -self.upper * float(np.hypot(*g))

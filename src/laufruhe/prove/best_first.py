@@ -88,7 +88,7 @@ class BranchAndBound(Generic[P]):
     seen: int
     waiting: list[OpenNode[P]]
     complete: bool
-    _least: float
+    _minimum: float
 
     @property
     def enough(self) -> float:
@@ -119,36 +119,36 @@ class BranchAndBound(Generic[P]):
         """Return the next `count` waiting parts, or fewer, lowest bound first."""
         return heapq.nsmallest(count, self.waiting)
 
-    def divide(self, root: tuple[float, P] | Over, most: int) -> float:
+    def divide(self, root: tuple[float, P] | Over, maximum: int) -> float:
         """Divide parts until the least bound is high enough, no part is left, or as often as is worth it.
 
         Parameters
         ----------
         root
             Bound of all that is open, and that; or that nothing is left of it.
-        most
+        maximum
             Parts, the root one of them.
 
         Returns
         -------
         What no design goes under, raw: the least of the bounds of all parts that are left, or were not worth dividing.
         """
-        self.waiting, self.seen, self._least = [], 1, math.inf
+        self.waiting, self.seen, self._minimum = [], 1, math.inf
         if isinstance(root, Over):
-            self._least = root.level
+            self._minimum = root.level
         else:
             self._check(*root)
             self.waiting.append(OpenNode(root[0], 0, root[1]))
-        return self.further(most)
+        return self.further(maximum)
 
-    def further(self, most: int) -> float:
+    def further(self, maximum: int) -> float:
         """The same with what waits, up to so many parts in all."""
         queue, self.complete = self.waiting, True
         while queue:
             self.look(queue[0].part)
             if self.is_fathomed(queue[0]):
                 break
-            self.complete = self.seen < most and not passed()
+            self.complete = self.seen < maximum and not passed()
             if not self.complete:
                 break
             known = (self.value, queue[0].bound) if self.of_objective else (math.inf, -math.inf)
@@ -159,7 +159,7 @@ class BranchAndBound(Generic[P]):
             for found in self.parts(taken):
                 self.seen += 1
                 if isinstance(found, Over):
-                    self._least = min(self._least, found.level)
+                    self._minimum = min(self._minimum, found.level)
                     continue
                 bound, part = found
                 self._check(bound, part)
@@ -167,8 +167,8 @@ class BranchAndBound(Generic[P]):
                 if bound < self.enough:
                     heapq.heappush(queue, OpenNode(bound, self.seen, part))
                 else:
-                    self._least = min(self._least, bound)
-        return min(queue[0].bound if queue else math.inf, self._least, self.level)
+                    self._minimum = min(self._minimum, bound)
+        return min(queue[0].bound if queue else math.inf, self._minimum, self.level)
 
     def _check(self, bound: float, part: P) -> None:
         if self.known is not None and is_over(bound, self.known.value) and self.holds(part):
@@ -245,14 +245,14 @@ class BoxBisection(BranchAndBound[Box]):
         for k, found in enumerate(self.halved([one.part for one in taken])):
             yield found if isinstance(found, Over) else (max(taken[k // 2].bound, found[0]), found[1])
 
-    def run(self, root: tuple[float, Box] | Over, most: int) -> BoxResult:
+    def run(self, root: tuple[float, Box] | Over, maximum: int) -> BoxResult:
         """Divide the root box, and return the proven bound and the middles of the least boxes left."""
-        return self.found(self.divide(root, most))
+        return self.found(self.divide(root, maximum))
 
     def found(self, bound: float) -> BoxResult:
         """Return a result with this bound, the boxes seen, and the middles of the least boxes left."""
-        least = [one.part for one in self.coming(MOST_PLACES) if one.bound < self.enough]
-        places = tuple(0.5 * (box.lower + box.upper) for box in least)
+        minimum = [one.part for one in self.coming(MOST_PLACES) if one.bound < self.enough]
+        places = tuple(0.5 * (box.lower + box.upper) for box in minimum)
         return BoxResult(bound, self.seen, places)
 
 
@@ -312,19 +312,19 @@ class Around:
 
 
 def divide(
-    search: BoxBounds, lower: Array, upper: Array, value: float, room: float, most: int, known: Known | None = None
+    search: BoxBounds, lower: Array, upper: Array, value: float, room: float, maximum: int, known: Known | None = None
 ) -> BoxResult:  # fmt: skip
     """Halve boxes, the least first, until none may hold a design that is `room` better than `value`."""
-    return next(divide_in_rounds(search, lower, upper, value, room, [most], known))
+    return next(divide_in_rounds(search, lower, upper, value, room, [maximum], known))
 
 
 def divide_in_rounds(
-    search: BoxBounds, lower: Array, upper: Array, value: float, room: float, most: Sequence[int],
+    search: BoxBounds, lower: Array, upper: Array, value: float, room: float, maximum: Sequence[int],
     known: Known | None = None,
 ) -> Iterator[BoxResult]:  # fmt: skip
     """The same up to each of these numbers of boxes, one after the other."""
     division = BoxSearch(search, value, room, known)
-    for k, count in enumerate(most):
+    for k, count in enumerate(maximum):
         found = (
             division.found(division.further(count)) if k else division.run(division.bounded([(lower, upper)])[0], count)
         )

@@ -214,9 +214,9 @@ def lower_bound(problem: AffineProblem, multipliers: Multipliers) -> Bound:
         Any dual rows on that grid; terms are scaled into the dual unit ball.
     """
     under = minorant(problem, multipliers)
-    least = under.constant + sum(domain.least(under.gradient) for domain in problem.domains)
+    minimum = under.constant + sum(domain.minimum(under.gradient) for domain in problem.domains)
     # every term is a norm, so nothing lies under zero
-    return Bound(max(least, 0.0), under.gradient, under.multipliers)
+    return Bound(max(minimum, 0.0), under.gradient, under.multipliers)
 
 
 def excludes(problem: AffineProblem, limits: tuple[Array, ...]) -> bool:
@@ -258,15 +258,15 @@ def check_dual(what: str, value: float, problem: AffineProblem, x: Array, bound:
     x
         Decision vector, in its sets but for a rounding.
     """
-    most = problem.objective(x)
-    if not is_over(value, most):
+    maximum = problem.objective(x)
+    if not is_over(value, maximum):
         return
     prices = bound.multipliers.shadow_prices(problem)
-    most += sum(price * (norm.value(x) - edge) for price, (edge, norm) in zip(prices, problem.limits, strict=True))
+    maximum += sum(price * (norm.value(x) - edge) for price, (edge, norm) in zip(prices, problem.limits, strict=True))
     inside = np.concatenate([np.zeros(0), *(domain.project(x) for domain in problem.domains)])
     sizes = [weight * _size(norm, x) for weight, norm in problem.terms]
     sizes += [price * (edge + _size(norm, x)) for price, (edge, norm) in zip(prices, problem.limits, strict=True)]
-    check_bound(what, value, most, float(np.abs(bound.gradient) @ np.abs(inside - x)) + ROUNDING * sum(sizes))
+    check_bound(what, value, maximum, float(np.abs(bound.gradient) @ np.abs(inside - x)) + ROUNDING * sum(sizes))
 
 
 def _size(norm: AffineNorm, x: Array) -> float:

@@ -43,14 +43,14 @@ class Known:
     read: Callable[[], float] | None = None
 
     @cached_property
-    def most(self) -> float:
+    def maximum(self) -> float:
         """Return the value, read finely where `read` is given, that no bound of a part with the design exceeds."""
         return self.value if self.read is None else self.read()
 
     def check(self, what: str, bound: float) -> None:
         """Report a bound that lies over the design."""
-        if is_over(bound, self.value) and is_over(bound, self.most):
-            check_bound(what, bound, self.most)
+        if is_over(bound, self.value) and is_over(bound, self.maximum):
+            check_bound(what, bound, self.maximum)
 
 
 class Bounder(Protocol[D, P]):

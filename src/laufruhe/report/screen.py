@@ -95,11 +95,11 @@ def _print_grid(console: Console, grid: Table) -> None:
 
 def _parts(grid: Table, width: int) -> Iterator[Sequence[int]]:
     # tables that fit the screen; each begins with the leading text columns
-    least = [least for least, _ in _widths(grid)]
+    minimum = [minimum for minimum, _ in _widths(grid)]
     lead = next(k for k in range(len(grid.head) + 1) if k not in grid.texts or k == len(grid.head) - 1)
     columns = list(range(lead))
     for k in range(lead, len(grid.head)):
-        if len(columns) > lead and sum(least[j] + BETWEEN for j in (*columns, k)) > width + BETWEEN:
+        if len(columns) > lead and sum(minimum[j] + BETWEEN for j in (*columns, k)) > width + BETWEEN:
             yield columns
             columns = list(range(lead))
         columns.append(k)
@@ -111,8 +111,8 @@ def _widths(grid: Table) -> list[tuple[int, int]]:
     for k, head in enumerate(grid.head):
         cells = [row[k] for row in grid.rows]
         words = [piece for text in ([head, *cells] if k in grid.texts else [head]) for piece in text.split()]
-        least = max(map(cell_len, words if k in grid.texts else [*words, *cells]), default=1)
-        widths.append((least, max(map(cell_len, [head, *cells]))))
+        minimum = max(map(cell_len, words if k in grid.texts else [*words, *cells]), default=1)
+        widths.append((minimum, max(map(cell_len, [head, *cells]))))
     return widths
 
 
@@ -121,8 +121,8 @@ def _table(grid: Table, columns: Sequence[int], width: int) -> RichTable:
     widths = [_widths(grid)[k] for k in columns]
     room = width - BETWEEN * (len(columns) - 1)
     # the widest lines are wrapped first
-    caps = range(max(most for _, most in widths), 0, -1)
-    shares = ([min(most, max(least, cap)) for least, most in widths] for cap in caps)
+    caps = range(max(maximum for _, maximum in widths), 0, -1)
+    shares = ([min(maximum, max(minimum, cap)) for minimum, maximum in widths] for cap in caps)
     fitting: Sequence[int | None] = next((share for share in shares if sum(share) <= room), [None] * len(columns))
     for column, column_width in zip(columns, fitting, strict=True):
         side: Literal["left", "right"] = "left" if column in grid.texts else "right"

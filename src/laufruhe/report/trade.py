@@ -58,8 +58,8 @@ OPEN_FLYWHEEL = "the flywheel is open, and a cheap model makes one that breaks i
 def trade_document(trade: Trade, picture: str | None, command: str) -> Document:
     """Return table, picture (if `picture` names one) and choice for one problem."""
     problem = trade.problem
-    initial, least = (figure(value, problem.objective_unit or "", 6) for value in (trade.value, trade.optimum))
-    optimum = "" if math.isnan(trade.optimum) else f", of the optimum {least}"
+    initial, minimum = (figure(value, problem.objective_unit or "", 6) for value in (trade.value, trade.optimum))
+    optimum = "" if math.isnan(trade.optimum) else f", of the optimum {minimum}"
     blocks: list[Block] = [
         Paragraph(
             f"Reference: {REFERENCE_NAME} over the cycle; {problem.objective_name} of the design as given {initial}"

@@ -143,8 +143,8 @@ def explained(result: Result) -> str:
         return "Nothing was decided, so there is nothing to prove."
     if result.status is Status.FAILED:
         bound = figure(c.lower_bound, o.unit, 6)
-        least = f"No design within the bounds and limits has less than {bound}. " if c.is_useful else ""
-        return f"{least}The design found breaks a limit, so that nothing is proven of it."
+        minimum = f"No design within the bounds and limits has less than {bound}. " if c.is_useful else ""
+        return f"{minimum}The design found breaks a limit, so that nothing is proven of it."
     if c.kind is Proof.NONE:
         return f"{result.message[:1].upper()}{result.message[1:]}."
     if c.kind is Proof.LOCAL or not c.is_useful:

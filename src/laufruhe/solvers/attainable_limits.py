@@ -144,7 +144,7 @@ def _answer(limit: Limit, problem: Problem, kinds: Collection[Kind], found: Resu
         held = others if math.isinf(rest.minimum) and math.isinf(rest.maximum) else (*others, rest)
         try:
             if measure.channel.minimised and side == "at most":
-                answer = _least(told, _asking(problem, (Term(measure),), held), solve)
+                answer = _minimum(told, _asking(problem, (Term(measure),), held), solve)
             else:
                 answer = _at_edges(told, own, problem, held, found.status, solve)
         except LaufruheError as error:
@@ -169,7 +169,7 @@ def _asking(problem: Problem, objective: tuple[Term, ...], limits: tuple[Limit, 
     return asked.changed(decisions=moving)
 
 
-def _least(told: AttainableLimit, asked: Problem, solve: Solve) -> _Answer:
+def _minimum(told: AttainableLimit, asked: Problem, solve: Solve) -> _Answer:
     """Return the reached value of a measure by minimising it under the other limits."""
     result = solve(asked)
     if not result.status.has_design or result.objective is None:

@@ -426,18 +426,18 @@ def decided(
     design: Design, bounds: Mapping[str, Price] | None = None, unfelt: float = 0.0
 ) -> tuple[DecisionValue, ...]:
     """Return the decisions of a design, with prices of the bounds that it stands at, where that share is felt."""
-    least = unfelt * design.value
+    minimum = unfelt * design.value
     return tuple(
-        _priced(entry, (bounds or {}).get(entry.name), least)
+        _priced(entry, (bounds or {}).get(entry.name), minimum)
         for decision, value in zip(design.problem.decisions, design.values, strict=True)
         for entry in decision_values(decision, value)
     )
 
 
-def _priced(entry: DecisionValue, price: Price | None, least: float) -> DecisionValue:
+def _priced(entry: DecisionValue, price: Price | None, minimum: float) -> DecisionValue:
     if price is None or not entry.at_bound:
         return entry
-    own = price.felt(least / (max(abs(entry.lower), abs(entry.upper)) or 1.0))
+    own = price.felt(minimum / (max(abs(entry.lower), abs(entry.upper)) or 1.0))
     return replace(entry, shadow_price=own.relaxed, tightening_price=own.other)
 
 

@@ -134,7 +134,7 @@ def _rank(
         name=stage.objective.name,
         unit=stage.objective.unit,
         initial=stage.objective.initial,
-        least=stage.objective.value,
+        minimum=stage.objective.value,
         lower_bound=certificate.lower_bound if certificate else 0.0,
         gap=certificate.gap if certificate else math.inf,
         proof=certificate.kind if certificate else Proof.NONE,

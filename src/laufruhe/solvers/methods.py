@@ -297,8 +297,8 @@ def _without_fixed_limits(problem: Problem, decide: Decide, _: Decide) -> Result
     given = evaluate_start(problem)
     # what cannot be evaluated is refused first
     objective_value(problem, given)
-    problem, least = exclude_collisions(problem, fixed, given)
-    broken = broken_limits(fixed, with_fine_sampling(least))
+    problem, minimum = exclude_collisions(problem, fixed, given)
+    broken = broken_limits(fixed, with_fine_sampling(minimum))
     if broken:
         return infeasible_result(problem, given, broken, {})
     moved = tuple(limit for limit in problem.limits if limit not in fixed)

@@ -65,9 +65,9 @@ class Price:
         """The price as it is tightened, None where that is the same."""
         return None if self.is_one or math.isnan(self.relaxed) else self.tightened
 
-    def felt(self, least: float) -> Price:
+    def felt(self, minimum: float) -> Price:
         """Return it without what is no more than a rounding."""
-        relaxed, tightened = (0.0 if price <= least else price for price in (self.relaxed, self.tightened))
+        relaxed, tightened = (0.0 if price <= minimum else price for price in (self.relaxed, self.tightened))
         return Price(relaxed, tightened)
 
 
@@ -171,20 +171,20 @@ def _ranges(objective: Sequence[Slopes], limits: Sequence[Slopes], edges: Array,
     totals = np.array([each[own].sum(axis=0) for own in numbers[::2]])
     pulled = np.concatenate([columns.T, np.zeros((columns.shape[1], 1))], axis=1)
     above = [pulled - each[last], -pulled - each[last], *(-each[own] for own in numbers[::2]), -each[last:]]
-    most = [np.zeros(sum(map(len, above)))]
+    maximum = [np.zeros(sum(map(len, above)))]
     for k, own in enumerate(numbers[1::2]):
         # a segment of the objective is added once, that of a limit as often as its price
         held = totals[k] if k >= count else np.zeros(last + 1)
         above += [each[own] - held, -each[own] - held]
-        most.append(np.full(2 * len(own), 1.0 if k < count else 0.0))
-    program = _Program(np.concatenate([totals[:count], *above]), np.concatenate([np.ones(count), *most]), count)
-    left = program.least(each[last])
+        maximum.append(np.full(2 * len(own), 1.0 if k < count else 0.0))
+    program = _Program(np.concatenate([totals[:count], *above]), np.concatenate([np.ones(count), *maximum]), count)
+    left = program.minimum(each[last])
     if not left <= BALANCED:
         return None
     program = program.under(each[last], 1.01 * left + _SPARE)
     found = []
     for total, scale in zip(totals[count:], scales[count:], strict=True):
-        low, high = program.least(total), -program.least(-total)
+        low, high = program.minimum(total), -program.minimum(-total)
         if math.isnan(low) or math.isnan(high):
             return None
         found.append(Price(max(low, 0.0) * size / scale, high * size / scale))
@@ -199,11 +199,11 @@ class _Program:
     right: Array
     equal: int
 
-    def under(self, row: Array, most: float) -> _Program:
+    def under(self, row: Array, maximum: float) -> _Program:
         """Return it with one more row."""
-        return replace(self, rows=np.vstack([self.rows, row]), right=np.append(self.right, most))
+        return replace(self, rows=np.vstack([self.rows, row]), right=np.append(self.right, maximum))
 
-    def least(self, cost: Array) -> float:
+    def minimum(self, cost: Array) -> float:
         """Return the least cost; less than any number where it has none, and no number where the solver stopped."""
         import clarabel
 
@@ -260,10 +260,10 @@ def affine_prices(
     solver = found.shadow_prices(problem)
     prices = {
         # no design is under a limit of nothing
-        (limit, "at most"): Price(price, math.inf if most == 0.0 else price)
-        for limit, price, (most, _) in zip(limits, solver, problem.limits, strict=True)
+        (limit, "at most"): Price(price, math.inf if maximum == 0.0 else price)
+        for limit, price, (maximum, _) in zip(limits, solver, problem.limits, strict=True)
     }  # fmt: skip
-    active = [k for k, (most, norm) in enumerate(problem.limits) if norm.value(x) >= most * (1.0 - ACTIVE)]
+    active = [k for k, (maximum, norm) in enumerate(problem.limits) if norm.value(x) >= maximum * (1.0 - ACTIVE)]
     edges = {
         name: (domain.columns, normal)
         for domain in problem.domains

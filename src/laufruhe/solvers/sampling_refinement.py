@@ -102,8 +102,8 @@ def _untold(result: Result) -> float:
     few = replace(own, samples=problem.fidelity.samples)
     limits, many = _coarsely_sampled_limits(problem, few), with_fine_sampling(few)
     # what a search missed at fewer angles than by default is sought at these, wherever the design as given stands
-    least = 0.5 * KEPT * (with_default_sampling(problem).fidelity.samples / few.samples) ** 2
-    return max((max(least, abs(many.standing(x).excess - few.standing(x).excess)) for x in limits), default=0.0)
+    minimum = 0.5 * KEPT * (with_default_sampling(problem).fidelity.samples / few.samples) ** 2
+    return max((max(minimum, abs(many.standing(x).excess - few.standing(x).excess)) for x in limits), default=0.0)
 
 
 def _misread(problem: Problem, evaluation: Evaluation) -> float:

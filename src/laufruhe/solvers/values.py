@@ -73,7 +73,7 @@ class RankValue:
 
     Attributes
     ----------
-    least, lower_bound, gap, proof
+    minimum, lower_bound, gap, proof
         What was found under the limits of those before it, and how good that is.
     initial, final
         Of the design as given, and of that of the last rank.
@@ -88,7 +88,7 @@ class RankValue:
     name: str
     unit: str
     initial: float
-    least: float
+    minimum: float
     lower_bound: float
     gap: float
     proof: Proof
@@ -100,8 +100,8 @@ class RankValue:
     @property
     def equal(self) -> tuple[DecisionRange, ...]:
         """Decisions whose ends are two designs, and not what the solver's tolerance leaves of one."""
-        most = {found.unit: max(abs(d.high) for d in self.designs if d.unit == found.unit) for found in self.designs}
-        return tuple(found for found in self.designs if found.high - found.low > APART * most[found.unit])
+        maximum = {found.unit: max(abs(d.high) for d in self.designs if d.unit == found.unit) for found in self.designs}
+        return tuple(found for found in self.designs if found.high - found.low > APART * maximum[found.unit])
 
 
 @dataclass(frozen=True)

@@ -291,7 +291,7 @@ def _value(domain: Domain, x: Array) -> Value:
 def _throw(phasing: Phasing, k: int) -> Move:
     """Move one throw; the first one is where cylinder 1 fires unless it has bounds of its own (C5)."""
     bounds = phasing.throw_bounds
-    wide = min(phasing.intervals.most - phasing.intervals.least, phasing.even_interval)
+    wide = min(phasing.intervals.maximum - phasing.intervals.minimum, phasing.even_interval)
 
     def move(stand: Stand, share: float) -> Stand | None:
         assert stand.candidate is not None
@@ -431,16 +431,16 @@ def _withheld(problem: Problem, found: Result, witness: Visit, bound: float) -> 
         ranks=_reached(found, witness),
         nearest=None,
     )
-    what, least = "a walk", bound
+    what, minimum = "a walk", bound
     if found.status is Status.INFEASIBLE:
-        what, least = "a walk; it was said that no design keeps the limits", math.inf
-    return without_proof(moved, BoundError(what, least, witness.value))
+        what, minimum = "a walk; it was said that no design keeps the limits", math.inf
+    return without_proof(moved, BoundError(what, minimum, witness.value))
 
 
 def _reached(found: Result, witness: Visit) -> tuple[RankValue, ...]:
     own = found.problem
     values = [objective_value(replace(own, objective=rank.terms), witness.evaluation) for rank in own.ranks]
     return tuple(
-        replace(rank, least=min(rank.least, value) if k == 0 else rank.least, final=value, price=math.nan)
+        replace(rank, minimum=min(rank.minimum, value) if k == 0 else rank.minimum, final=value, price=math.nan)
         for k, (rank, value) in enumerate(zip(found.ranks, values, strict=False))
     )

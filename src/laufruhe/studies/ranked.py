@@ -44,16 +44,16 @@ def side_by_side(data: xr.Dataset, words: str) -> p.Picture:
 
 
 def _panel(title: str, values: np.ndarray, names: list[str]) -> p.Panel:
-    most = float(np.nanmax(values, initial=0.0)) or 1.0
-    least = float(np.nanmin(values, initial=most))
+    maximum = float(np.nanmax(values, initial=0.0)) or 1.0
+    minimum = float(np.nanmin(values, initial=maximum))
     # values over decades need a logarithmic axis
-    low = 10.0 ** math.floor(math.log10(least)) if 0.0 < least < most / SPREAD else 0.0
-    span = math.log(most / low) if low else most
+    low = 10.0 ** math.floor(math.log10(minimum)) if 0.0 < minimum < maximum / SPREAD else 0.0
+    span = math.log(maximum / low) if low else maximum
     known, places = np.isfinite(values), np.arange(len(values), dtype=float)
     marks: list[p.Mark] = [p.Bars(places[known], values[known], 0.62, upright=False)]
     for place, value in zip(places.tolist(), values.tolist(), strict=True):
         is_known = math.isfinite(value)
-        text = number(value, scale=most) if is_known else "not told"
+        text = number(value, scale=maximum) if is_known else "not told"
         at = value if is_known else low
         marks.append(p.Words(at * math.exp(0.03 * span) if low else at + 0.03 * span, place, text))
     ticks = [(float(row), each) for row, each in enumerate(names)]

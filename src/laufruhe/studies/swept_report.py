@@ -166,13 +166,13 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
     single = alone if once is None else np.ones(count, dtype=bool)
     plain = alone | (np.zeros(count, dtype=bool) if once is None else once)
     initial, best = data["objective_given"].values, data["objective"].values
-    most = max(np.nanmax(initial, initial=0.0), np.nanmax(best, initial=0.0))
+    maximum = max(np.nanmax(initial, initial=0.0), np.nanmax(best, initial=0.0))
     marks: list[tuple[float, p.Mark]] = []
     for k in range(count):
         one = [(k + 0.0, best[k], "before" if plain[k] else "after")]
         pair = [(k - 0.2, initial[k], "before"), (k + 0.2, best[k], "after")]
         width = 0.5 if single.all() else 0.36
-        marks += [(bar[0], _bar(*bar, width, most)) for bar in (one if single[k] else pair)]
+        marks += [(bar[0], _bar(*bar, width, maximum)) for bar in (one if single[k] else pair)]
     labels = ["\n".join(part for line in str(label).split("\n") for part in wrap(line, LETTERS)) for label in labels]
     widest = max(len(line) for label in labels for line in str(label).split("\n"))
     each = max(1.15, 0.2 + LETTER * widest)
@@ -196,7 +196,7 @@ def bars(data: xr.Dataset, labels: Any, words: str, once: Any = None) -> p.Pictu
     return p.Picture(data.attrs["title"], words, panels, p.credit(data), size=size, gap=gap, legend=legend)
 
 
-def _bar(place: float, value: float, colour: str, width: float, most: float) -> p.Mark:
+def _bar(place: float, value: float, colour: str, width: float, maximum: float) -> p.Mark:
     if not np.isfinite(value):
-        return p.Words(place, 0.02 * most, "no design", across="center", along="bottom")
-    return p.Bars([place], [value], width, colour, numbers=[figures(without_rounding(value, most))])
+        return p.Words(place, 0.02 * maximum, "no design", across="center", along="bottom")
+    return p.Bars([place], [value], width, colour, numbers=[figures(without_rounding(value, maximum))])

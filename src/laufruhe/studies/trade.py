@@ -151,7 +151,7 @@ def trade(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Trad
     even_only = any(measure.is_inside for measure in problem.measures)
     flywheel = _price_of_constant_speed(problem) if problem.load_terms and not even_only else None
     return Trade(
-        problem, tuple(decided.regretted(row) for row in rows), decided.given, decided.least, flywheel,
+        problem, tuple(decided.regretted(row) for row in rows), decided.given, decided.minimum, flywheel,
         _price_of_time(problem), left_out, is_complete,
     )  # fmt: skip
 
@@ -191,13 +191,13 @@ class _Decided:
     ----------
     given
         Reference objective of the design as given.
-    least
+    minimum
         Reference objective of the best design known that keeps the limits; zero of what cancels, NaN where none is.
     """
 
     def __init__(self, scale: Scale) -> None:
         self._problem = problem = scale.problem
-        self.given, self.least = objective_value(problem, scale.best), math.nan
+        self.given, self.minimum = objective_value(problem, scale.best), math.nan
         self._known: Result | None = None
         at = problem.at(Fidelity(samples=REFERENCE_STEPS))
         engine = None
@@ -215,9 +215,9 @@ class _Decided:
         problem = self._problem
         final = reference(problem, engine)
         value, excess = objective_value(problem, final), final.excess(problem.limits)
-        if excess <= FEASIBLE and not self.least <= value:
+        if excess <= FEASIBLE and not self.minimum <= value:
             # a zero objective has no relative regret
-            self.least = 0.0 if value <= numerical_zero(problem, engine) else value
+            self.minimum = 0.0 if value <= numerical_zero(problem, engine) else value
         return value, excess
 
     def by(self, variant: Problem) -> Engine | None:
@@ -232,7 +232,7 @@ class _Decided:
 
     def regretted(self, row: Row) -> Row:
         """Return a row with its regret; call it after all designs are known."""
-        return replace(row, regret=row.optimum / self.least - 1.0) if self.least > 0.0 else row
+        return replace(row, regret=row.optimum / self.minimum - 1.0) if self.minimum > 0.0 else row
 
 
 def _row(name: str, variant: Problem, scale: Scale, decided: _Decided) -> Row:
@@ -313,13 +313,13 @@ def _price_of_constant_speed(problem: Problem) -> tuple[float, float]:
     for _ in range(12):
         uneven = Fidelity(samples=360, crank_inertia=inertia)
         try:
-            most = max(crank_motion(problem.engine, point, uneven).unevenness for point in problem.points)
+            maximum = max(crank_motion(problem.engine, point, uneven).unevenness for point in problem.points)
         except ModelError:
             inertia *= 4.0
             continue
-        if most < 1e-9 or 0.019 < most < 0.021:
+        if maximum < 1e-9 or 0.019 < maximum < 0.021:
             break
-        inertia *= most / 0.02
+        inertia *= maximum / 0.02
     even, changed = (
         objective_value(problem, evaluate(replace(problem, fidelity=f))) for f in (Fidelity(samples=360), uneven)
     )

@@ -45,5 +45,5 @@ def test_random_economics_have_fronts_that_fall(seed: int, tmp_path: Path) -> No
     built = [set(build.get("shafts", [])) for build in part["builds"]]
     cases = [build.get("case", part["cases"][0]["name"]) for build in part["builds"]]
     for one, own, value in zip(built, cases, optimum[1:], strict=False):
-        for other, its, most in zip(built, cases, optimum[1:], strict=False):
-            assert own != its or not one <= other or most <= value * (1.0 + 2e-4)
+        for other, its, maximum in zip(built, cases, optimum[1:], strict=False):
+            assert own != its or not one <= other or maximum <= value * (1.0 + 2e-4)

@@ -47,8 +47,8 @@ def test_multipliers_of_a_corner_say_the_same_of_other_mounts_as_rows_do(seed: i
         assert np.abs(mine.slope - exact.slope).max() <= 1e-9 * np.abs(exact.slope).max()
     u = generator.normal(size=given.size)
     rows = sum(weight * np.vdot(z, norm.rows(u)) for (weight, norm), z in zip(again.terms, used.terms, strict=True))
-    for (most, norm), z in zip(again.limits, used.limits, strict=True):
-        rows += np.vdot(z, norm.rows(u)) - norm.dual_norm(z) * most
+    for (maximum, norm), z in zip(again.limits, used.limits, strict=True):
+        rows += np.vdot(z, norm.rows(u)) - norm.dual_norm(z) * maximum
     loop, orders = mount_loop(problem, loads.orders.omegas, other, other), loads.orders
     felt = orders.loads[:, 0] + np.einsum("c,wci->wi", u, orders.loads[:, 1:])
     by_orders = pairing.constant + pairing.slopes @ u
@@ -64,11 +64,11 @@ def test_multipliers_of_a_corner_that_keeps_no_limits_call_it_bad(seed: int) -> 
     ((_, mounts),) = boxes_of(problem, generator, 1, 0.5)
     given = MountedLoads(problem).at(mounts)
     x, multipliers = best_at(given)
-    assert all(norm.value(x) <= most * (1.0 + 1e-6) for most, norm in given.limits)
+    assert all(norm.value(x) <= maximum * (1.0 + 1e-6) for maximum, norm in given.limits)
     assert lower_bound(given, multipliers).value == pytest.approx(given.objective(x), rel=1e-3)
-    tight = replace(given, limits=tuple((0.3 * most, norm) for most, norm in given.limits))
+    tight = replace(given, limits=tuple((0.3 * maximum, norm) for maximum, norm in given.limits))
     x, multipliers = best_at(tight)
-    assert any(norm.value(x) > most * 1.01 for most, norm in tight.limits)
+    assert any(norm.value(x) > maximum * 1.01 for maximum, norm in tight.limits)
     # by once the value of these unbalances
     assert lower_bound(tight, multipliers).value > 1.99 * tight.objective(x) > 0.0
 
@@ -125,9 +125,9 @@ def test_the_least_over_unbalances_is_that_of_their_sets() -> None:
             np.concatenate([domain.project(u[domain.columns]) for domain in domains])
             for u in 10.0 * generator.normal(size=(2000, 2))
         ]
-        least = min(float(slopes @ (u - near)) for u in inside)
-        assert boxes.least(slopes, near) <= least + 1e-12
-        assert boxes.least(slopes, near) == pytest.approx(least, rel=0.02, abs=0.02)
+        minimum = min(float(slopes @ (u - near)) for u in inside)
+        assert boxes.minimum(slopes, near) <= minimum + 1e-12
+        assert boxes.minimum(slopes, near) == pytest.approx(minimum, rel=0.02, abs=0.02)
 
 
 @pytest.mark.parametrize("seed", first_fast(SEEDS[:6], 0, 2))
@@ -153,8 +153,8 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
 def test_loads_of_too_many_numbers_have_no_boxes(monkeypatch: pytest.MonkeyPatch) -> None:
     boxes = DesignBoxes(joint(780004), math.inf, lambda *_: math.inf)
     count = boxes.loads.rows * boxes.loads.columns
-    for most, few, worth in ((count, 2, True), (count - 1, 2, False), (count, 10**9, False)):
-        monkeypatch.setattr(design_boxes, "MOST_NUMBERS", most)
+    for maximum, few, worth in ((count, 2, True), (count - 1, 2, False), (count, 10**9, False)):
+        monkeypatch.setattr(design_boxes, "MOST_NUMBERS", maximum)
         monkeypatch.setattr(design_boxes, "FEW", few)
         assert (boxes.most_boxes > 0) is worth
 
@@ -176,7 +176,7 @@ def test_what_is_asked_may_be_crossed(kind: str) -> None:
     table, rng = random_problem("joint", 780004)
     terms, limits = CROSSED[kind]
     table["objective"] = objective([{"quantity": name, "weight": weight} for name, weight in terms])
-    table["constraints"] = [{"limit": name, "max": most} for name, most in limits]
+    table["constraints"] = [{"limit": name, "max": maximum} for name, maximum in limits]
     first = table["operating_points"][0]
     table["operating_points"] = [first, {"name": "faster", "speed": "160 rad/s", "weight": 0.7}]
     problem = laufruhe.load(table)

@@ -74,13 +74,13 @@ def test_one_open_number_is_bounded_by_few_boxes(name: str) -> None:
     ((low, high),) = own.box
     designs = own.designs(np.linspace(low, high, 61)[:, None])
     objective = np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf)
-    least = float(objective.min())
-    (found,) = load_bounds(problem, least, 1e-3 * least, (1.0,))
+    minimum = float(objective.min())
+    (found,) = load_bounds(problem, minimum, 1e-3 * minimum, (1.0,))
     assert found.boxes <= 60
-    assert least * (1.0 - 1e-3) <= found.bound <= least * (1.0 + 1e-6)
+    assert minimum * (1.0 - 1e-3) <= found.bound <= minimum * (1.0 + 1e-6)
     # a better value than any is not shown
-    (found,) = load_bounds(problem, 1.2 * least, 1e-3 * least, (1.0,))
-    assert found.bound <= least * (1.0 + 1e-6)
+    (found,) = load_bounds(problem, 1.2 * minimum, 1e-3 * minimum, (1.0,))
+    assert found.bound <= minimum * (1.0 + 1e-6)
 
 
 @pytest.mark.slow
@@ -109,9 +109,9 @@ def test_a_share_of_the_boxes_is_divided_first() -> None:
     own = Own(tomllib.loads(path.read_text(encoding="utf-8")), 256)
     ((low, high),) = own.box
     designs = own.designs(np.linspace(low, high, 61)[:, None])
-    least = float(np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf).min())
-    few, many = load_bounds(problem, least, 1e-4 * least, (EARLY, 1.0))
+    minimum = float(np.where(designs.excesses.max(axis=1) <= 0.0, designs.objective, np.inf).min())
+    few, many = load_bounds(problem, minimum, 1e-4 * minimum, (EARLY, 1.0))
     assert few.boxes <= 10
-    assert few.bound < least * (1.0 - 1e-4)
+    assert few.bound < minimum * (1.0 - 1e-4)
     assert many.boxes > few.boxes
     assert many.bound > few.bound

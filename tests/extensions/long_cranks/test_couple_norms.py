@@ -74,15 +74,15 @@ def test_couples_say_what_the_exact_model_says(cylinders, cycle, name, gas, tmp_
     assert low == pytest.approx(exact, rel=5e-3)
     assert own.lower_bound(family.space) <= low.min() * (1.0 + 1e-9)
     assert low.max() <= own.upper_bound(family.space)
-    for most in np.quantile(exact, (0.0, 0.1, 0.5, 0.9)):
-        window = own.window(family.space, family.space.patterns[0], most)
+    for maximum in np.quantile(exact, (0.0, 0.1, 0.5, 0.9)):
+        window = own.window(family.space, family.space.patterns[0], maximum)
         couples = star_sums(stars, family.space.phases, family.space.places, (window.order,))[:, 0, 1]
         inside = (np.abs(couples.real) <= window.high.real) & (np.abs(couples.imag) <= window.high.imag)
-        assert inside[exact <= most].all()
+        assert inside[exact <= maximum].all()
         # those over a value may be told by less, never under it
-        told = own.values(family.space, stars, most)
-        assert told[low <= most] == pytest.approx(low[low <= most], rel=1e-12)
-        assert (told[low > most] > most).all()
+        told = own.values(family.space, stars, maximum)
+        assert told[low <= maximum] == pytest.approx(low[low <= maximum], rel=1e-12)
+        assert (told[low > maximum] > maximum).all()
         assert (told <= low * (1.0 + 1e-9)).all()
 
 
@@ -168,6 +168,6 @@ def test_a_plane_meets_its_term_and_is_nowhere_over_it(norm):
     drawn = r.normal(size=(40, 2 * orders))
     assert term.values(drawn) == pytest.approx([by_hand(c) for c in drawn])
     for at in drawn[:4]:
-        least, slope = term.plane(at)
-        assert least + slope @ at == pytest.approx(by_hand(at))
-        assert all(least + slope @ c <= by_hand(c) * (1.0 + 1e-12) for c in drawn)
+        minimum, slope = term.plane(at)
+        assert minimum + slope @ at == pytest.approx(by_hand(at))
+        assert all(minimum + slope @ c <= by_hand(c) * (1.0 + 1e-12) for c in drawn)

@@ -67,8 +67,8 @@ def test_enumeration_equals_plain_permutations(throws):
     space = whole(throws)
     x, steps = np.array(space.places), 2.0 * np.pi * every / throws
     couples = np.stack([np.abs((x * np.exp(1j * h * steps)).sum(axis=1)) for h in (1, 2)])
-    least = np.sqrt(couples[0] ** 2 + (0.25 * couples[1]) ** 2).min()
-    assert enumerate_stars(space, objective).values[0] == pytest.approx(least, rel=1e-12)
+    minimum = np.sqrt(couples[0] ** 2 + (0.25 * couples[1]) ** 2).min()
+    assert enumerate_stars(space, objective).values[0] == pytest.approx(minimum, rel=1e-12)
 
 
 @settings(max_examples=40)

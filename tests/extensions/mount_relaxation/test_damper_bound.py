@@ -60,8 +60,8 @@ def test_no_design_is_under_the_bound_of_a_box(kind: str, norm: str, tmp_path: P
         below = low + generator.random(len(low)) * (1.0 - share) * (high - low)
         given = [below + part * share * (high - low) for part in generator.random((40, len(low)))]
         worth = [objective_value(problem, evaluate(problem, problem.design(x.tolist()))) for x in given]
-        least, best = min(worth), given[int(np.argmin(worth))]
-        boxes = SdpRelaxation(problem, 1.5 * least, 1e-3, best.tolist())
+        minimum, best = min(worth), given[int(np.argmin(worth))]
+        boxes = SdpRelaxation(problem, 1.5 * minimum, 1e-3, best.tolist())
         planes = np.array([in_planes(boxes, x) for x in given])
         ends = np.append(below, planes.min(axis=0)), np.append(below + share * (high - low), planes.max(axis=0))
-        assert tight * least <= boxes.bound(*ends)[0] <= least * (1.0 + 1e-9)
+        assert tight * minimum <= boxes.bound(*ends)[0] <= minimum * (1.0 + 1e-9)

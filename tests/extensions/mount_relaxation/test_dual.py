@@ -60,7 +60,7 @@ class Program:
 def test_both_keep_their_conditions_and_meet(seed: int, kind: Any) -> None:
     program = Program(seed)
     for cost in program.costs:
-        x, z, least = program.solver(kind).solve(cost)
+        x, z, minimum = program.solver(kind).solve(cost)
         slack = program.right - program.rows @ x
         assert np.abs(slack[:3]).max() < 1e-6
         assert slack[3 : 3 + 2 * COUNT].min() > -1e-6
@@ -72,7 +72,7 @@ def test_both_keep_their_conditions_and_meet(seed: int, kind: Any) -> None:
             assert np.linalg.eigvalsh(matrix_of(left[own], SIZE)).min() > -1e-6
         assert z[3 : 3 + 2 * COUNT].min() > -1e-6
         assert z[-4] - np.linalg.norm(z[-3:]) > -1e-6
-        assert least == cost @ x == pytest.approx(-program.right @ z, abs=1e-5)
+        assert minimum == cost @ x == pytest.approx(-program.right @ z, abs=1e-5)
 
 
 def test_what_is_larger_stands_in_a_program_once() -> None:

@@ -19,15 +19,15 @@ from laufruhe.problem.evaluation import evaluate, objective_value
 @pytest.mark.slow
 def test_whoever_works_them_out() -> None:
     problem = decoupled(3)
-    best, least = min(designs_about(problem, NEAR[:3], 30), key=lambda pair: pair[1])
+    best, minimum = min(designs_about(problem, NEAR[:3], 30), key=lambda pair: pair[1])
     found = []
     with ThreadPoolExecutor(3) as pool:
         for executor in (SERIAL, pool):
             with working_on(executor), bounds_ahead() as ahead:
-                boxes = SdpRelaxation(problem, 1.02 * least, 1e-3, best.tolist(), ahead)
+                boxes = SdpRelaxation(problem, 1.02 * minimum, 1e-3, best.tolist(), ahead)
                 box, solved = narrowed(boxes, boxes.lower, boxes.upper, np.ones(len(boxes.lower)))
                 assert box is not None
-                found.append((box, solved, spring_bound(problem, least, 1e-2 * least, best.tolist()).bound))
+                found.append((box, solved, spring_bound(problem, minimum, 1e-2 * minimum, best.tolist()).bound))
                 # those that are asked for are foreseen, though some are not asked for any more
                 assert (ahead.hits > solved // 2) == (executor is pool)
     (box, solved, bound), (other, counted, proven) = found
@@ -39,14 +39,14 @@ def test_whoever_works_them_out() -> None:
 def test_aims_are_those_of_their_own_program_and_box() -> None:
     """Whatever was stated, or looked at, before."""
     problem = decoupled(2)
-    best, least = min(designs_about(problem, NEAR[:2], 6), key=lambda pair: pair[1])
-    boxes, anew = (SdpRelaxation(problem, 1.02 * least, 1e-3, best.tolist()) for _ in range(2))
+    best, minimum = min(designs_about(problem, NEAR[:2], 6), key=lambda pair: pair[1])
+    boxes, anew = (SdpRelaxation(problem, 1.02 * minimum, 1e-3, best.tolist()) for _ in range(2))
     middle = 0.5 * (boxes.lower + boxes.upper)
     boxes.bound(boxes.lower, middle)
     half, whole = (boxes.cut_off(boxes.lower, upper)[0] for upper in (middle, boxes.upper))
     aim = np.eye(whole.numbers + 5 * len(boxes.modes))[0]
     found = [Objectives(program, None).bound(0, aim)[0] for program in (whole, half, whole)]
-    alone = [ConeProgram(program).least(aim)[0] for program in (anew.cut_off(boxes.lower, boxes.upper)[0], half)]
+    alone = [ConeProgram(program).minimum(aim)[0] for program in (anew.cut_off(boxes.lower, boxes.upper)[0], half)]
     assert found == [*alone, alone[0]]
     assert alone[0] != alone[1]
 
@@ -58,5 +58,5 @@ def test_roots_of_a_box_are_not_taken_for_those_of_a_wider_one(tmp_path: Path) -
     boxes, anew = (SdpRelaxation(problem, value, 1e-3, near) for _ in range(2))
     at, aim = boxes.lower + 0.9 * (boxes.upper - boxes.lower), np.eye(len(boxes.lower))[0]
     boxes.bound(at, boxes.upper)
-    found, alone = (ConeProgram(one.cut_off(one.lower, one.upper)[0]).least(aim)[0] for one in (boxes, anew))
+    found, alone = (ConeProgram(one.cut_off(one.lower, one.upper)[0]).minimum(aim)[0] for one in (boxes, anew))
     assert found == alone

@@ -31,13 +31,13 @@ ASKED = {
 UNITS = {"rms": " m", "mean": " N", "maximum": " m"}
 
 
-def limited(name: str, most: float) -> Problem:
+def limited(name: str, maximum: float) -> Problem:
     """Three springs of the powertrain open, force at speed against something at idle."""
     tables = powertrain("2", "3 Hz", 3)
     tables["operating_points"] = [{"name": "idle", "speed": "800 rpm"}, {"name": "fast", "speed": "1500 rpm"}]
     tables["objective"] |= {"operating_points": ["fast"], "minimise": "rms mount travel"}
     tables["fidelity"] = {"samples": 144}
-    tables["constraints"].append({**ASKED[name], "max": f"{most:.9g}{UNITS.get(name, '')}"})
+    tables["constraints"].append({**ASKED[name], "max": f"{maximum:.9g}{UNITS.get(name, '')}"})
     return load(tables)
 
 
@@ -62,22 +62,22 @@ def test_no_design_that_keeps_a_limit_is_under_the_bound(name: str) -> None:
     """Beside multipliers of a solver also spoilt ones; without the limit there is less to prove, or as much."""
     designs = drawn(limited(name, 1e6), 150)
     problem = limited(name, float(np.quantile([each for *_, each in designs], 0.12)))
-    generator, most = np.random.default_rng(9), asked_limit(problem).maximum
-    kept = [(x, value, each) for x, value, each in designs if each <= most]
+    generator, maximum = np.random.default_rng(9), asked_limit(problem).maximum
+    kept = [(x, value, each) for x, value, each in designs if each <= maximum]
     assert len(kept) > 5
-    least, near = min(value for _, value, _ in kept), max(kept, key=lambda each: each[2])[0]
-    boxes = SdpRelaxation(problem, 1.3 * least, 1e-3, near.tolist())
+    minimum, near = min(value for _, value, _ in kept), max(kept, key=lambda each: each[2])[0]
+    boxes = SdpRelaxation(problem, 1.3 * minimum, 1e-3, near.tolist())
     assert boxes.limits.norms or boxes.limits.ratios
     bound = boxes.relax(boxes.lower, boxes.upper)[0]
     program, _ = boxes.cut_off(boxes.lower, boxes.upper)
     boxes.limits = Limits((), ())
     without = boxes.relax(boxes.lower, boxes.upper)[0]
-    assert (1.0 - 1e-3) * without <= bound <= least
+    assert (1.0 - 1e-3) * without <= bound <= minimum
     # least s of all that is better than the best known
     own = replace(program, objective=np.eye(program.numbers)[0])
     told = ConeProgram(own).solve(own).multipliers
     half, middle = 0.5 * (boxes.upper - boxes.lower), 0.5 * (boxes.upper + boxes.lower)
-    smallest = min((x[0] - middle[0]) / half[0] for x, value, _ in kept if value <= 1.3 * least)
+    smallest = min((x[0] - middle[0]) / half[0] for x, value, _ in kept if value <= 1.3 * minimum)
     assert proven_bound(own, told) <= smallest
     for by in (0.5, 1.0, 2.0):
         worse = replace(
@@ -96,8 +96,8 @@ def test_a_limit_that_holds_the_best_design_back_raises_the_bound() -> None:
         problem = limited(name, 0.98 * min(designs, key=lambda each: each[1])[2])
         kept = [(value, x) for x, value, each in designs if each <= asked_limit(problem).maximum]
         if kept:
-            least, x = min(kept, key=lambda each: each[0])
-            boxes = SdpRelaxation(problem, 1.2 * least, 1e-3, x.tolist())
+            minimum, x = min(kept, key=lambda each: each[0])
+            boxes = SdpRelaxation(problem, 1.2 * minimum, 1e-3, x.tolist())
             with_limit = boxes.relax(boxes.lower, boxes.upper)[0]
             boxes.limits = Limits((), ())
             raised.append(with_limit / boxes.relax(boxes.lower, boxes.upper)[0])
@@ -192,7 +192,7 @@ def test_a_half_of_the_motions_may_have_nothing_open() -> None:
     assert result.certificate is not None
     assert result.certificate.kind is Proof.GLOBAL
     others = [remounted(given, problem.design([x])) for x in np.geomspace(47e3, 940e3, 30)]
-    least = min(objective_value(problem, each) for each in others if each.excess(problem.limits) <= 0.0)
-    assert result.certificate.lower_bound <= least
+    minimum = min(objective_value(problem, each) for each in others if each.excess(problem.limits) <= 0.0)
+    assert result.certificate.lower_bound <= minimum
     assert result.objective is not None
-    assert result.objective.value <= least * (1.0 + 1e-6)
+    assert result.objective.value <= minimum * (1.0 + 1e-6)

@@ -112,13 +112,13 @@ def test_sides_hold_whatever_a_solver_proposes() -> None:
     """Least s and least w of all designs that are better than one, by multipliers at random too."""
     problem, generator = decoupled(4), np.random.default_rng(11)
     designs = designs_about(problem, NEAR, 12)
-    best, least = min(designs, key=lambda pair: pair[1])
-    boxes = SdpRelaxation(problem, 1.1 * least, 1e-3, best.tolist())
+    best, minimum = min(designs, key=lambda pair: pair[1])
+    boxes = SdpRelaxation(problem, 1.1 * minimum, 1e-3, best.tolist())
     program, mounts = boxes.cut_off(boxes.lower, boxes.upper)
     assert len(program.modes) == 2
     stated = ConeProgram(program)
     half = 0.5 * (boxes.upper - boxes.lower)
-    inside = [x for x, value in designs if value <= 1.1 * least]
+    inside = [x for x, value in designs if value <= 1.1 * minimum]
     for number in (0, 2):
         own: Program = replace(program, objective=np.eye(program.numbers + 10)[number])
         told: Solution = stated.solve(own)
@@ -127,7 +127,7 @@ def test_sides_hold_whatever_a_solver_proposes() -> None:
         smallest = min((x[side] - 0.5 * (boxes.lower + boxes.upper)[side]) / half[side] for x in inside)
         assert -1.01 <= proven_bound(own, told.multipliers) <= smallest
         # by the solver of the aim before, as exactly as it is worth
-        proven, stands = stated.least(np.eye(program.numbers + 10)[number])
+        proven, stands = stated.minimum(np.eye(program.numbers + 10)[number])
         assert proven_bound(own, told.multipliers) - 0.05 < proven <= min(smallest, stands[number] + 0.05)
         for by, noise in ((2.0, 0.0), (1.0, 1e-3), (0.0, 1.0), (0.0, 0.0)):
             assert proven_bound(own, spoilt(told.multipliers, by, noise, generator)) <= smallest
@@ -138,12 +138,12 @@ def test_a_narrowed_box_keeps_all_better_designs_and_halves_are_dropped_rightly(
     """And what is proven of the whole is not over the best of them."""
     problem = decoupled(4)
     designs = designs_about(problem, NEAR, 60)
-    best, least = min(designs, key=lambda pair: pair[1])
-    boxes = SdpRelaxation(problem, 1.02 * least, 1e-3, best.tolist())
+    best, minimum = min(designs, key=lambda pair: pair[1])
+    boxes = SdpRelaxation(problem, 1.02 * minimum, 1e-3, best.tolist())
     found, _ = narrowed(boxes, boxes.lower, boxes.upper, np.ones(len(boxes.lower)))
     assert found is not None
     for x, value in designs:
-        if value <= 1.02 * least:
+        if value <= 1.02 * minimum:
             assert np.all((found[0][:4] <= x) & (x <= found[1][:4]))
     assert np.prod((found[1] - found[0])[:4] / (boxes.upper - boxes.lower)[:4]) < 0.5
-    assert 0.0 < spring_bound(problem, least, 1e-2 * least, best.tolist()).bound <= least
+    assert 0.0 < spring_bound(problem, minimum, 1e-2 * minimum, best.tolist()).bound <= minimum

@@ -42,7 +42,7 @@ def known(problem: Problem) -> OpenMounts:
     return open_mounts(problem, *designs(problem, 0))
 
 
-def least(matrix: np.ndarray) -> float:
+def minimum(matrix: np.ndarray) -> float:
     return float(np.linalg.eigvalsh(matrix)[0])
 
 
@@ -54,8 +54,8 @@ def test_no_stiffness_of_a_box_is_outside_of_what_is_known(tmp_path: Path, place
         mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
         own = mounts.root @ mounting.stiffness @ mounts.root.T
         size = float(np.linalg.norm(own))
-        assert least(mounts.most - own) >= -1e-9 * size
-        assert least(own - mounts.least) >= -1e-9 * size
+        assert minimum(mounts.maximum - own) >= -1e-9 * size
+        assert minimum(own - mounts.minimum) >= -1e-9 * size
 
 
 def test_mounts_that_mirror_each_other_move_in_two_halves(tmp_path: Path) -> None:
@@ -63,7 +63,7 @@ def test_mounts_that_mirror_each_other_move_in_two_halves(tmp_path: Path) -> Non
     whole = known(problem_of(tmp_path, ENGINE, BLOCK, MOUNTS, RMS))
     parts = split_mounts(whole)
     assert [part.size for part in parts] == [3, 3]
-    for side in ("least", "most"):
+    for side in ("minimum", "maximum"):
         values = np.concatenate([np.linalg.eigvalsh(getattr(part, side)) for part in parts])
         assert np.sort(values) == pytest.approx(np.linalg.eigvalsh(getattr(whole, side)), rel=1e-9)
 
@@ -76,9 +76,9 @@ def test_limits_on_frequencies_are_those_of_the_stiffness(tmp_path: Path) -> Non
         mounting = mounting_in(problem.design(x.tolist(), problem.mount_decisions))
         own, hertz = mounts.root @ mounting.stiffness @ mounts.root.T, mounting.modes.frequencies
         if abs(hertz[0] / 4.0 - 1.0) > 1e-3:
-            assert (least(own - floor) > 0.0) == (hertz[0] > 4.0)
+            assert (minimum(own - floor) > 0.0) == (hertz[0] > 4.0)
         if abs(hertz[-1] / 16.0 - 1.0) > 1e-3:
-            assert (least(ceiling - own) > 0.0) == (hertz[-1] < 16.0)
+            assert (minimum(ceiling - own) > 0.0) == (hertz[-1] < 16.0)
         seen.add((bool(hertz[0] > 4.0), bool(hertz[-1] < 16.0)))
     assert len(seen) >= 2
 

@@ -340,11 +340,11 @@ def test_no_design_in_a_box_is_under_its_bound(name: str, limits: str, tmp_path:
     for share in (1.0, 0.02):
         below = np.clip(centre - 0.5 * share * (high - low), low, high - share * (high - low))
         above = below + share * (high - low)
-        best, least = min(designs_of(problem, below, above, 40, 6), key=lambda pair: pair[1])
+        best, minimum = min(designs_of(problem, below, above, 40, 6), key=lambda pair: pair[1])
         # what is known is a design that others of the box are better than
-        bound = SdpRelaxation(problem, 1.2 * least, 1e-3, best.tolist()).relax(below, above)[0]
-        assert bound <= least * (1.0 + 1e-9)
-        tight = max(tight, bound / least)
+        bound = SdpRelaxation(problem, 1.2 * minimum, 1e-3, best.tolist()).relax(below, above)[0]
+        assert bound <= minimum * (1.0 + 1e-9)
+        tight = max(tight, bound / minimum)
     assert tight > 0.8
 
 
@@ -393,17 +393,17 @@ def test_no_design_of_mounts_and_unbalances_is_under_the_bound(norm: str, tmp_pa
             given.append((objective_value(problem, each), values))
     assert len(domains) == 2
     assert len(given) > 20
-    least, best = min(given, key=lambda pair: pair[0])
-    boxes = SdpRelaxation(problem, 1.2 * least, 1e-3, best)
+    minimum, best = min(given, key=lambda pair: pair[0])
+    boxes = SdpRelaxation(problem, 1.2 * minimum, 1e-3, best)
     low, high = boxes.lower.copy(), boxes.upper.copy()
-    assert boxes.relax(low, high)[0] <= least
+    assert boxes.relax(low, high)[0] <= minimum
     # about the best of them, its place held
     held = [*("position" in d.name for d in problem.mount_decisions), False, False, False]
     width = np.where(held, 0.0, 1e-3 * (high - low))
     near = np.clip(boxes.near, low + width, high - width)
     bound = boxes.relax(near - width, near + width)[0]
     # the unbalances may cancel the one order that others than root mean squares are shown by
-    assert (0.3 * least if norm == "rms" else 0.0) <= bound <= least
+    assert (0.3 * minimum if norm == "rms" else 0.0) <= bound <= minimum
 
 
 @pytest.mark.parametrize("name", ["rms", pytest.param("means", marks=pytest.mark.slow)])
@@ -412,8 +412,8 @@ def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, mon
     problem = asked_for(tmp_path, ASKED.get(name, MEANS), LIMITS, mounts=DAMPED if name == "means" else TURNED)
     low, high = (np.array([getattr(d, side) for d in problem.mount_decisions]) for side in ("lower", "upper"))
     high = low + 0.2 * (high - low)
-    best, least = min(designs_of(problem, low, high, 200, 1), key=lambda pair: pair[1])
-    boxes, generator = SdpRelaxation(problem, 1.5 * least, 1e-3, best.tolist()), np.random.default_rng(3)
+    best, minimum = min(designs_of(problem, low, high, 200, 1), key=lambda pair: pair[1])
+    boxes, generator = SdpRelaxation(problem, 1.5 * minimum, 1e-3, best.tolist()), np.random.default_rng(3)
     # roots of a mean narrow each other on the whole of what is divided
     boxes.lower, boxes.upper = low, high
 
@@ -441,7 +441,7 @@ def test_a_bound_holds_whatever_a_solver_proposes(name: str, tmp_path: Path, mon
     for wrong in ways[: 1 if name == "means" else 4]:
         monkeypatch.setattr(ConeProgram, "solve", wrong)
         boxes._reset()
-        assert boxes.relax(low, high)[0] <= least
+        assert boxes.relax(low, high)[0] <= minimum
 
 
 def test_a_mean_is_shown_by_its_strongest_order_less_odd_multiples() -> None:
@@ -565,13 +565,13 @@ def test_no_local_search_finds_less_than_the_bound_of_six_springs() -> None:
     best = np.log(np.array([decision.value for decision in result.decisions]) / low) / np.log(high / low)
     starts = [0.95 * best + 0.02, *np.random.default_rng(7).random((2, 6))]
     ends = [minimize(worth, start, method="Nelder-Mead", options={"maxfev": 150}) for start in starts]
-    least = min(float(end.fun) for end in ends)
-    assert least >= bound * (1.0 - 1e-6)
+    minimum = min(float(end.fun) for end in ends)
+    assert minimum >= bound * (1.0 - 1e-6)
     assert result.certificate.kind is Proof.GLOBAL
     assert result.objective is not None
     few, value = replace(problem, search=replace(problem.search, boxes=4)), result.objective.value
     asked = spring_bound(few, 1.1 * value, 1e-3 * value, [decision.value for decision in result.decisions])
-    assert 0.999 * value < asked.bound <= min(value, least) * (1.0 + 1e-9)
+    assert 0.999 * value < asked.bound <= min(value, minimum) * (1.0 + 1e-9)
 
 
 @pytest.mark.slow

@@ -189,9 +189,9 @@ class TestSeveralCylinders:
 
     @pytest.mark.parametrize("mounting", ["short", "long"])
     def test_largest_force_of_six_is_least_and_of_four_worst(self, worth: Worth, mounting: str) -> None:
-        most = {z: float(worth("fig-12", f"max(most['{z} {mounting}'])")) for z in (2, 3, 4, 6)}
+        maximum = {z: float(worth("fig-12", f"max(most['{z} {mounting}'])")) for z in (2, 3, 4, 6)}
         mean = {z: float(worth("fig-12", f"mean['{z} {mounting}']")) for z in (2, 3, 4, 6)}
-        assert min(most, key=most.__getitem__) == 6
+        assert min(maximum, key=maximum.__getitem__) == 6
         assert max(mean, key=mean.__getitem__) == 4
 
     def test_long_mounting_loads_the_front_of_four_more(self, worth: Worth) -> None:

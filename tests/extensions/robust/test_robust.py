@@ -188,9 +188,9 @@ def test_share_of_engines(problem: Problem, result: Result) -> None:
         assert level(moved) >= worst(shared) * (1.0 - 3e-4)
 
 
-def limited(read: Callable[[str], Problem], most: float) -> tuple[Problem, _Program]:
+def limited(read: Callable[[str], Problem], maximum: float) -> tuple[Problem, _Program]:
     """A limit of the shaking force, and the program of engines as drawn."""
-    limit = f'[[constraints]]\nlimit = "maximum shaking force"\nmax = "{most} N"\n'
+    limit = f'[[constraints]]\nlimit = "maximum shaking force"\nmax = "{maximum} N"\n'
     problem = read(TEXT + ROBUST + limit)
     program = _Program(problem, 0.0)
     program.add([np.zeros(tolerances_of(problem).count)])
@@ -239,7 +239,8 @@ def test_limits_are_kept_by_every_engine(read: Callable[[str], Problem]) -> None
     found = solve(tight)
     assert found.limits[0].value <= 1900.0 * (1.0 + 1e-5)
     wide, narrow = (
-        worst(solve(replace(tight, limits=(replace(tight.limits[0], maximum=most),)))) for most in (1930.0, 1870.0)
+        worst(solve(replace(tight, limits=(replace(tight.limits[0], maximum=maximum),))))
+        for maximum in (1930.0, 1870.0)
     )
     assert found.limits[0].shadow_price == pytest.approx((narrow - wide) / 60.0, rel=0.05, abs=1e-6)
     for z in itertools.product((-1.0, 1.0), repeat=6):
@@ -347,8 +348,8 @@ def test_what_bends_loads_is_drawn(read: Callable[[str], Problem]) -> None:
     assert not found.details.exact
     values = unbalances_of(problem, found)
     engines = (with_errors(problem, z) for z in tolerances_of(problem).draw(np.random.default_rng(1), 30))
-    most = max(objective_value(own, evaluate(own, own.design(values), found.final.samples)) for own in engines)
-    assert most == pytest.approx(worst(found), rel=1e-9)
+    maximum = max(objective_value(own, evaluate(own, own.design(values), found.final.samples)) for own in engines)
+    assert maximum == pytest.approx(worst(found), rel=1e-9)
 
 
 @pytest.mark.slow

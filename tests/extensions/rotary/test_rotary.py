@@ -275,8 +275,8 @@ class TestApexes:
         phi = np.linspace(0.0, 3 * math.tau, 100001)
         ahead, here, behind = (_housing((phi + shift) / 3.0) for shift in (step, 0.0, -step))
         assert values["apex speed"] == pytest.approx(speed * np.abs((ahead - behind) / (2 * step)).max(), rel=1e-6)
-        most = np.abs((ahead + behind - 2 * here) / step**2).max()
-        assert values["apex acceleration"] == pytest.approx(speed**2 * most, rel=1e-6)
+        maximum = np.abs((ahead + behind - 2 * here) / step**2).max()
+        assert values["apex acceleration"] == pytest.approx(speed**2 * maximum, rel=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -119,7 +119,7 @@ def of_seed(seed: int) -> Boxes:
     return Boxes(seed)
 
 
-def least(under: LinearBound) -> Array:
+def minimum(under: LinearBound) -> Array:
     found = under.value - under.rest - np.abs(under.slopes).sum(axis=1)
     return np.where(np.isfinite(found), found, -np.inf)
 
@@ -139,7 +139,7 @@ def test_no_design_of_a_box_is_under_its_bound(seed: int) -> None:
             share = (x - boxes.lower[box]) / half - 1.0
             lines = np.array([u.value[box] - u.rest[box] + u.slopes[box] @ share for u in found])
             assert np.all(lines[np.isfinite(lines)] <= values[np.isfinite(lines)] * (1.0 + 1e-9))
-        bounds = np.array([least(under)[box] for under in found])
+        bounds = np.array([minimum(under)[box] for under in found])
         assert np.all(bounds <= best * (1.0 + 1e-9))
         tight.append(bounds / best)
     assert np.min(tight[0]) > 0.9
@@ -154,7 +154,7 @@ def test_a_smaller_box_has_no_worse_bound_and_is_known_to_its_cube(seed: int) ->
     width = sizes[:, None] * np.minimum(middle - boxes.model.lower, boxes.model.upper - middle)
     for number, measure in enumerate(OF_RUNS):
         found = boxes.runs.under(measure, middle - width, middle + width)
-        bounds = least(found)
+        bounds = minimum(found)
         assert np.all(np.diff(np.maximum(bounds, 0.0)) >= -1e-9 * bounds[-1])
         assert bounds[-1] == pytest.approx(boxes.values(middle[0])[number], rel=1e-5)
         # squares are in the rest as well, as far as they are under
@@ -179,7 +179,7 @@ def test_the_place_and_time_with_the_highest_bound_is_taken(seed: int) -> None:
             size[box, p, t] - sum(abs(slopes[box, :, p, t])) - sum(bent[box, :, p, t]) - rest[box, p, t]
             for p in range(places) for t in range(times)
         ]  # fmt: skip
-        assert least(found)[box] == pytest.approx(max(each), rel=1e-12)
+        assert minimum(found)[box] == pytest.approx(max(each), rel=1e-12)
 
 
 @pytest.mark.slow
@@ -188,7 +188,7 @@ def test_scipy_reaches_what_boxes_are_not_under() -> None:
     boxes = of_seed(3)
     problem, run = boxes.problem, boxes.problem.engine.extra(Run)
     assert run is not None
-    bounds = np.array([least(boxes.runs.under(measure, boxes.lower, boxes.upper)) for measure in OF_RUNS])
+    bounds = np.array([minimum(boxes.runs.under(measure, boxes.lower, boxes.upper)) for measure in OF_RUNS])
     inertia, gas = run_loads(problem.engine, problem.points[0], problem.fidelity)
     for box in range(2):
         for x in boxes.designs(box, 4):
@@ -289,7 +289,7 @@ def test_what_orders_leave_of_forces_is_no_more_than_is_told() -> None:
     for shares in ((1.0, 1.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
         own, curved, left = (share * each for share, each in zip(shares, (first, bends, rest), strict=True))
         of = SimpleNamespace(count=boxes, first=own, maps=SimpleNamespace(bends=curved, rest=left))
-        told, most = _force(of, middle, by, bent), np.zeros((boxes, times))
+        told, maximum = _force(of, middle, by, bent), np.zeros((boxes, times))
         for s in np.vstack([r.uniform(-1.0, 1.0, (20, sides)), r.choice([-1.0, 1.0], (20, sides))]):
             products = np.array([s[j] * s[k] for j, k in pairs])
             once, twice = np.einsum("j,bjmt->bmt", s, by), np.einsum("p,bpmt->bmt", products, bent)
@@ -297,9 +297,9 @@ def test_what_orders_leave_of_forces_is_no_more_than_is_told() -> None:
             force += np.einsum("p,bpnm,bmt->bnt", products, curved, (once + twice)[:, n:])
             unknown = r.choice([-1.0, 1.0], left.shape) * left
             force += unknown @ (middle + once + twice)[:, n:]
-            most = np.maximum(most, np.linalg.norm(force, axis=1))
-        assert np.all(most <= told * (1.0 + 1e-12))
-        assert np.all(told <= 30.0 * most)
+            maximum = np.maximum(maximum, np.linalg.norm(force, axis=1))
+        assert np.all(maximum <= told * (1.0 + 1e-12))
+        assert np.all(told <= 30.0 * maximum)
     # where nothing has a sign of its own the corner has all of what bends tell
     curved, by, bent = (np.abs(each) for each in (bends, by, bent))
     of = SimpleNamespace(count=boxes, first=0.0 * first, maps=SimpleNamespace(bends=curved, rest=0.0 * rest))
@@ -316,12 +316,12 @@ def test_a_box_that_reaches_to_a_free_block_is_not_bounded() -> None:
     problem = load_tables(told, Path("loose.toml"))
     model = BoxModel(problem, evaluate_start(problem))
     found = RunBoxes(model, OF_RUNS).under(OF_RUNS[1], model.lower[None], model.upper[None])
-    assert least(found)[0] == -np.inf
+    assert minimum(found)[0] == -np.inf
 
 
-def stopped(most: str, stiffness: str = "300 N/mm", **more: Any) -> Problem:
+def stopped(maximum: str, stiffness: str = "300 N/mm", **more: Any) -> Problem:
     """With stops at 1.1 mm, and a limit of travel."""
-    told = random_tables(7, constraints=[{"limit": "run-up travel", "max": most}], **more)
+    told = random_tables(7, constraints=[{"limit": "run-up travel", "max": maximum}], **more)
     for place in told["mounts"]["places"]:
         place["stop"] = {"gap": "1.1 mm", "stiffness": stiffness}
     return load_tables(told, Path("stopped.toml"))
@@ -385,8 +385,8 @@ def test_no_design_of_a_grid_is_under_the_bound(
     if limit is not None:
         name, unit, scale = limit
         measure = next(m for m in OF_RUNS if m.name == name)
-        most = float(np.quantile([design.value(measure) for design in designs], 0.2))
-        problem = random_problem(seed, **asked, constraints=[{"limit": name, "max": f"{most * scale} {unit}"}])
+        maximum = float(np.quantile([design.value(measure) for design in designs], 0.2))
+        problem = random_problem(seed, **asked, constraints=[{"limit": name, "max": f"{maximum * scale} {unit}"}])
     values = [objective_value(problem, d) for d in designs if d.excess(problem.limits) <= 0.0]
     value = min(values)
     result = laufruhe.solve(problem)

@@ -34,7 +34,7 @@ SHORT = {"up_to": "1500 rpm", "time": "0.8 s", "shut_down_time": "1 s"}
 
 def problem_of(*limits: tuple[str, str], **more: Any) -> Problem:
     whole = {**tables_of(READY), "fidelity": {"samples": 120}, "run_up": SHORT}
-    whole["constraints"] = [{"limit": quantity, "max": most} for quantity, most in limits]
+    whole["constraints"] = [{"limit": quantity, "max": maximum} for quantity, maximum in limits]
     return load_tables({**whole, **more}, Path("single.toml"))
 
 

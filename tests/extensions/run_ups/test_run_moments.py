@@ -32,7 +32,7 @@ def test_moments_are_integrals_of_the_polynomials_and_sizes_are_over_them(place:
     ahead = -place % times
     assert found.count == (ahead + sweep.count) // times
     for long in range(found.count):
-        moments, push, most = np.zeros((MOMENTS, 6)), 0.0, 0.0
+        moments, push, maximum = np.zeros((MOMENTS, 6)), 0.0, 0.0
         for k in range(times):
             step = long * times - ahead + k
             if step < 0:
@@ -41,9 +41,9 @@ def test_moments_are_integrals_of_the_polynomials_and_sizes_are_over_them(place:
             for order in range(MOMENTS):
                 moments[order] += sweep.step * values @ (shares * (whole - at) ** order) / math.factorial(order)
             sizes = np.linalg.norm(load @ polynomial(step, np.linspace(0.0, 1.0, 101)), axis=0)
-            most, push = max(most, float(sizes.max())), push + sweep.step * float(sizes.mean())
+            maximum, push = max(maximum, float(sizes.max())), push + sweep.step * float(sizes.mean())
         assert found.moments[:, :, long] == pytest.approx(moments, rel=1e-9, abs=1e-12 * np.abs(moments).max())
-        assert most <= found.highest[long] < 10.0 * most
+        assert maximum <= found.highest[long] < 10.0 * maximum
         assert push <= found.pushes[long] < 20.0 * push
     short = own.short(np.array([-1, 2, sweep.count]))
     assert not short[[0, 2]].any()

@@ -41,7 +41,7 @@ def tables(**more: Any) -> dict[str, Any]:
 
 
 def limited(*limits: tuple[str, str], **more: Any) -> Problem:
-    given = [{"limit": quantity, "max": most} for quantity, most in limits]
+    given = [{"limit": quantity, "max": maximum} for quantity, maximum in limits]
     return load_tables(tables(constraints=given, **more), Path("single.toml"))
 
 
@@ -154,11 +154,11 @@ def test_peaks_are_those_of_the_last_word_and_slope_as_they_differ() -> None:
         x = np.array([*own, unbalance.real, unbalance.imag])
         engine = problem.design([unbalance, *own])
         told = runs_of(engine, problem.points[0], problem.fidelity, problem.engine.extra(Run))
-        for coarser, most in ((1, 1e-9), (4, error)):
+        for coarser, maximum in ((1, 1e-9), (4, error)):
             peaks = RunPeaks(problem, OF_RUNS, coarser)
             parts = np.split(peaks.values(x), np.cumsum(peaks.counts)[:-1])
             for name, part in zip(("worst_force", "worst_travel", "worst_twist"), parts, strict=True):
-                assert part.max() == pytest.approx(max(getattr(run, name) for run in told), rel=max(most, 1e-9))
+                assert part.max() == pytest.approx(max(getattr(run, name) for run in told), rel=max(maximum, 1e-9))
             slopes = peaks.slopes(x)
             at = [int(part.argmax()) + start for part, start in zip(parts, np.cumsum([0, *peaks.counts]), strict=False)]
             for k, step in enumerate(1e-5 * np.maximum(np.abs(x), 1e-3)):
@@ -280,7 +280,7 @@ def test_the_least_travel_of_a_start_over_weights_is_proven() -> None:
 def test_weights_and_stiffness_together_are_no_worse_than_either() -> None:
     """More freedom is never worse: the least force through a start, of mounts alone and with a weight."""
     weight = {**tables_of(READY)["counterweights"][0], "mass": {"between": ["0 kg", "3 kg"], "start": "1 kg"}}
-    least = {"minimise": "run-up force"}
+    minimum = {"minimise": "run-up force"}
     # a mount of its own under the weight of the block
     given = mounts()
     given["places"][2]["stiffness"] = [
@@ -288,7 +288,7 @@ def test_weights_and_stiffness_together_are_no_worse_than_either() -> None:
         "120 N/mm",
         {"between": ["60 N/mm", "400 N/mm"], "start": "300 N/mm"},
     ]
-    asked = {"mounts": given, "objective": least, "search": {"starts": 1, "boxes": 1}}
+    asked = {"mounts": given, "objective": minimum, "search": {"starts": 1, "boxes": 1}}
     mounts_alone = laufruhe.solve(limited(("static sag", "5 mm"), **asked))
     both = laufruhe.solve(limited(("static sag", "5 mm"), counterweights=[weight], **asked))
     assert both.objective.value < mounts_alone.objective.value < mounts_alone.objective.initial

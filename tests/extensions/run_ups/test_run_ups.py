@@ -21,8 +21,8 @@ RPM = np.pi / 30.0
 RUN = '[run_up]\nup_to = "1000 rpm"\ntime = "0.5 s"\nshut_down_time = "0.8 s"\n'
 
 
-def limited(most: str) -> str:
-    return f'[[constraints]]\nlimit = "run-up travel"\nmax = "{most}"\n'
+def limited(maximum: str) -> str:
+    return f'[[constraints]]\nlimit = "run-up travel"\nmax = "{maximum}"\n'
 
 
 @pytest.fixture(scope="module")

@@ -89,15 +89,15 @@ def test_a_limit_that_moves_has_no_bound_beside_it(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "least"), [("few-angles-below-any-design", 1508.9), ("few-angles-16-percent-below", 3837.4)]
+    ("name", "minimum"), [("few-angles-below-any-design", 1508.9), ("few-angles-16-percent-below", 3837.4)]
 )
-def test_an_estimate_is_what_its_design_has(name: str, least: float) -> None:
+def test_an_estimate_is_what_its_design_has(name: str, minimum: float) -> None:
     """At the angles that the program takes both read less than any design has."""
     path = INPUTS / f"{name}.toml"
     found = follow(path)
     assert found["claim"]["kind"] == "estimate"
     assert found["claim"]["value"] == pytest.approx(exact(path, found["design"]), rel=1e-12)
-    assert found["claim"]["value"] >= least
+    assert found["claim"]["value"] >= minimum
     assert is_modest(found["claim"])
 
 

@@ -29,8 +29,8 @@ def test_the_least_is_that_of_a_corner() -> None:
         masses = min(function[1 : 1 + MASSES] @ corner for corner in itertools.product(*zip(low, high, strict=True)))
         weights = min(function[1 + MASSES] * x for x in (0.2, 0.5)) + float((function[-2:] @ disc).min())
         brute = function[0] + masses + weights
-        assert brute - 1e-4 <= float(reach.least(function[None])[0]) <= brute + 1e-12
-    assert reach.most.tolist() == [1.0, *np.maximum(np.abs(low), np.abs(high)), 0.5, 0.3, 0.3]
+        assert brute - 1e-4 <= float(reach.minimum(function[None])[0]) <= brute + 1e-12
+    assert reach.maximum.tolist() == [1.0, *np.maximum(np.abs(low), np.abs(high)), 0.5, 0.3, 0.3]
 
 
 def test_each_size_takes_numbers_one_way_or_is_refused() -> None:

@@ -361,15 +361,15 @@ def test_length_and_diameter_of_a_rod_are_proven_against_a_scan_of_positions() -
     assert result.objective.value == pytest.approx(force, rel=1e-5)
     for limit, own in zip(result.limits, (buckling, stress), strict=True):
         assert limit.value == pytest.approx(own, rel=1e-4)
-    least, widths = math.inf, np.linspace(0.008, 0.025, 120)
+    minimum, widths = math.inf, np.linspace(0.008, 0.025, 120)
     for at in np.linspace(0.055, 0.3, 50):
         # a thicker rod is firmer
         thin = bisect_left(widths, True, key=lambda across: all(np.less_equal(_rod(at, across)[1:], (0.05, 60e6))))
         if thin < len(widths):
-            least = min(least, _rod(at, widths[thin])[0])
-    assert result.certificate.lower_bound <= least
-    assert result.objective.value <= least * (1.0 + 1e-4)
-    assert least <= 1.02 * result.objective.value
+            minimum = min(minimum, _rod(at, widths[thin])[0])
+    assert result.certificate.lower_bound <= minimum
+    assert result.objective.value <= minimum * (1.0 + 1e-4)
+    assert minimum <= 1.02 * result.objective.value
 
 
 def test_a_cut_off_that_moves_with_the_rod_is_left_out_of_the_bound() -> None:

@@ -199,8 +199,8 @@ def test_eyes_of_the_rod_are_limits_on_its_pull(tmp_path: Path) -> None:
     allowed, area, arm, modulus = 40e6, 0.8e-4, 0.012, 0.4e-6
     free = '[[operating_points]]\nname = "exchange"\nspeed = "3000 rpm"\ngas = false\n[gas]'
     limits = "".join(
-        f'[[constraints]]\nname = "{eye}"\nlimit = "{name}"\noperating_points = ["exchange"]\nmax = "{most} N"\n'
-        for eye, name, most in (
+        f'[[constraints]]\nname = "{eye}"\nlimit = "{name}"\noperating_points = ["exchange"]\nmax = "{maximum} N"\n'
+        for eye, name, maximum in (
             ("small eye pulled", "maximum rod force", 2.0 * area * allowed),
             ("small eye bent", "maximum rod force", 2.0 * modulus * allowed / arm),
             ("bolts", "maximum crank-pin force", 2.0 * area * allowed),

@@ -47,8 +47,8 @@ def test_a_bound_of_sizes_is_not_over_a_rival_that_many_angles_judge() -> None:
 def test_limits_of_sizes_are_what_the_cycle_has(throw: float, share: float, met: bool) -> None:
     """48 angles have half a percent too little of it at a throw of none, a quarter too much at 3 deg."""
     told = sized(throw)
-    least = of_many_angles(throw).objective.value
-    limit = {"name": "quiet", "limit": "mean shaking force", "orders": [2], "max": f"{share * least} N"}
+    minimum = of_many_angles(throw).objective.value
+    limit = {"name": "quiet", "limit": "mean shaking force", "orders": [2], "max": f"{share * minimum} N"}
     more = {"constraints": [*told["constraints"], limit], "search": {"boxes": 200}}
     asked = problem(told, objective={"minimise": "rms shaking force"}, **more)
     result = solve(asked)
@@ -66,8 +66,8 @@ def test_a_gap_is_not_left_open_for_what_few_angles_read_too_much() -> None:
 def test_time_that_is_over_leaves_no_design_that_few_angles_alone_allow() -> None:
     """48 angles have half a percent too little of the second order; no time is left to look at more."""
     told = sized(0)
-    most = 0.998 * of_many_angles(0).objective.value
-    limit = {"name": "quiet", "limit": "mean shaking force", "orders": [2], "max": f"{most} N"}
+    maximum = 0.998 * of_many_angles(0).objective.value
+    limit = {"name": "quiet", "limit": "mean shaking force", "orders": [2], "max": f"{maximum} N"}
     asked = problem(told, objective={"minimise": "rms shaking force"}, constraints=[*told["constraints"], limit])
     with limited(1e-9):
         result = refine_sampling(asked, solve_sizes)

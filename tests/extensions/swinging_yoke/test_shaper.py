@@ -81,29 +81,29 @@ def test_lever_weight_is_named_where_it_cannot_be_decided() -> None:
         laufruhe.solve(tables)
 
 
-@pytest.mark.parametrize("most", [120.0, 60.0])
-def test_the_weight_of_the_lever_counts_as_a_counterweight(most: float) -> None:
+@pytest.mark.parametrize("maximum", [120.0, 60.0])
+def test_the_weight_of_the_lever_counts_as_a_counterweight(maximum: float) -> None:
     """Both weights together under a limit, against a scan of how they share it by least squares of positions."""
     text = PROBLEM.read_text(encoding="utf-8").replace("unbalance = {", 'radius = "400 mm"\nunbalance = {')
-    limit = f'[[constraints]]\nlimit = "counterweight mass"\nmax = "{most} kg"\n'
+    limit = f'[[constraints]]\nlimit = "counterweight mass"\nmax = "{maximum} kg"\n'
     problem = laufruhe.load(text + limit)
     result = laufruhe.solve(problem)
     (part,), (rotor,) = result.final.engine.slider_cranks, result.final.engine.rotors
     assert isinstance(part, SwingingYoke)
-    assert part.lever_weight + abs(rotor.unbalance) / 0.4 == pytest.approx(most, rel=1e-6)
-    assert result.limits[0].value == pytest.approx(most, rel=1e-6)
+    assert part.lever_weight + abs(rotor.unbalance) / 0.4 == pytest.approx(maximum, rel=1e-6)
+    assert result.limits[0].value == pytest.approx(maximum, rel=1e-6)
     given, units = columns(problem)
-    least = math.inf
+    minimum = math.inf
     for share in np.linspace(0.0, 1.0, 401):
-        rest = given + units[:, 0] * most * share
+        rest = given + units[:, 0] * maximum * share
         turning = units[:, 1:3]
         free, *_ = np.linalg.lstsq(turning, -rest, rcond=None)
-        size = 0.4 * most * (1.0 - share)
+        size = 0.4 * maximum * (1.0 - share)
         # columns of a full turn are square to each other, so the nearest is the shorter one
         free = free * min(1.0, size / float(np.linalg.norm(free)))
-        least = min(least, math.sqrt(np.square(rest + turning @ free).sum() / STEPS))
-    assert result.objective.value == pytest.approx(least, rel=1e-4)
-    assert result.objective.value <= least * (1.0 + 1e-9)
+        minimum = min(minimum, math.sqrt(np.square(rest + turning @ free).sum() / STEPS))
+    assert result.objective.value == pytest.approx(minimum, rel=1e-4)
+    assert result.objective.value <= minimum * (1.0 + 1e-9)
 
 
 def test_a_shaper_does_not_fire() -> None:

@@ -31,11 +31,11 @@ def test_boxes_whose_absorber_gives_off_too_much_hold_no_design(heated: Problem)
     found = [evaluate(heated, heated.design([float(x)])) for x in edges]
     heat = np.array([each.value(limit.measure) for each in found])
     values = np.array([objective_value(heated, each) for each in found])
-    least = np.minimum(values[:-1], values[1:])
+    minimum = np.minimum(values[:-1], values[1:])
     # heat and twist go one way each, so that the ends of a box tell its least
     assert np.all(np.diff(heat) > 0.0)
     kept = heat[:-1] <= limit.maximum
-    assert np.all(bounds[kept] <= least[kept] * (1.0 + 1e-9))
+    assert np.all(bounds[kept] <= minimum[kept] * (1.0 + 1e-9))
     assert np.all(np.isinf(bounds[heat[:-1] > 1.05 * limit.maximum]))
 
 
@@ -43,11 +43,11 @@ def test_boxes_whose_absorber_gives_off_too_much_hold_no_design(heated: Problem)
 def test_one_absorber_under_a_limit_of_heat_is_proven(heated: Problem) -> None:
     found, (decision,) = laufruhe.solve(heated), heated.decisions
     designs = [evaluate(heated, heated.design([float(x)])) for x in np.linspace(decision.lower, decision.upper, 400)]
-    least = min(objective_value(heated, each) for each in designs if each.excess(heated.limits) <= 0.0)
+    minimum = min(objective_value(heated, each) for each in designs if each.excess(heated.limits) <= 0.0)
     assert found.certificate is not None
     assert found.objective is not None
     assert found.certificate.kind is Proof.GLOBAL
-    assert found.certificate.lower_bound <= found.objective.value <= least * (1.0 + 1e-6)
+    assert found.certificate.lower_bound <= found.objective.value <= minimum * (1.0 + 1e-6)
 
 
 @pytest.mark.slow
@@ -56,10 +56,10 @@ def test_orders_that_answer_most_choose_the_sides_of_three_numbers() -> None:
     boxes, generator = TwistBoxes(problem, evaluate(problem)), np.random.default_rng(83)
     low, high = boxes.coordinates.lower, boxes.coordinates.upper
     draws = [low + (high - low) * generator.random(3) for _ in range(400)]
-    least = min(objective_value(problem, evaluate(problem, problem.design(list(map(float, x))))) for x in draws)
-    bound = divide(boxes, low, high, least, problem.tolerance * least, 600).bound
+    minimum = min(objective_value(problem, evaluate(problem, problem.design(list(map(float, x))))) for x in draws)
+    bound = divide(boxes, low, high, minimum, problem.tolerance * minimum, 600).bound
     # by the gain of any order the same boxes left four fifths
-    assert 0.7 * least <= bound <= least
+    assert 0.7 * minimum <= bound <= minimum
 
 
 @pytest.mark.slow

@@ -208,9 +208,9 @@ def test_a_peak_between_the_angles_breaks_its_limit() -> None:
     seen = {order: float(e.rows(fired(tables(objective=peak), order).objective[0].measure).value)
             for order, e in rows.items()}  # fmt: skip
     # between what the angles see of the least one and what it is
-    least = min(seen, key=seen.get)
-    allowed = 0.5 * (seen[least] + values[least])
-    assert seen[least] < 0.9999 * values[least]
+    minimum = min(seen, key=seen.get)
+    allowed = 0.5 * (seen[minimum] + values[minimum])
+    assert seen[minimum] < 0.9999 * values[minimum]
     limit = {"limit": "maximum shaft torque", "max": f"{allowed} N m"}
     result = laufruhe.solve(problem_of(tables(constraints=[limit], **coarse)))
     kept = [value for value in values.values() if value <= allowed]

@@ -33,13 +33,13 @@ def dynamic(chain: Torsion, order: float, speed: float) -> np.ndarray:
     return found
 
 
-def zeros(chain: Torsion, order: float, most: float) -> list[float]:
+def zeros(chain: Torsion, order: float, maximum: float) -> list[float]:
     """Return the speeds at which the determinant changes its sign, by halving [rad/s]."""
 
     def sign(speed: float) -> float:
         return float(np.linalg.slogdet(dynamic(chain, order, speed))[0])
 
-    speeds = np.geomspace(most / 2000.0, most, 6000)
+    speeds = np.geomspace(maximum / 2000.0, maximum, 6000)
     found = []
     for low, high in pairwise(speeds):
         a, b = float(low), float(high)

@@ -172,8 +172,8 @@ def verdicts(data: xr.Dataset) -> dict[str, tuple[Verdict, ...]]:
 def _judged(engines: Mapping[str, _Engine], engine: _Engine, against: _Engine, says: str) -> tuple[bool, str]:
     # whether a judgement holds, and by which rule
     if says == "negligible":
-        most = 1.0 - engine.bound / against.force
-        return most < NEGLIGIBLE, f"W1: under {100.0 * NEGLIGIBLE:.0f} %; proven, none of these shafts does more"
+        maximum = 1.0 - engine.bound / against.force
+        return maximum < NEGLIGIBLE, f"W1: under {100.0 * NEGLIGIBLE:.0f} %; proven, none of these shafts does more"
     if says == "noticeable":
         return 1.0 - engine.force / against.force >= NOTICEABLE, f"W2: {100.0 * NOTICEABLE:.0f} % or more"
     if says == "better":

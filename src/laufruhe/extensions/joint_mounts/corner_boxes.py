@@ -154,8 +154,8 @@ class DesignBoxes:
         value = problem.objective(columns)
         # a price by rounding would add the remainder of its limit
         limits = tuple(
-            z if norm.dual_norm(z) * most > NO_PRICE * value else np.zeros_like(z)
-            for (most, norm), z in zip(problem.limits, multipliers.limits, strict=True)
+            z if norm.dual_norm(z) * maximum > NO_PRICE * value else np.zeros_like(z)
+            for (maximum, norm), z in zip(problem.limits, multipliers.limits, strict=True)
         )
         pairing = self.loads.pairing(problem, Multipliers(multipliers.terms, limits))
         if value < self.value and problem.excess(columns) <= FEASIBLE:
@@ -170,7 +170,7 @@ class DesignBoxes:
             return math.inf, 0
         loop = mount_loop(self.loads.problem, self.loads.orders.omegas, lower, upper)
         even = _BalancedLoop.from_loop(loop, len(lower))
-        if not (even.most[self._counted] < WORTH).all():
+        if not (even.maximum[self._counted] < WORTH).all():
             # halve until the series of all orders converge
             return 0.0, int(np.argmax(even.scores(self._counted) + EVEN * (upper - lower) / (self.upper - self.lower)))
         places = [np.where(end < 0.0, lower, upper) for end in corners_of(len(lower))]
@@ -197,11 +197,11 @@ class DesignBoxes:
         if not (np.isfinite(rest).all() and np.isfinite(quadratics).all()):
             return 0.0, int(np.argmax(loop.scores(np.ones_like(self._counted))))
         mixes = np.einsum("vkp,kcp->vc", mixed(loop.count), np.array(quadratics), optimize=True)
-        least = np.array([line[0] + self.least(line[1:], near) for line in mixes])
+        minimum = np.array([line[0] + self.minimum(line[1:], near) for line in mixes])
         # weights of vertices have sum one, so the remainder is at most that of the worst vertex
-        least = priced(least, over) - rest.sum(axis=1).max()
-        scores = _concavity(least.reshape((4,) * loop.count)) + loop.shares.T @ rest[rest.sum(axis=1).argmax()]
-        return max(float(least.min()), 0.0), int(np.argmax(scores))
+        minimum = priced(minimum, over) - rest.sum(axis=1).max()
+        scores = _concavity(minimum.reshape((4,) * loop.count)) + loop.shares.T @ rest[rest.sum(axis=1).argmax()]
+        return max(float(minimum.min()), 0.0), int(np.argmax(scores))
 
     def expanded(self, pairing: Pairing, lower: Array, upper: Array) -> tuple[Array, Array, Array]:
         """Return the unbalances at the lower vertex of a box, and a bound about these as in `_expanded`."""
@@ -226,9 +226,9 @@ class DesignBoxes:
                 powers, rest = powers + more, rest + further
         return powers, rest
 
-    def least(self, slopes: Array, near: Array) -> float:
+    def minimum(self, slopes: Array, near: Array) -> float:
         """Return min g . (u - near) over the sets of unbalances."""
-        return float(sum(domain.least(slopes) for domain in self.loads.domains) - slopes @ near)
+        return float(sum(domain.minimum(slopes) for domain in self.loads.domains) - slopes @ near)
 
 
 @dataclass(frozen=True, eq=False)
@@ -243,7 +243,7 @@ class _BalancedLoop:
         Diagonal of the scaling T, shape (w, m).
     gain
         T G T^-1, shape (w, m, m).
-    most
+    maximum
         Upper bound of its norm, shape (w,).
     """
 
@@ -251,7 +251,7 @@ class _BalancedLoop:
     count: int
     balance: Array
     gain: ComplexArray
-    most: Array
+    maximum: Array
 
     @classmethod
     def from_loop(cls, loop: Loop, count: int) -> _BalancedLoop:
@@ -277,7 +277,7 @@ class _BalancedLoop:
 
     def scores(self, orders: Mask) -> Array:
         """Return branching scores of numbers for orders whose series converges slowly, shape (n,)."""
-        return np.asarray(self.sizes[orders & ~(self.most < WORTH)].max(axis=0, initial=0.0))
+        return np.asarray(self.sizes[orders & ~(self.maximum < WORTH)].max(axis=0, initial=0.0))
 
 
 class _LoadedLoop:
@@ -289,7 +289,7 @@ class _LoadedLoop:
         self._inputs = np.einsum("wmi,wci->wcm", self.loop.inputs, loads, optimize=True)
         size = np.abs(self._inputs) * self._balance[:, None]
         # a column without loads has no motion
-        rest = rest_of(even.gain[:, None], even.most[:, None], size)
+        rest = rest_of(even.gain[:, None], even.maximum[:, None], size)
         self._rest = np.where(size.any(axis=-1), rest, 0.0)
 
     def paired(self, duals: ComplexArray, maps: tuple[ComplexArray, ComplexArray]) -> tuple[Array, Array]:
@@ -336,10 +336,10 @@ class _VertexBranching(BoxSearch):
 def designed_bound(boxes: DesignBoxes, room: float, known: Known | None = None) -> BoxResult:
     """Bound a problem that `mixes_corners`, until no design is more than `room` better than the incumbent."""
     division = _VertexBranching(boxes, room, known)
-    most = boxes.most_boxes
-    if not most:
+    maximum = boxes.most_boxes
+    if not maximum:
         return BoxResult(0.0, 0)
-    divided = division.run(division.bounded([(boxes.lower, boxes.upper)])[0], most)
+    divided = division.run(division.bounded([(boxes.lower, boxes.upper)])[0], maximum)
     if known is not None:
         check_around(Around(boxes, boxes.lower, boxes.upper), known.place, known)
     return divided
@@ -358,7 +358,7 @@ def priced(values: Array, over: list[Array]) -> Array:
 def _price(values: Array, over: Array) -> float:
     """Return the price with the largest minimum of values + price over, by golden section (P4)."""
 
-    def least(price: float) -> float:
+    def minimum(price: float) -> float:
         return float((values + price * over).min())
 
     worst = int(np.argmin(values))
@@ -368,9 +368,9 @@ def _price(values: Array, over: Array) -> float:
     low, best = 0.0, 0.0
     for _ in range(STEPS):
         one, two = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        if least(one) >= least(two):
+        if minimum(one) >= minimum(two):
             high = two
         else:
             low = one
-        best = max(best, one, two, key=least)
+        best = max(best, one, two, key=minimum)
     return best

@@ -88,9 +88,9 @@ def load_bounds(
     if not is_boxed(problem, throws) or not 0.0 < value < math.inf:
         return
     boxes = LoadBoxes(problem, LEFT_OUT * room, throws)
-    most = boxes.most_boxes
-    if most and boxes.is_sampled_fully:
-        counts = [math.ceil(share * most) for share in shares]
+    maximum = boxes.most_boxes
+    if maximum and boxes.is_sampled_fully:
+        counts = [math.ceil(share * maximum) for share in shares]
         yield from divide_in_rounds(boxes, boxes.lower, boxes.upper, value, room, counts, known)
 
 
@@ -128,9 +128,9 @@ class LoadBoxes:
     def __init__(self, problem: Problem, left_out: float, throws: OpenThrows | None = None) -> None:
         self.problem = problem = with_default_sampling(problem)
         self.loads, turns = MountedLoads(problem, throws), throws is not None
-        (low, high), (least, most) = sides_of(problem.mount_decisions), ends_of(self.loads.domains)
+        (low, high), (minimum, maximum) = sides_of(problem.mount_decisions), ends_of(self.loads.domains)
         first, last = throws.sides if throws else (np.zeros(0), np.zeros(0))
-        self.lower, self.upper = np.concatenate([low, least, first]), np.concatenate([high, most, last])
+        self.lower, self.upper = np.concatenate([low, minimum, first]), np.concatenate([high, maximum, last])
         self._numbers, self._orders = len(low), self.loads.orders
         self._terms = [(t.weight, t.measure) for t in problem.objective if _is_bounded(t.measure, problem, turns)]
         limits = [x for x in problem.limits if _is_bounded(x.measure, problem, turns) and math.isfinite(x.maximum)]
@@ -145,12 +145,12 @@ class LoadBoxes:
     def _drop_small_orders(self, budget: float) -> dict[Measure, float]:
         """Drop orders that add less than a budget together, and return their effect on measures (E41)."""
         budgets = {measure: budget / weight for weight, measure in self._terms if measure.on_mounts}
-        budgets |= {measure: SLACK * most for most, measure in self._limits if measure.on_mounts}
+        budgets |= {measure: SLACK * maximum for maximum, measure in self._limits if measure.on_mounts}
         if not budgets or self._ratios:
             return {}
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             box = self._box(self.lower[None], self.upper[None])
-            size = np.array([np.nan_to_num(box.answer(measure).most[0], nan=np.inf) for measure in budgets])
+            size = np.array([np.nan_to_num(box.answer(measure).maximum[0], nan=np.inf) for measure in budgets])
             share = np.max(size / np.array([*budgets.values()])[:, None], axis=0)
         order = np.argsort(share, kind="stable")
         small = order[np.cumsum(share[order]) <= 1.0]
@@ -212,7 +212,7 @@ class LoadBoxes:
             scores = scores + LIMITS * box.scores(bound) / (maximum or 1.0)
         widths = (upper - lower) / np.maximum(self.upper - self.lower, 1e-300)
         side = np.argmax(np.nan_to_num(scores) + EVEN * widths, axis=1)
-        return np.where(self._violated(lower, upper), np.inf, lines.least), np.asarray(side, dtype=np.intp)
+        return np.where(self._violated(lower, upper), np.inf, lines.minimum), np.asarray(side, dtype=np.intp)
 
     def _violated(self, lower: Array, upper: Array) -> Mask:
         # boxes outside of the sets of unbalances, or whose mounts violate a static limit, shape (boxes,)
@@ -300,7 +300,7 @@ class _Boxes:
     def _expanded(self, loops: list[Loop]) -> tuple[list[Loop], list[Expansion]]:
         """Return one expansion for the fixed loads, and one for each column."""
         gain, inputs = np.array([loop.gain for loop in loops]), np.array([loop.inputs for loop in loops])
-        balance, even, most = balanced(gain)
+        balance, even, maximum = balanced(gain)
         numbers = loops[0].numbers
         sides = Sides(np.zeros((6, len(numbers))), numbers, self._numbers)
         still = np.zeros((*gain.shape[:2], 6, len(numbers)), dtype=complex)
@@ -309,7 +309,7 @@ class _Boxes:
             channels_in = np.einsum("bwmi,bwi->bwm", inputs, column)
             size = np.abs(channels_in) * balance
             # a column without loads has no motion
-            rest = np.where(size.any(axis=-1), rest_of(even, most, size), 0.0)
+            rest = np.where(size.any(axis=-1), rest_of(even, maximum, size), 0.0)
             ones = np.ones((len(gain), self._numbers))
             expansions.append(Expansion(ones, ones, sides, column, still, gain, channels_in, balance, rest))
         return loops, expansions
@@ -334,7 +334,7 @@ class _Boxes:
         slopes = np.concatenate([fixed.slopes, np.moveaxis(by_column, 0, 2), *crossed], axis=2)
         rests = np.array([each.rest for each in moved]).reshape(self.columns, boxes, lines)
         for k, each in enumerate(beyond):
-            rests[self._unbalances + k] += each.most
+            rests[self._unbalances + k] += each.maximum
         bends = fixed.bends + sum((each.bends for each in moved), np.zeros_like(fixed.bends))
         # smaller sides of unbalances do not make a series converge
         bends = np.concatenate([bends, np.moveaxis(np.where(np.isfinite(rests), rests, 0.0), 0, -1)], axis=2)

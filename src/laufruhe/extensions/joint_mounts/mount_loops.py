@@ -60,8 +60,8 @@ class Loop:
 class _Signals:
     """A growing list of channels; a signal has coefficients of motion and feedback, (w, rows, 6 + channels)."""
 
-    def __init__(self, frequencies: int, most: int) -> None:
-        self.size, self.owners = (frequencies, 6 + most), list[int]()
+    def __init__(self, frequencies: int, maximum: int) -> None:
+        self.size, self.owners = (frequencies, 6 + maximum), list[int]()
         self._inputs: list[ComplexArray] = []
 
     def motion(self, rows: Array) -> ComplexArray:

@@ -163,7 +163,7 @@ class MountedLoads:
         limits = zip(self.problem.load_limits, problem.limits, used.limits, strict=True)
         rows = [(term.weight, term.measure, False, norm, z) for term, (_, norm), z in terms]
         rows += [(1.0, limit.measure, limit.measure.norm.averages, norm, z) for limit, (_, norm), z in limits]
-        prices = [norm.dual_norm(z) * most for (most, norm), z in zip(problem.limits, used.limits, strict=True)]
+        prices = [norm.dual_norm(z) * maximum for (maximum, norm), z in zip(problem.limits, used.limits, strict=True)]
         constant, slopes = -sum(prices), np.zeros(problem.size)
         width = 3 * len(self.problem.engine.mounts)
         sums = [np.zeros((len(self.orders.omegas), width), dtype=complex) for _ in range(2)]

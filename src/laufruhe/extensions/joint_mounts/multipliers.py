@@ -30,7 +30,7 @@ def best_at(problem: AffineProblem) -> tuple[Array, Multipliers]:
     if x is not None:
         return x, best.multipliers
     against = best.multipliers.limits
-    if all(most > 0.0 for most, _ in problem.limits):
+    if all(maximum > 0.0 for maximum, _ in problem.limits):
         x, best = _solve(replace(problem, limits=_wider(problem)))
     if x is None:
         return problem.start, best.multipliers
@@ -39,11 +39,11 @@ def best_at(problem: AffineProblem) -> tuple[Array, Multipliers]:
 
 def _wider(problem: AffineProblem) -> tuple[tuple[float, AffineNorm], ...]:
     # limits that some unbalances keep with slack, so that prices stay small
-    shares = tuple((1.0 / most, norm) for most, norm in problem.limits)
+    shares = tuple((1.0 / maximum, norm) for maximum, norm in problem.limits)
     coarse = coarser(replace(problem, terms=shares, limits=(), groups=tuple(range(len(shares)))), _times(problem)[0])
     x = solve_cones(coarse).x
     times = ROOM + max(weight * norm.value(problem.start if x is None else x) for weight, norm in shares)
-    return tuple((times * most, norm) for most, norm in problem.limits)
+    return tuple((times * maximum, norm) for maximum, norm in problem.limits)
 
 
 def _solve(problem: AffineProblem) -> tuple[Array | None, Bound]:
@@ -72,7 +72,7 @@ def _with_contradiction(
     # scaled so that the bound of mounts with contradicting limits exceeds `value`
     proof = lower_bound(replace(problem, terms=()), Multipliers((), tuple(against)))
     prices = proof.multipliers.shadow_prices(problem)
-    size = sum(price * most for price, (most, _) in zip(prices, problem.limits, strict=True))
+    size = sum(price * maximum for price, (maximum, _) in zip(prices, problem.limits, strict=True))
     if not proof.value > 0.0:
         return multipliers
     times = min(value / proof.value, STEEPEST * value / size)
@@ -84,7 +84,7 @@ def _times(problem: AffineProblem) -> list[int]:
     # factors of coarser sampling in the order of trials
     rows = sum(len(norm.grid.weights) for _, norm in (*problem.terms, *problem.limits))
     divisors = [k for k in range(1, problem.samples // LEAST_SAMPLES + 1) if problem.samples % k == 0] or [1]
-    factors = {min((k for k in divisors if rows <= most * k), default=divisors[-1]) for most in ROWS}
+    factors = {min((k for k in divisors if rows <= maximum * k), default=divisors[-1]) for maximum in ROWS}
     return sorted(factors, reverse=True)
 
 

@@ -64,22 +64,22 @@ class _Rest:
 
 
 def _sag(limit: Limit, rest: _Rest) -> list[Array]:
-    most = limit.maximum * rest.weight * (1.0 + SLACK)
-    if not 0.0 < most < math.inf:
+    maximum = limit.maximum * rest.weight * (1.0 + SLACK)
+    if not 0.0 < maximum < math.inf:
         return []
     y = np.asarray(np.linalg.solve(rest.at.middle, rest.pull), dtype=np.float64)
     form, off = rest.form(y)
-    return [(2.0 * float(rest.pull @ y) - form - off - most) / most]
+    return [(2.0 * float(rest.pull @ y) - form - off - maximum) / maximum]
 
 
 def _frequencies(limit: Limit, rest: _Rest) -> list[Array]:
     violations = []
     if limit.minimum > 0.0:
-        least, (form, off) = (math.tau * limit.minimum * (1.0 - SLACK)) ** 2, rest.form(rest.motions[:, 0])
-        violations.append((least - form - off) / least)
+        minimum, (form, off) = (math.tau * limit.minimum * (1.0 - SLACK)) ** 2, rest.form(rest.motions[:, 0])
+        violations.append((minimum - form - off) / minimum)
     if limit.maximum < math.inf:
-        most, (form, off) = (math.tau * limit.maximum * (1.0 + SLACK)) ** 2, rest.form(rest.motions[:, -1])
-        violations.append((form - off - most) / most)
+        maximum, (form, off) = (math.tau * limit.maximum * (1.0 + SLACK)) ** 2, rest.form(rest.motions[:, -1])
+        violations.append((form - off - maximum) / maximum)
     return violations
 
 

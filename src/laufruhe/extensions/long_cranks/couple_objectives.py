@@ -62,8 +62,8 @@ class StarAmplitudes(AmplitudeObjective):
         place, room = int(np.argmax(shares)), value - self._forces(space, pattern)
         if room < 0.0:
             return None
-        most = room / shares[place] if shares[place] > 0.0 else np.inf
-        return Window(self.orders[place], complex(-most, -most), complex(most, most))
+        maximum = room / shares[place] if shares[place] > 0.0 else np.inf
+        return Window(self.orders[place], complex(-maximum, -maximum), complex(maximum, maximum))
 
     def _forces(self, space: StarSpace, pattern: Sequence[int]) -> float:
         forces = np.abs(phase_waves(space.phases, self.orders) @ np.array(pattern))
@@ -125,15 +125,15 @@ class CoupleNorms:
     orders: tuple[int, ...]
     terms: tuple[CoupleTerm, ...]
 
-    def values(self, space: StarSpace, stars: Stars, most: float = math.inf) -> Array:
-        """Return values of many stars, shape (n,); over `most` any number between it and the value."""
+    def values(self, space: StarSpace, stars: Stars, maximum: float = math.inf) -> Array:
+        """Return values of many stars, shape (n,); over `maximum` any number between it and the value."""
         couples = star_sums(stars, space.phases, space.places, self.orders)[:, :, 1]
         parts = np.ascontiguousarray(couples).view(float).reshape(len(stars), 2 * len(self.orders))
-        if most == math.inf:
+        if maximum == math.inf:
             return np.asarray(sum(term.values(parts) for term in self.terms))
         constants, slopes = self._planes
         out = (constants + parts @ slopes.T).max(axis=1, initial=0.0)
-        near = out <= most
+        near = out <= maximum
         out[near] = sum(term.values(parts[near]) for term in self.terms)
         return np.asarray(out)
 
@@ -176,12 +176,12 @@ class CoupleNorms:
         place = int(np.argmax(shares))
         if len(self.terms) == 1 and self.terms[0].norm.is_euclidean:
             # squares of orders add up, so that what no couple changes leaves less room
-            most = math.sqrt((value - minimum) * (value + minimum)) / float(shares[place])
+            maximum = math.sqrt((value - minimum) * (value + minimum)) / float(shares[place])
         else:
-            most = self._reach(space, place, value, value / float(shares[place]))
-        return Window(self.orders[place], complex(-most, -most), complex(most, most))
+            maximum = self._reach(space, place, value, value / float(shares[place]))
+        return Window(self.orders[place], complex(-maximum, -maximum), complex(maximum, maximum))
 
-    def _reach(self, space: StarSpace, place: int, value: float, most: float) -> float:
+    def _reach(self, space: StarSpace, place: int, value: float, maximum: float) -> float:
         """Return the largest couple of an order whose half, at any phase, is worth no more than a value (S48)."""
         order, levers = self.orders[place], float(np.abs(space.places).sum())
         same = [
@@ -194,10 +194,10 @@ class CoupleNorms:
         parts[:, 2 * place], parts[:, 2 * place + 1] = turns.real, turns.imag
         low = 0.0
         for _ in range(HALVINGS):
-            middle = 0.5 * (low + most)
+            middle = 0.5 * (low + maximum)
             values = sum(term.values(0.5 * middle * parts) for term in self.terms)
-            low, most = (low, middle) if float(np.max(values)) > room else (middle, most)
-        return most
+            low, maximum = (low, middle) if float(np.max(values)) > room else (middle, maximum)
+        return maximum
 
 
 def couple_norms(problem: Problem, space: StarSpace, stars: Sequence[Problem]) -> CoupleNorms | None:

@@ -42,8 +42,8 @@ SEED = 1964
 class CoupleObjective(Protocol):
     """Objective of stars, as far as they differ in couples."""
 
-    def values(self, space: StarSpace, stars: Stars, most: float = math.inf) -> Array:
-        """Return values of many stars, shape (n,); over `most` any number between it and the value."""
+    def values(self, space: StarSpace, stars: Stars, maximum: float = math.inf) -> Array:
+        """Return values of many stars, shape (n,); over `maximum` any number between it and the value."""
 
     def upper_bound(self, space: StarSpace) -> float:
         """Return an upper bound of all stars [SI]."""

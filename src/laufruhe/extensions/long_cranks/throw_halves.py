@@ -85,11 +85,11 @@ def shares_of(space: StarSpace, free: Free) -> Counts:
     """Return how many throws of the front may stand on every step, shape (n, phases); images are left out (S2)."""
     rest, front = free.counts(space.phases), len(free.front)
     shares = np.zeros((1, 0), dtype=np.uint8)
-    for step, most in enumerate(rest):
+    for step, maximum in enumerate(rest):
         after = int(rest[step + 1 :].sum())
         taken = shares.sum(axis=1, dtype=np.int64)
-        grown = [np.column_stack([shares, np.full(len(shares), k, dtype=np.uint8)]) for k in range(most + 1)]
-        left = np.concatenate([front - taken - k for k in range(most + 1)])
+        grown = [np.column_stack([shares, np.full(len(shares), k, dtype=np.uint8)]) for k in range(maximum + 1)]
+        left = np.concatenate([front - taken - k for k in range(maximum + 1)])
         shares = np.concatenate(grown)[(left >= 0) & (left <= after)]
     is_whole = len(free.star) == len(free.front) + len(free.back) + 1
     # throws on every step of the star that turns the other way

@@ -299,8 +299,8 @@ def _is_single(variables: Sequence[EpigraphVariable]) -> bool:
 
 def joint_scores(scores: Array, loose: Array, missing: float) -> Array:
     """Return the larger of two shares by side: of the largest score, and of the missing bound."""
-    least = max(WORTH * missing, 1e-100 * float(loose.max()), 1e-300)
-    return np.maximum(scores / max(float(scores.max()), 1e-300), loose / least)
+    minimum = max(WORTH * missing, 1e-100 * float(loose.max()), 1e-300)
+    return np.maximum(scores / max(float(scores.max()), 1e-300), loose / minimum)
 
 
 def _matters(shares: Array) -> Mask:

@@ -206,7 +206,7 @@ class ConeProgram:
         block = np.concatenate([-column(constraint.slopes).T.reshape(len(i), -1), moments], axis=1)
         self._add(block, columns, MATRIX, "constraints", column(constraint.constant))
 
-    def least(self, objective: Array | int) -> tuple[float, Array]:
+    def minimum(self, objective: Array | int) -> tuple[float, Array]:
         """Return the proven bound of another objective, or of one root by its number, and s and w at the optimum."""
         if isinstance(objective, int):
             assert self.program.limit is not None

@@ -65,9 +65,9 @@ def moment_constraints(mounts: OpenMounts, response: Response) -> list[MomentCon
         constraint = product_constraint(constant, slopes, response.motion, pressed)
         constraints.append(_restricted(constraint, still) if mounts.places else constraint)
     # (A - a)(A - b) is semidefinite where no eigenvalue is between, and so is (A - a)(b - A) where all are (E53)
-    least = max(mounts.lowest, 0.0)
+    minimum = max(mounts.lowest, 0.0)
     pairs = [(response.carried - a * response.motion, response.carried - b * response.motion) for a, b in mounts.bands]
-    pairs.append((response.carried - least * response.motion, unit * response.motion - response.carried))
+    pairs.append((response.carried - minimum * response.motion, unit * response.motion - response.carried))
     size = (unit * float(np.linalg.norm(response.motion))) ** 2
     return constraints + [_of_moments(numbers, product(*pair)[None, None], size) for pair in pairs]
 

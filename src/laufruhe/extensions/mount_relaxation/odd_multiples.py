@@ -239,16 +239,18 @@ def mean_bound(
         if bounds:
             weights = variable.multiple_weights
             parts = [bound.better.times(weight) for bound, weight in zip(bounds, weights, strict=True)]
-            most = sum(weight * bound.largest for bound, weight in zip(bounds, weights, strict=True))
+            maximum = sum(weight * bound.largest for bound, weight in zip(bounds, weights, strict=True))
             total = sum(parts, LinearUpperBound(0.0, np.zeros(numbers), 0.0))
-            own = [(COSINE / variable.factor, constant_bound(0.0, np.zeros(numbers)), 0.0), (1.0, total, most)]
+            own = [(COSINE / variable.factor, constant_bound(0.0, np.zeros(numbers)), 0.0), (1.0, total, maximum)]
         options.append(own)
     norms = np.array([
-        max([0.0, *(ratio * root - most for ratio, _, most in own)]) for own, root in zip(options, lower, strict=True)
+        max([0.0, *(ratio * root - limit for ratio, _, limit in own)]) for own, root in zip(options, lower, strict=True)
     ])  # fmt: skip
     floor = float(shares @ norms)
     rest = (norm - floor) / shares + norms
-    upper = np.array([min((r + most) / ratio for ratio, _, most in own) for own, r in zip(options, rest, strict=True)])
+    upper = np.array(
+        [min((r + maximum) / ratio for ratio, _, maximum in own) for own, r in zip(options, rest, strict=True)]
+    )
     # the option that shows most of the best design
     best = [
         max(own, key=lambda option: option[0] * unit - option[1].near) for own, unit in zip(options, units, strict=True)

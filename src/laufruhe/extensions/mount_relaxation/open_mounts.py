@@ -65,7 +65,7 @@ class OpenMounts:
         Lower and upper bounds of the stiffness A by limits (E31, E43), within the tolerance of limits.
     bands
         Squares of angular frequencies that none stands between.
-    least, most
+    minimum, maximum
         Lower and upper bounds of stiffness by the bounds of its numbers, shape (k, k).
     lossy, lagging, damping
         Lower bounds of loss, of damping by lag per frequency, and of viscous damping, shape (k, k).
@@ -90,8 +90,8 @@ class OpenMounts:
     floors: tuple[Array, ...]
     ceilings: tuple[Array, ...]
     bands: tuple[tuple[float, float], ...]
-    least: Array
-    most: Array
+    minimum: Array
+    maximum: Array
     lossy: Array
     lagging: Array
     damping: Array
@@ -111,12 +111,12 @@ class OpenMounts:
     @cached_property
     def lowest(self) -> float:
         """Return a lower bound of the eigenvalues of A."""
-        return max(float(np.linalg.eigvalsh(each)[0]) for each in (self.least + self.at_rest, *self.floors))
+        return max(float(np.linalg.eigvalsh(each)[0]) for each in (self.minimum + self.at_rest, *self.floors))
 
     @cached_property
     def highest(self) -> float:
         """Return an upper bound of the eigenvalues of A."""
-        return min(float(np.linalg.eigvalsh(each)[-1]) for each in (self.most + self.at_rest, *self.ceilings))
+        return min(float(np.linalg.eigvalsh(each)[-1]) for each in (self.maximum + self.at_rest, *self.ceilings))
 
     @property
     def times(self) -> Array:
@@ -213,13 +213,13 @@ def open_mounts(problem: Problem, lower: Array, upper: Array, framed: PlaneFrame
     low, high, lossy, lagging, damping = (np.zeros((6, 6)) for _ in range(5))
     for m, motion in enumerate(motions):
         moved = sum(abs(reach) for place in places for k, reach in place.mounts if k == m)
-        least, most = maps.bounds(m, STIFFNESS)
-        high += (1.0 + STRETCH * (moved > 0.0)) * carried(motion, most)
+        minimum, maximum = maps.bounds(m, STIFFNESS)
+        high += (1.0 + STRETCH * (moved > 0.0)) * carried(motion, maximum)
         if moved > 0.0:
-            size = float(np.linalg.norm(most, 2)) * moved**2
+            size = float(np.linalg.norm(maximum, 2)) * moved**2
             high += (1.0 + 1.0 / STRETCH) * size * (root[:, 3:] @ root[:, 3:].T)
         else:
-            own = carried(motion, least)
+            own = carried(motion, minimum)
             low += own
             lossy += float(maps.low[m, LOSS]) * own
             lagging += float(maps.low[m, LAG]) * own

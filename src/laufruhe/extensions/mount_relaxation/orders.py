@@ -113,8 +113,8 @@ class MeasureOrders:
             factor, loss = (variable.factor, variable.loss) if variable.is_largest else (COSINE, 0.0)
             times = math.sqrt(2.0) if variable.is_largest else len(self.mounts)
             reach = times * (norm / variable.share + loss) / factor
-        least = float(self.factors.min())
-        return ResponseBound(self.mounts, reach / least if least > 0.0 else math.inf, self.is_travel)
+        minimum = float(self.factors.min())
+        return ResponseBound(self.mounts, reach / minimum if minimum > 0.0 else math.inf, self.is_travel)
 
     def largest_sum(self, order: Order, parts: Sequence[OpenMounts]) -> float:
         """Return an upper bound of the sum over mounts of an order for all designs."""

@@ -269,12 +269,12 @@ class ParameterMaps:
         # of a box |K12| <= h3 is under any diag(h3 w, h3 / w)
         w = math.sqrt((halves[0] + TINY * high) / (halves[1] + TINY * high))
         near, size = np.diag([halves[0] + w * halves[2], halves[1] + halves[2] / w]), float(halves.max()) or 1.0
-        most = float(np.linalg.norm(np.array([[halves[0], halves[2]], [halves[2], halves[1]]]), 2))
+        maximum = float(np.linalg.norm(np.array([[halves[0], halves[2]], [halves[2], halves[1]]]), 2))
         sides = [(centre - low * np.eye(2), 1.0), (high * np.eye(2) - centre, -1.0)]
         spans = [(sides[0][0], sides[1][0])]
         if self._boxes is not None:
             sides += [(near, 1.0), (near, -1.0)]
-            spans += [(most * np.eye(2), most * np.eye(2))]
+            spans += [(maximum * np.eye(2), maximum * np.eye(2))]
         spring = SpringTerm(m, axes[pair].T, terms, tuple(sides), tuple(spans), size)
         top = min(high * np.eye(2), centre + near, key=lambda each: float(np.trace(each)))
         rest = np.delete(axes, pair, axis=0)
@@ -406,8 +406,8 @@ class PlaneStiffness:
         part, rounding = box.copy(), ROUNDING * float(self.high.max())
         for _ in range(ROUNDS):
             near, aside, steep = self._polar(part)
-            least = max(aside[0], -aside[1], 0.0)
-            if least - rounding > steep * max(-near[0], near[1], 0.0):
+            minimum = max(aside[0], -aside[1], 0.0)
+            if minimum - rounding > steep * max(-near[0], near[1], 0.0):
                 return None
             low, high = self.stiffness_range(part)
             part = _contract_by_trace(part, float(self.low.sum()) - rounding, float(self.high.sum()) + rounding)
@@ -434,9 +434,9 @@ def _contract_by_eigenvalues(box: Array, low: float, high: float) -> Array:
         part[0] = 1.0, -1.0
         return np.asarray(part * high)
     for k, other in ((0, 1), (1, 0)):
-        least = low + (across**2 / over[other] if over[other] > 0.0 else 0.0)
-        most = high - (across**2 / under[other] if under[other] > 0.0 else 0.0)
-        part[k] = max(box[k, 0], least), min(box[k, 1], most)
+        minimum = low + (across**2 / over[other] if over[other] > 0.0 else 0.0)
+        maximum = high - (across**2 / under[other] if under[other] > 0.0 else 0.0)
+        part[k] = max(box[k, 0], minimum), min(box[k, 1], maximum)
     reach = math.sqrt(min(over[0] * over[1], under[0] * under[1]))
     part[2] = max(box[2, 0], -reach), min(box[2, 1], reach)
     return part

@@ -257,8 +257,8 @@ def proven_bound(program: Program, multipliers: Multipliers) -> float:
     for mode, priced, slope in zip(program.modes, multipliers.modes, mode_objectives, strict=True):
         bound += _mode_bound(mode, priced, slope)
         slopes -= priced.corners
-    least = sum(_least_quadratic(matrix, reach) for matrix, reach in zip(remainders, program.reaches, strict=True))
-    return bound - float(np.abs(slopes).sum()) + least
+    minimum = sum(_least_quadratic(matrix, reach) for matrix, reach in zip(remainders, program.reaches, strict=True))
+    return bound - float(np.abs(slopes).sum()) + minimum
 
 
 def _split_price(price: float, chord: float, vectors: Sequence[Array]) -> tuple[float, list[Array]]:

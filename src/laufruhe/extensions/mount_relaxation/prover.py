@@ -97,13 +97,13 @@ def spring_bound(
             # straight for the value, but where a box shows little of it
             shares: tuple[float, ...]
             if relaxation.modes:
-                shares, most = LEVELS, MOST_RELAXED
+                shares, maximum = LEVELS, MOST_RELAXED
             elif relaxation.has_loose_mean:
-                shares, most = (*FIRST, *LEVELS), FEW_RELAXED
+                shares, maximum = (*FIRST, *LEVELS), FEW_RELAXED
             else:
-                shares, most = (OF_MANY, 0.0) if of_many else (0.0,), relaxation.most_boxes
-            most = 1 if root_only else problem.search.boxes_or(most)
-            return _prove_levels(relaxation, room, shares, most, known)
+                shares, maximum = (OF_MANY, 0.0) if of_many else (0.0,), relaxation.most_boxes
+            maximum = 1 if root_only else problem.search.boxes_or(maximum)
+            return _prove_levels(relaxation, room, shares, maximum, known)
     except np.linalg.LinAlgError:
         # a middle on a resonance that nothing damps
         return BoxResult(0.0, 0)
@@ -126,11 +126,11 @@ class _Around:
 
     def bound(self, box: tuple[Array, Array]) -> float:
         """Return the bound of a box, for designs that are not over the value by more than a rounding."""
-        return self.relaxation.up_to(self.known.most * (1.0 + EXCESS)).bound(*box)[0]
+        return self.relaxation.up_to(self.known.maximum * (1.0 + EXCESS)).bound(*box)[0]
 
 
 def _prove_levels(
-    relaxation: SdpRelaxation, room: float, shares: Sequence[float], most: int, known: Known | None
+    relaxation: SdpRelaxation, room: float, shares: Sequence[float], maximum: int, known: Known | None
 ) -> BoxResult:
     """Prove that no design is under a value, and then under values nearer to that of the best (E59)."""
 
@@ -140,21 +140,21 @@ def _prove_levels(
     def under(share: float) -> SdpRelaxation:
         # at the last level the best design itself is among the designs
         search = relaxation.under(level_of(share))
-        return search if share or known is None else search.up_to(known.most * (1.0 + EXCESS))
+        return search if share or known is None else search.up_to(known.maximum * (1.0 + EXCESS))
 
     # the level that says much of the best design bounds the root box
     root_share = next(share for share in shares if share <= LEVELS[0])
     root_search = under(root_share)
     root_bound = root_search.bound(relaxation.lower, relaxation.upper)
-    if known is not None and root_search.value > known.most:
+    if known is not None and root_search.value > known.maximum:
         known.check(_Narrowing.what, root_bound[0])
     # a bound holds for designs that are not over the level
     bound, spent, places = min(root_bound[0], root_search.value), 1, tuple[Array, ...]()
     for share in shares:
-        level, left = level_of(share), most - spent
+        level, left = level_of(share), maximum - spent
         if level <= bound:
             continue
-        if (spent > 1 and AHEAD * spent > most) or left <= 0 or passed():
+        if (spent > 1 and AHEAD * spent > maximum) or left <= 0 or passed():
             break
         is_root = share == root_share
         narrowing = _Narrowing(root_search if is_root else under(share), left, known, root_bound if is_root else None)
@@ -184,10 +184,10 @@ class _Narrowing(BoxBisection):
     what = "boxes of mounts and modes, by spring forces"
 
     def __init__(
-        self, search: SdpRelaxation, most: int, known: Known | None, root_bound: tuple[float, Array] | None
+        self, search: SdpRelaxation, maximum: int, known: Known | None, root_bound: tuple[float, Array] | None
     ) -> None:
-        super().__init__(search.value, 0.0, known if known is not None and search.value > known.most else None)
-        self._search, self._most, self._root_bound, self.spent = search, most, root_bound, 0
+        super().__init__(search.value, 0.0, known if known is not None and search.value > known.maximum else None)
+        self._search, self._maximum, self._root_bound, self.spent = search, maximum, root_bound, 0
 
     @property
     def enough(self) -> float:
@@ -223,7 +223,7 @@ class _Narrowing(BoxBisection):
                 return Over(min(best, self.level))
             if before > -math.inf:
                 narrows = best - before >= PROGRESS * (self.enough - before)
-            if self.spent >= self._most or passed() or not scores.any() or not narrows:
+            if self.spent >= self._maximum or passed() or not scores.any() or not narrows:
                 return best, Box(lower, upper, int(np.argmax(scores)), narrows)
             box, solved = narrowed(self._search, lower, upper, scores)
             self.spent += solved
@@ -277,9 +277,9 @@ def narrowed(
         if not pays(side, k):
             continue
         objectives.prefetch(((n, end), signs[end] * units[n]) for n, j, end in tried[first:] if pays(j, end))
-        least, point = objectives.bound((number, k), signs[k] * units[number])
+        minimum, point = objectives.bound((number, k), signs[k] * units[number])
         solved += 1
-        ends[k, side] = max(ends[k, side], signs[k] * middle[side] + half[side] * least)
+        ends[k, side] = max(ends[k, side], signs[k] * middle[side] + half[side] * minimum)
         if ends[:, side].sum() > 0.0:
             return None, solved
         at = middle[along] + half[along] * point[variables]

@@ -185,8 +185,8 @@ def _units(mounts: OpenMounts, near: ComplexArray) -> Array:
     """Return the rough size of every product at some motions, none much smaller than others of its kind."""
     deflections, turns = mounts.motions @ near, mounts.turns @ near
     sizes = [_lengths(spring.axes.T @ deflections[spring.mount]) for spring in mounts.springs]
-    least = SMALL * max((float(each.max()) for each in sizes), default=0.0)
-    units = [spring.size * np.maximum(each, least) for spring, each in zip(mounts.springs, sizes, strict=True)]
+    minimum = SMALL * max((float(each.max()) for each in sizes), default=0.0)
+    units = [spring.size * np.maximum(each, minimum) for spring, each in zip(mounts.springs, sizes, strict=True)]
     for place in mounts.places:
         units.append(np.maximum(_lengths(place.aside @ turns), SMALL * np.linalg.norm(turns)))
         for matrices in (mounts.middles, mounts.dampers)[: 1 + place.is_damped]:

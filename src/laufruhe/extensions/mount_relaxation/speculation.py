@@ -36,7 +36,7 @@ def _bound(step: _Step) -> tuple[float, Array]:
     name, program, objective = step
     if _CACHE.program is None or _CACHE.name != name:
         _CACHE.name, _CACHE.program = name, ConeProgram(pickle.loads(program))
-    return _CACHE.program.least(objective)
+    return _CACHE.program.minimum(objective)
 
 
 def bounds_ahead() -> AbstractContextManager[Ahead]:
@@ -53,7 +53,7 @@ class Objectives:
             ahead.discard()
 
     def bound(self, key: Hashable, objective: Array | int) -> tuple[float, Array]:
-        """Return the bound as `ConeProgram.least` does."""
+        """Return the bound as `ConeProgram.minimum` does."""
         step = (self._name, self._program, objective)
         return _bound(step) if self._ahead is None else self._ahead.result((self._name, key), step)
 

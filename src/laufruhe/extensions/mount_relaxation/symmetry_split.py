@@ -109,7 +109,7 @@ def _part(mounts: OpenMounts, images: list[int], basis: Array) -> OpenMounts:
         places=tuple(place for place in places if len(place.aside)),
         members=tuple(tuple(sorted({int(k), pairs[int(k)]})) for k in stands),
         floors=tuple(map(within, mounts.floors)), ceilings=tuple(map(within, mounts.ceilings)),
-        least=within(mounts.least), most=within(mounts.most), lossy=within(mounts.lossy),
+        minimum=within(mounts.minimum), maximum=within(mounts.maximum), lossy=within(mounts.lossy),
         lagging=within(mounts.lagging), damping=within(mounts.damping),
     )  # fmt: skip
 

@@ -97,18 +97,18 @@ def _evaluated(problem: Problem, lots: Sequence[Lot], chosen: Chosen) -> Evaluat
 def _walk(problem: Problem, lots: Sequence[Lot], best: Chosen, bound: float, seconds: float) -> Chosen | None:
     """Return an assembly under a bound, found by exact evaluations alone; None where the walk meets none."""
     random, until = np.random.default_rng(walk.SEED), time.thread_time() + seconds
-    here, own, least, left = best, _evaluated(problem, lots, best), math.inf, [best]
+    here, own, minimum, left = best, _evaluated(problem, lots, best), math.inf, [best]
     for _ in range(walk.MOST):
         if not left or time.thread_time() > until:
             break
         chosen = left.pop()
         found = _evaluated(problem, lots, chosen)
-        if objective_value(problem, found) < least:
-            here, own, least = chosen, found, objective_value(problem, found)
+        if objective_value(problem, found) < minimum:
+            here, own, minimum = chosen, found, objective_value(problem, found)
             near = list(_neighbours(lots, chosen))
             left = [near[k] for k in random.permutation(len(near))]
     over = 1.0 + 2.0 * error_of(problem, own) + walk.ROUNDING
-    return here if least * over + numerical_zero(problem, own.engine) < bound else None
+    return here if minimum * over + numerical_zero(problem, own.engine) < bound else None
 
 
 def _neighbours(lots: Sequence[Lot], chosen: Chosen) -> Iterator[Chosen]:

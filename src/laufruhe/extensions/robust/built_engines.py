@@ -144,8 +144,8 @@ class WorstCaseAdversary:
     def at(self, values: Sequence[Value], proven: bool) -> WorstEngines:
         """Return the worst engines, by branch and bound."""
         engines = BuiltEngines(self.problem, values, self.samples)
-        columns, most = tolerances_of(self.problem).columns, MOST_NODES if proven else QUICK
-        found = worst_case(engines.terms, columns, self.tolerance, most=most)
+        columns, maximum = tolerances_of(self.problem).columns, MOST_NODES if proven else QUICK
+        found = worst_case(engines.terms, columns, self.tolerance, maximum=maximum)
         if proven:
             check_worst(engines.terms, columns, found)
         errors, limits, divisions = [found.errors], [], found.nodes
@@ -155,7 +155,7 @@ class WorstCaseAdversary:
             angles = limit_samples(limit.measure, self.samples)
             finely[angles] = finely.get(angles) or BuiltEngines(self.problem, values, angles)
             terms: Terms = ((1.0, finely[angles].norm(limit.measure)),)
-            own = worst_case(terms, columns, self.tolerance, most=most)
+            own = worst_case(terms, columns, self.tolerance, maximum=maximum)
             limits.append((limit, own.bound if proven else own.value))
             divisions += own.nodes
             if own.value > limit.maximum:

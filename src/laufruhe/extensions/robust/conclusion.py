@@ -197,10 +197,10 @@ def _limits_in_the_worst_case(
     # limits of a drawing as its worst engines stand to them
     worst, own = dict(found.limits), []
     for limit, value in zip(problem.limits, limits, strict=True):
-        most = worst.get(limit, value.value)
-        active = most >= value.limit * (1.0 - problem.tolerance)
+        maximum = worst.get(limit, value.value)
+        active = maximum >= value.limit * (1.0 - problem.tolerance)
         price = prices.get(limit, 0.0) if active else 0.0
-        own.append(replace(value, value=most, active=active, shadow_price=price))
+        own.append(replace(value, value=maximum, active=active, shadow_price=price))
     return tuple(own)
 
 

@@ -374,8 +374,8 @@ def _assembly(table: AssemblyTable, problem: Problem, given: Given) -> Problem:
     if not lots:
         raise Refused("assembly", None, "has no parts to choose among", "name a file of pistons or rods")
     for part in engine.slider_cranks:
-        least = part.reciprocating_mass + sum(float(lot.differences[:, 0].min()) for lot in lots)
-        if type(part) is not SliderCrank or least <= 0.0:
+        minimum = part.reciprocating_mass + sum(float(lot.differences[:, 0].min()) for lot in lots)
+        if type(part) is not SliderCrank or minimum <= 0.0:
             rule = "needs plain cylinders whose reciprocating mass is above all differences of the parts"
             raise Refused("assembly", None, rule, "correct the masses, or leave it out")
     return replace(problem, extras=(*problem.extras, Assembly(tuple(lots))))

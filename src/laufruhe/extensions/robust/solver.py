@@ -122,18 +122,20 @@ def solve_built(problem: Problem, solve: Solve, _: Solve) -> Result:
     problem = with_tolerances(replace(problem, fidelity=drawing.problem.fidelity), nonzero)
     start = tuple(unbalances_of(problem, drawing))
     report_progress("worst errors of the drawing")
-    adversary, least = _decide(problem, over, start, drawing)
-    adversary = replace(adversary, samples=least.samples)
+    adversary, minimum = _decide(problem, over, start, drawing)
+    adversary = replace(adversary, samples=minimum.samples)
     as_given = adversary.at(problem.start, proven=False)
-    if least.conflict:
-        return infeasible_robust_result(problem, as_given, least.conflict, {"solve": time.perf_counter() - started})
+    if minimum.conflict:
+        return infeasible_robust_result(problem, as_given, minimum.conflict, {"solve": time.perf_counter() - started})
     solved = time.perf_counter()
     reach = ProofStrength.WHOLE if over.share is None else ProofStrength.ASIDE
-    design = evaluate_design(problem, least.values, least.samples)
-    shown = ProofData(least.bound, reach, least.active.residual, _method(problem, least))
-    details = compare_designs(problem, adversary, start, least.values, least.found, least.active, least.scenarios)
+    design = evaluate_design(problem, minimum.values, minimum.samples)
+    shown = ProofData(minimum.bound, reach, minimum.active.residual, _method(problem, minimum))
+    details = compare_designs(
+        problem, adversary, start, minimum.values, minimum.found, minimum.active, minimum.scenarios
+    )
     timing = {"solve": solved - started, "compare": time.perf_counter() - solved}
-    return robust_result(problem, design, as_given, least.found, least.active, shown, details, timing)
+    return robust_result(problem, design, as_given, minimum.found, minimum.active, shown, details, timing)
 
 
 def _decide(
@@ -214,9 +216,9 @@ class _Program:
         """Add sets that are not in it yet, and return whether there were any."""
         new = [z for z in errors if all(np.abs(z - own).max(initial=0.0) > SAME for own in self.errors)]
         while self.errors and len(self.errors) + len(new) > MOST_SCENARIOS:
-            least = int(np.argmin(self.shares)) if self.shares else 0
+            minimum = int(np.argmin(self.shares)) if self.shares else 0
             for own in (self.errors, self.models, self.shares):
-                del own[least]
+                del own[minimum]
         for z in new:
             self.errors.append(z)
             self.models.append(AffineModel(with_errors(self.problem, z)))

@@ -85,8 +85,8 @@ class TolerancesTable(Table):
         return Tolerances(tuple(Cause(name, unit, size, tuple(errors)) for name, unit, size, errors in causes)).nonzero
 
 
-def _left(name: str, x: float, most: float) -> Error:
-    return Error(name, (AddedDrive(name, x, most),), 2)
+def _left(name: str, x: float, maximum: float) -> Error:
+    return Error(name, (AddedDrive(name, x, maximum),), 2)
 
 
 def _built(engine: Engine, tolerances: Tolerances, errors: Array) -> Engine:
@@ -260,11 +260,11 @@ class Tolerance(Part):
         """Return the density over random engines, worst sum, and the free force of the drawing, a row an engine."""
         rows = [data.sel(case=name) for name in data["case"].values]
         stated = np.atleast_1d(data.attrs.get("mark_forces", []))
-        most = max([float(data["nominal"].max()), float(data["worst"].max()), *stated]) / GRAVITY
+        maximum = max([float(data["nominal"].max()), float(data["worst"].max()), *stated]) / GRAVITY
         top = _TOP - 0.25 - (_STEP if len(stated) > 1 else 0.0)
         panel = p.Panel(
             [mark for k, row in enumerate(rows) for mark in _row(row, k)] + _marks(data, len(rows)),
-            p.Axis("largest free force over the cycle [kp]", (LEAST, max(2.0 * most, 10.0 * LEAST)), log=(1.0,)),
+            p.Axis("largest free force over the cycle [kp]", (LEAST, max(2.0 * maximum, 10.0 * LEAST)), log=(1.0,)),
             p.Axis(ends=(len(rows) - 0.5, top), ticks=[(k, _label(row)) for k, row in enumerate(rows)], grid=False),
         )
         legend: list[p.Mark] = [

@@ -65,7 +65,7 @@ def value_at(terms: Terms, errors: Array) -> float:
     return sum(weight * norm.value(errors) for weight, norm in terms)
 
 
-def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, most: int = MOST_NODES) -> WorstCase:
+def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, maximum: int = MOST_NODES) -> WorstCase:
     """Return the largest weighted sum of norms N(V0 + E z) over intervals and discs.
 
     Parameters
@@ -76,7 +76,7 @@ def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, most: i
         Columns of every error: one for an interval of -1 to 1, two for the unit disc.
     tolerance
         Relative distance of bound and value at which the search ends.
-    most
+    maximum
         Largest number of parts that the errors are divided into.
     """
     count = columns[-1].stop if columns else 0
@@ -92,7 +92,7 @@ def worst_case(terms: Terms, columns: Sequence[slice], tolerance: float, most: i
     blocks = [Block(own, np.eye(own.stop - own.start)) for own in columns]
     root = bound_part(terms, np.zeros(count), blocks, best[0], search.reaches)
     search.improve(_climb(terms, columns, root.errors))
-    bound = search.divide((-root.bound, _Part(np.zeros(count), blocks, root.split)), most)
+    bound = search.divide((-root.bound, _Part(np.zeros(count), blocks, root.split)), maximum)
     value, errors = search.best
     if is_over(bound, -value):
         report(BoundError("errors that no engine exceeds", -bound, value))
@@ -395,7 +395,7 @@ def _over_balls(pulls: Array, bend: Array, firsts: NDArray[np.int_]) -> tuple[Ar
     # what bends alike in all directions of a ball is known
     even = np.add.reduceat(np.diag(bend), firsts) / sizes
     rest = bend - np.diag(np.repeat(even, sizes))
-    most = float(np.linalg.eigvalsh(rest)[-1])
+    maximum = float(np.linalg.eigvalsh(rest)[-1])
     points, pulled = np.zeros_like(pulls), pulls
     for _ in range(TURNS):
         size = np.repeat(lengths_of(pulled), sizes, axis=1)
@@ -403,7 +403,7 @@ def _over_balls(pulls: Array, bend: Array, firsts: NDArray[np.int_]) -> tuple[Ar
         # any point of the sphere will do where nothing pulls
         points[:, firsts] += lengths_of(points) == 0.0
         pulled = pulls + points @ rest
-    reached = lengths_of(pulled - most * points) + most
+    reached = lengths_of(pulled - maximum * points) + maximum
     bound = reached.sum(axis=1) - 0.5 * np.einsum("sn,sn->s", points @ rest, points) + 0.5 * float(even.sum())
     return bound, points
 

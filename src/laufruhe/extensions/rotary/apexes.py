@@ -26,7 +26,7 @@ class ApexChannel(NumberChannel):
     of_loads: bool = False
 
 
-def _most(name: str, unit: str, power: int, number: Callable[[RotaryUnit], float]) -> ApexChannel:
+def _maximum(name: str, unit: str, power: int, number: Callable[[RotaryUnit], float]) -> ApexChannel:
     def values(measure: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         speeds = [
             at.point.speed for at in evaluation.loads if measure.points is None or at.point.name in measure.points
@@ -37,5 +37,5 @@ def _most(name: str, unit: str, power: int, number: Callable[[RotaryUnit], float
     return ApexChannel(name, unit, values=values)
 
 
-APEX_SPEED = _most("apex speed", "m/s", 1, lambda part: part.apex_speed)
-APEX_ACCELERATION = _most("apex acceleration", "m/s^2", 2, lambda part: part.apex_acceleration)
+APEX_SPEED = _maximum("apex speed", "m/s", 1, lambda part: part.apex_speed)
+APEX_ACCELERATION = _maximum("apex acceleration", "m/s^2", 2, lambda part: part.apex_acceleration)

@@ -62,8 +62,8 @@ class RunBoxes:
         drag = float(np.linalg.norm(self._matrices.base.damping, 2))
         runs = []
         for sweep, wrenches in zip(self._peaks.sweeps, self._peaks.wrenches, strict=True):
-            most = min(REACH / ((self._scale + drag) * sweep.step), sweep.count / LEAST_STEPS)
-            runs.append(RunMoments(sweep, wrenches, self._matrices.base.load, max(int(most), 1)))
+            maximum = min(REACH / ((self._scale + drag) * sweep.step), sweep.count / LEAST_STEPS)
+            runs.append(RunMoments(sweep, wrenches, self._matrices.base.load, max(int(maximum), 1)))
         return tuple(runs)
 
     def under(self, measure: Measure, lower: Array, upper: Array, mask: Mask | None = None) -> LinearBound:
@@ -90,7 +90,7 @@ class RunBoxes:
         maps_of, d = self._rows[measure]
         maps = mapped(maps_of, of.above, of.halves, of.turn, of.roots)
         looks = [_Look(of, run, maps, d).under() for run in self._runs]
-        bounds = [np.nan_to_num(one.least, nan=-np.inf) for one in looks]
+        bounds = [np.nan_to_num(one.minimum, nan=-np.inf) for one in looks]
         best, pick = np.argmax(bounds, axis=0), np.arange(of.count)
         parts = ("value", "slopes", "rest", "bends")
         return LinearBound(*(np.array([getattr(one, part) for one in looks])[best, pick] for part in parts))
@@ -111,11 +111,11 @@ def _stays_off_stops(problem: Problem, peaks: RunPeaks) -> bool:
     """
     travels = [measure for measure in peaks.measures if measure.unit == "m"]
     limits = (limit for limit in problem.limits if limit.measure in travels)
-    most = min((limit.maximum for limit in limits), default=math.inf)
+    maximum = min((limit.maximum for limit in limits), default=math.inf)
     model = time_model(mounting_in(problem.engine))
     gaps = model.gaps[model.stops > 0.0]
     firm = any(quickest(model) * sweep.step > QUICKEST for sweep in peaks.sweeps)
-    return not firm and most * (1.0 + MARGIN) < float(gaps.min())
+    return not firm and maximum * (1.0 + MARGIN) < float(gaps.min())
 
 
 def _tops(squares: Array) -> Array:

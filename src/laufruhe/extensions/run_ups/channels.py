@@ -42,7 +42,7 @@ class RunChannel(NumberChannel):
     part: Callable[[Response], Array] = field(kw_only=True)
 
 
-def _most(name: str, unit: str, number: Callable[[RunUp], float], part: Callable[[Response], Array]) -> RunChannel:
+def _maximum(name: str, unit: str, number: Callable[[RunUp], float], part: Callable[[Response], Array]) -> RunChannel:
     def values(_: MeasureQuery, evaluation: EvaluatedDesign) -> Sequence[float]:
         run = evaluation.engine.extra(Run)
         if run is None or not evaluation.loads:
@@ -53,6 +53,6 @@ def _most(name: str, unit: str, number: Callable[[RunUp], float], part: Callable
     return RunChannel(name, unit, values=values, part=part)
 
 
-FORCE = _most("run-up force", "N", lambda run: run.worst_force, lambda response: response.force)
-TRAVEL = _most("run-up travel", "m", lambda run: run.worst_travel, lambda response: response.travel)
-TWIST = _most("run-up twist", "rad", lambda run: run.worst_twist, lambda response: response.twist)
+FORCE = _maximum("run-up force", "N", lambda run: run.worst_force, lambda response: response.force)
+TRAVEL = _maximum("run-up travel", "m", lambda run: run.worst_travel, lambda response: response.travel)
+TWIST = _maximum("run-up twist", "rad", lambda run: run.worst_twist, lambda response: response.twist)

@@ -128,11 +128,11 @@ def roots(squares: Array, slopes: Array, size: int) -> Roots:
         one if j == k else one + np.swapaxes(one, 1, 2)
         for one, (j, k) in zip(products, pairs_of(slopes.shape[1]), strict=True)
     ]
-    most = np.abs(slopes).sum(axis=1)
+    maximum = np.abs(slopes).sum(axis=1)
     share = np.linalg.eigvalsh(slopes.sum(axis=1) / (w[:, :, None] * w[:, None]))[:, -1]
     left = 1.0 - share
-    twice = (most / squares[:, None]) @ most
-    near, far = (np.sqrt(np.einsum("bac,bac->ba", change**2, diagonal)) for change in (most, twice))
+    twice = (maximum / squares[:, None]) @ maximum
+    near, far = (np.sqrt(np.einsum("bac,bac->ba", change**2, diagonal)) for change in (maximum, twice))
     # half a box that reaches to nothing is not known
     left = np.where(left > 0.0, left, np.nan)[:, None, None]
     after_first, crossed = (change[:, :, None] * near[:, None] / left for change in (near, far))

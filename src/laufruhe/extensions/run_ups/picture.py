@@ -26,7 +26,7 @@ def figure(result: Result) -> Figure:
     """Envelope of force, travel and roll over speed."""
     drawn = page(3, 1, (6.8, 1.5), gap=0.22)
     run, factors = run_of(result), [readable(channel.unit)[1] for _, channel in _ROWS]
-    most, legend = [0.0] * len(_ROWS), []
+    maximum, legend = [0.0] * len(_ROWS), []
     for one in series_of(result):
         runs = shown_runs(result, one.design)
         for envelope, (style, _) in zip(runs, _RUNS, strict=True):
@@ -34,10 +34,10 @@ def figure(result: Result) -> Figure:
                 drawn.panels[k].plot(
                     envelope.speeds * RPM, factors[k] * values, color=one.colour, linestyle=style, linewidth=1.4
                 )
-                most[k] = max(most[k], factors[k] * float(values.max(initial=0.0)))
+                maximum[k] = max(maximum[k], factors[k] * float(values.max(initial=0.0)))
         force, travel = max(ways.worst_force for ways in runs), max(ways.worst_travel for ways in runs)
         legend.append(one.entry(f": at most {words(force, 'N', 3)}, {words(travel, 'm', 3)}"))
-    for axes, (label, channel), factor, top in zip(drawn.panels, _ROWS, factors, most, strict=True):
+    for axes, (label, channel), factor, top in zip(drawn.panels, _ROWS, factors, maximum, strict=True):
         limits = [factor * limit.maximum for limit in limits_on(result, channel)]
         for limit in limits:
             axes.axhline(limit, color=LIMIT, linewidth=1.0)

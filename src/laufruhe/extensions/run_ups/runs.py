@@ -143,9 +143,9 @@ def _envelope(response: Response, first: float, last: float) -> RunUp:
     signals = (response.force, response.travel, response.twist)
     edges = np.arange(0, len(response.twist), (len(response.twist) - 1) // STRETCHES)
     sizes = [np.linalg.norm(signal, axis=-1).max(axis=-1) for signal in signals]
-    most = [np.array([size[a : b + 1].max() for a, b in pairwise(edges)]) for size in sizes]
+    maximum = [np.array([size[a : b + 1].max() for a, b in pairwise(edges)]) for size in sizes]
     speeds = first + (last - first) * edges[1:] / edges[-1]
-    return RunUp(speeds, *most)
+    return RunUp(speeds, *maximum)
 
 
 def run_through(
@@ -188,12 +188,12 @@ def run_through(
     for k, (start, end) in enumerate(pairwise(edges)):
         times = np.linspace(start, end, min(max(count, LEAST_STEPS), MOST_STEPS))
         states = integrated(rates, (start, end), state, method, t_eval=times, rtol=tolerance, atol=absolute)
-        force[k], travel[k], twist[k] = _most(model, *np.split(states, 2))
+        force[k], travel[k], twist[k] = _maximum(model, *np.split(states, 2))
         state = states[:, -1]
     return RunUp(first + gain * edges[1:], force, travel, twist)
 
 
-def _most(model: TimeModel, y: Array, rate: Array) -> tuple[float, float, float]:
+def _maximum(model: TimeModel, y: Array, rate: Array) -> tuple[float, float, float]:
     force, travel = model.mount_forces(y, rate), model.mount_travels(y)
     sizes = (np.linalg.norm(signal, axis=-1).max() for signal in (force, travel))
     force_most, travel_most = (float(size) for size in sizes)

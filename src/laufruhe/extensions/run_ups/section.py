@@ -35,7 +35,7 @@ def _tables(result: Result) -> list[Table]:
 
 def _record(result: Result) -> dict[str, Any]:
     run = run_of(result)
-    most = {
+    maximum = {
         way: {
             "time": time,
             "force": envelope.worst_force,
@@ -46,7 +46,7 @@ def _record(result: Result) -> dict[str, Any]:
             ("up", "down"), (run.up, run.down), shown_runs(result, result.final), strict=True
         )
     }
-    return {"up_to": run.speed, "point": run_point(result).name, **most}
+    return {"up_to": run.speed, "point": run_point(result).name, **maximum}
 
 
 def _over_speed(result: Result) -> Table:

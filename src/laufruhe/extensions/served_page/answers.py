@@ -238,20 +238,20 @@ def _front(source: Source, state: PageState, across: str) -> tuple[ParetoFront, 
 def front(source: Source, state: PageState, across: str, k: int) -> dict[str, Any]:
     """Return point k of the front against another measure; {"done": True} after the last."""
     pareto, simpler = _front(source, state, across)
-    most = next(islice(places(*pareto.ends()), k, None), None)
-    if most is None:
+    maximum = next(islice(places(*pareto.ends()), k, None), None)
+    if maximum is None:
         return {"done": True}
-    point = pareto.at(most)
+    point = pareto.at(maximum)
     if point.conflict:
         return {"skipped": True}
     problem, unit = pareto.problem, pareto.across.unit
     design = evaluate(problem.fixed_at(point.values))
     (shown_unit, factor), (of_unit, of_factor) = readable(unit), readable(problem.objective_unit or "")
     # a bound of a simplified problem does not hold for the whole problem
-    bound = None if simpler else {"at": most, "value": point.bound}
+    bound = None if simpler else {"at": maximum, "value": point.bound}
     place, value = design.value(pareto.across), objective_value(problem, design)
     text = f"{figure(place, unit)}: {figure(value, problem.objective_unit or '')}"
-    least = f"; no design has less than {figure(point.bound, problem.objective_unit or '')}" if bound else ""
+    minimum = f"; no design has less than {figure(point.bound, problem.objective_unit or '')}" if bound else ""
     # limits on numbers are not part of a front
     breaks = breaks_words(limit_values(replace(problem, limits=pareto.others), design))
     return {
@@ -261,7 +261,7 @@ def front(source: Source, state: PageState, across: str, k: int) -> dict[str, An
         "design": serialise.design(problem, point.values),
         "axes": {"across": [shown_unit, factor], "value": [of_unit, of_factor]},
         "name": problem.objective_name,
-        "words": "; ".join(part for part in (f"{text}{least}", breaks) if part),
+        "words": "; ".join(part for part in (f"{text}{minimum}", breaks) if part),
         "simpler": simpler.phrase,
     }
 

@@ -164,7 +164,7 @@ def settled_claim(position: int, result: Result) -> Claim:
     if not result.status.has_design or objective is None or certificate is None:
         return Claim(Kind.NO_DESIGN, position, "", result.message or "No design was found.", is_last=True)
     value, breaks = figure(objective.value, objective.unit, 5), breaks_words(result.limits)
-    least = f"no design has less than {figure(certificate.lower_bound, objective.unit, 5)}"
+    minimum = f"no design has less than {figure(certificate.lower_bound, objective.unit, 5)}"
     is_proven = result.status is Status.OPTIMAL and not breaks
     # the page shows the drawing without extras
     is_drawn = not result.problem.extras
@@ -173,7 +173,9 @@ def settled_claim(position: int, result: Result) -> Claim:
         Kind.PROVEN if is_proven else Kind.FOUND,
         position,
         f"{'Optimum' if is_proven else 'Best design found'} {value}",
-        f"{objective.name}, proven: {least}" if is_proven else f"{objective.name}; {_gap_words(certificate, least)}",
+        f"{objective.name}, proven: {minimum}"
+        if is_proven
+        else f"{objective.name}; {_gap_words(certificate, minimum)}",
         objective.value,
         reference if is_drawn else "",
         breaks,
@@ -181,11 +183,11 @@ def settled_claim(position: int, result: Result) -> Claim:
     )
 
 
-def _gap_words(certificate: Certificate, least: str) -> str:
+def _gap_words(certificate: Certificate, minimum: str) -> str:
     if certificate.kind is Proof.NONE or not certificate.is_useful:
         return "no useful bound was found in the time given"
     local = ", a local optimum" if certificate.kind is Proof.LOCAL else ""
-    return f"{least} (gap {number(100.0 * certificate.gap, 2)} %{local})"
+    return f"{minimum} (gap {number(100.0 * certificate.gap, 2)} %{local})"
 
 
 def join_phrases(phrases: Sequence[str]) -> str:

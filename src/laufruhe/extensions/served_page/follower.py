@@ -113,7 +113,9 @@ class Follower:
         x, value = solution.x, fine.objective(solution.x)
         price = dict(zip(names, bound.multipliers.shadow_prices(averaged), strict=True))
         stands = {name: norm.value(x) for name, (_, norm) in zip(names, fine.limits, strict=True)}
-        broken = tuple(n for n, (most, norm) in zip(names, fine.limits, strict=True) if _breaks(norm.value(x), most))
+        broken = tuple(
+            n for n, (maximum, norm) in zip(names, fine.limits, strict=True) if _breaks(norm.value(x), maximum)
+        )
         idle = [n for n, (_, norm) in zip(names, fine.limits, strict=True) if not norm.slope.any()]
         if set(broken) & set(idle):
             return _conflict(tuple(n for n in broken if n in idle))
@@ -129,7 +131,8 @@ class Follower:
     def _under(self, rows: AffineProblem, moved: Mapping[Measure, Limit]) -> AffineProblem:
         pairs = zip(self._problem.load_limits, rows.limits, strict=True)
         return replace(
-            rows, limits=tuple((moved[x.measure].maximum if x.measure in moved else most, n) for x, (most, n) in pairs)
+            rows,
+            limits=tuple((moved[x.measure].maximum if x.measure in moved else maximum, n) for x, (maximum, n) in pairs),
         )
 
 

@@ -48,19 +48,19 @@ class ParetoFront:
         alone = problem.changed(limits=(*others, self._limit), ranks=())
         self.problem, self.across = alone, across
         self._follower = Follower(alone)
-        self._least = Follower(alone.changed(objective=(Term(across),), limits=others))
+        self._minimum = Follower(alone.changed(objective=(Term(across),), limits=others))
 
     def ends(self) -> tuple[float, float]:
         """Return the minimum of the other measure, and its value at the least objective."""
-        least = self._least.at(self.others)
-        if least.conflict:
-            raise ModelError(f"no design keeps {' and '.join(least.conflict)}")
+        minimum = self._minimum.at(self.others)
+        if minimum.conflict:
+            raise ModelError(f"no design keeps {' and '.join(minimum.conflict)}")
         free = self._follower.at((*self.others, self._limit))
-        return least.value, max(free.standing[-1], least.value)
+        return minimum.value, max(free.standing[-1], minimum.value)
 
-    def at(self, most: float) -> Optimum:
-        """Return the least objective with the other measure at most `most`, or a conflict."""
-        return self._follower.at((*self.others, replace(self._limit, maximum=most)))
+    def at(self, maximum: float) -> Optimum:
+        """Return the least objective with the other measure at most `maximum`, or a conflict."""
+        return self._follower.at((*self.others, replace(self._limit, maximum=maximum)))
 
 
 def places(low: float, high: float, count: int = POINTS) -> Iterator[float]:

@@ -110,9 +110,11 @@ class Page:
     ) -> Callable[[Any], Answer]:
         return _read(lambda state: _worked(partial(desk.ask, seconds, work, self.watched.source, state, *more)))
 
-    def _lines(self, desk: LatestWorker, most: int, work: Callable[..., str], state: PageState, *more: Any) -> Answer:
+    def _lines(
+        self, desk: LatestWorker, maximum: int, work: Callable[..., str], state: PageState, *more: Any
+    ) -> Answer:
         source = self.watched.source
-        return Answer(lines=_each(lambda k: partial(desk.ask, FOLLOWED, work, source, state, *more, k), most))
+        return Answer(lines=_each(lambda k: partial(desk.ask, FOLLOWED, work, source, state, *more, k), maximum))
 
     def _fronted(self, body: Any) -> Answer:
         across = body.pop("across", None) if isinstance(body, dict) else None
@@ -138,8 +140,8 @@ def _read(answer: Callable[[PageState], Answer]) -> Callable[[Any], Answer]:
     return answered
 
 
-def _each(work: Callable[[int], Callable[[], str]], most: int) -> Iterator[str]:
-    for k in range(most):
+def _each(work: Callable[[int], Callable[[], str]], maximum: int) -> Iterator[str]:
+    for k in range(maximum):
         text = _worked(work(k)).text
         yield text
         if text.startswith(('{"error"', '{"done"', '{"dropped"')):

@@ -75,8 +75,8 @@ class SizeBoxes:
         for limit in problem.limits:
             for edge, sense in ((limit.maximum, 1.0), (limit.minimum, -1.0)):
                 if math.isfinite(edge):
-                    most = sense * edge + SLACK * abs(edge)
-                    self.limits.append((most, self._number(limit.measure, sense), limit))
+                    maximum = sense * edge + SLACK * abs(edge)
+                    self.limits.append((maximum, self._number(limit.measure, sense), limit))
         self._ask, self._together = ask, self._programs(ask)
         self.touch(model.lower, model.upper)
 
@@ -153,14 +153,14 @@ class SizeBoxes:
 
     def touch(self, lower: Array, upper: Array) -> None:
         """Add affine functions that loads meet at masses of a box."""
-        reach, most = self.reach(lower, upper), MOST_TOUCHED if self._together is None else FEW_TOUCHED
+        reach, maximum = self.reach(lower, upper), MOST_TOUCHED if self._together is None else FEW_TOUCHED
         (middle, length), unbalances = reach.middle, self.model.start
         for number in (*(number for _, number in self.terms), *(number for _, number, _ in self.limits)):
             for bundle in number.pieces:
-                for masses in (reach.low, middle) if bundle.count < most else ():
+                for masses in (reach.low, middle) if bundle.count < maximum else ():
                     bundle.touch(np.append(masses, unbalances), length)
 
-    def least(self, number: Number, lower: Array, upper: Array, reach: SizeReach) -> float:
+    def minimum(self, number: Number, lower: Array, upper: Array, reach: SizeReach) -> float:
         """Return a lower bound of a measure on a box."""
         at = corner(number.ways, lower, upper)
         if not number.pieces:
@@ -172,27 +172,27 @@ class SizeBoxes:
         factors = self.model.factors(bundle.piece, measure, engine)
         ratio = bundle.piece.ratio(factors)
         if ratio is not None:
-            return ratio * bundle.least(reach)
+            return ratio * bundle.minimum(reach)
         scaled, (masses, length) = bundle.scaled(factors), reach.middle
         scaled.touch(np.append(masses, self.model.start), length)
-        return scaled.least(reach)
+        return scaled.minimum(reach)
 
     def objective(self, lower: Array, upper: Array, known: Sequence[Together] = ()) -> float:
         """Return a lower bound of the objective on a box, infinite where known dual rows exclude it."""
         reach = self.reach(lower, upper)
         # what is known of all loads together is no less than what each tells
         numbers = [(w, number) for w, number in self.terms if not (known and number.pieces)]
-        bound = sum(weight * self.least(number, lower, upper, reach) for weight, number in numbers)
+        bound = sum(weight * self.minimum(number, lower, upper, reach) for weight, number in numbers)
         if self._together is None or not known:
             return bound
-        return bound + max(*(self._together.least(rows, lower, upper, reach) for rows in known), 0.0)
+        return bound + max(*(self._together.minimum(rows, lower, upper, reach) for rows in known), 0.0)
 
     def breaks(self, lower: Array, upper: Array, k: int | None = None, way: float = 0.0) -> bool:
         """Return whether a limit is broken all over a box; with k, of limits that go one `way` with size k."""
         reach = self.reach(lower, upper)
         return any(
-            self.least(number, lower, upper, reach) > most
-            for most, number, _ in self.limits
+            self.minimum(number, lower, upper, reach) > maximum
+            for maximum, number, _ in self.limits
             if k is None or number.ways[k] == way
         )
 
@@ -322,11 +322,11 @@ class _Around:
 
 
 def divided_sizes(
-    boxes: SizeBoxes, value: float, room: float, most: int = MOST_BOXES, known: Known | None = None
+    boxes: SizeBoxes, value: float, room: float, maximum: int = MOST_BOXES, known: Known | None = None
 ) -> BoxResult:  # fmt: skip
     """Halve boxes, the least first, until none may hold a design that is `room` better than `value` (Z12)."""
     division = _Sizes(boxes, value, room, known)
-    bound = division.run(division.bounded(boxes.model.lower, boxes.model.upper), most)
+    bound = division.run(division.bounded(boxes.model.lower, boxes.model.upper), maximum)
     if known is not None:
         check_around(_Around(boxes, known), known.place, known)
     return bound

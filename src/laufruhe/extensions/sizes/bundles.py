@@ -34,18 +34,18 @@ class SizeReach(NamedTuple):
         return 0.5 * (self.low + self.high), 0.5 * (self.rod[0] + self.rod[1])
 
     @property
-    def most(self) -> Array:
+    def maximum(self) -> Array:
         """Largest size of one, then of every column."""
         scales = [np.full(domain.width, domain.scale) for domain in self.domains]
         return np.concatenate([[1.0], np.maximum(np.abs(self.low), np.abs(self.high)), *scales])
 
-    def least(self, functions: Array) -> Array:
+    def minimum(self, functions: Array) -> Array:
         """Return the least of affine functions, shape (n, 1 + columns)."""
         masses = functions[:, 1 : 1 + MASSES]
         total = functions[:, 0] + np.where(masses > 0.0, masses * self.low, masses * self.high).sum(axis=1)
         for domain in self.domains:
             columns = functions[:, 1 + MASSES :][:, domain.columns]
-            total = total + np.array([domain.set.least(row) for row in columns])
+            total = total + np.array([domain.set.minimum(row) for row in columns])
         return np.asarray(total)
 
 
@@ -65,9 +65,9 @@ def least_of(nodes: Array, terms: Array, rest: Array, reach: SizeReach) -> Array
         Bound of the rest of the series, shape (1 + columns,).
     """
     series = np.einsum("mn,tnj->mtj", terms, nodes)
-    linear, further, most = series[1:2].sum(axis=0), np.abs(series[2:]).sum(axis=0), reach.most
-    ends = np.minimum(*(reach.least(series[0] + end * linear) for end in (-1.0, 1.0)))
-    return np.asarray(ends - further @ most - rest @ most)
+    linear, further, maximum = series[1:2].sum(axis=0), np.abs(series[2:]).sum(axis=0), reach.maximum
+    ends = np.minimum(*(reach.minimum(series[0] + end * linear) for end in (-1.0, 1.0)))
+    return np.asarray(ends - further @ maximum - rest @ maximum)
 
 
 class Bundle:
@@ -91,7 +91,7 @@ class Bundle:
         """Return an empty bundle with other factors of its rows."""
         return Bundle(self.lengths.scaled(factors))
 
-    def least(self, reach: SizeReach) -> float:
+    def minimum(self, reach: SizeReach) -> float:
         """Return a lower bound of the norm on a box."""
         values = least_of(self.nodes, self.lengths.terms(*reach.rod), self.lengths.rest, reach)
         return max(float(values.max(initial=0.0)), 0.0)

@@ -57,7 +57,7 @@ class PistonPinTable(Table):
     diameter: f.OpenPositiveLength
     bore: f.OpenNonNegativeLength = 0.0
     length: f.OpenPositiveLength
-    in_bosses: Annotated[float, f.Number("", above=0.0, most=0.95)] = f.optional(
+    in_bosses: Annotated[float, f.Number("", above=0.0, maximum=0.95)] = f.optional(
         "Share of the length of the pin that the bosses hold.", 0.5
     )
     span: f.PositiveLength | None = f.optional(

@@ -93,7 +93,7 @@ class SizePrograms:
             return AffineNorm(rows[0].norm, constant, slope[..., columns], grid)
 
         terms = tuple((weight, norm(number)) for weight, number in self._terms)
-        limits = tuple((most, norm(number)) for most, number in self._limits)
+        limits = tuple((maximum, norm(number)) for maximum, number in self._limits)
         decisions = (*masses, *(domain.decision for domain in self._model.domains))
         return AffineProblem(terms, limits, domains_of(decisions), self._model.problem.fidelity.samples)
 
@@ -114,11 +114,11 @@ class SizePrograms:
         weighted = [(number, weight * z) for (weight, number), z in zip(self._terms, rows.terms, strict=False)]
         prices, constant, size = replace(rows, terms=()).shadow_prices(program), 0.0, 0.0
         limits = zip(self._limits, program.limits, rows.limits, prices, strict=True)
-        for (most, number), (_, norm), z, price in limits:
+        for (maximum, number), (_, norm), z, price in limits:
             if price > 0.0:
                 weighted.append((number, z))
-                constant += price * most
-                size += price * (most + norm.value(np.zeros(program.size)))
+                constant += price * maximum
+                size += price * (maximum + norm.value(np.zeros(program.size)))
         parts = []
         for number, z in weighted:
             cuts = np.cumsum([bundle.lengths.constant.shape[1] for bundle in number.pieces])[:-1]
@@ -126,7 +126,7 @@ class SizePrograms:
             parts.append((number, tuple(Grouped.from_rows(bundle.lengths, rows) for bundle, rows in bundles)))
         return Together(tuple(parts), constant, size, not rows.terms)
 
-    def least(self, known: Together, lower: Array, upper: Array, reach: SizeReach) -> float:
+    def minimum(self, known: Together, lower: Array, upper: Array, reach: SizeReach) -> float:
         """Return the bound of a box from dual rows; infinite where they exclude it."""
         if not known.parts:
             return 0.0
@@ -134,9 +134,9 @@ class SizePrograms:
         for number, groups in known.parts:
             engine = self._engine(number, lower, upper)
             for group in groups:
-                function, most = group.weighed(self._model.factors(group.lengths.piece, number.measure, engine))
+                function, maximum = group.weighed(self._model.factors(group.lengths.piece, number.measure, engine))
                 total = total + function
-                rest = rest + group.price * most * group.lengths.rest
+                rest = rest + group.price * maximum * group.lengths.rest
                 terms = group.lengths.terms(*reach.rod)
         total[:, 0] -= known.constant
         value = float(least_of(total[None], terms, rest, reach)[0])

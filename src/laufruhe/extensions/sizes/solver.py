@@ -101,14 +101,14 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
 
     def bounded(value: float, room: float, design: Design) -> BoxResult:
         usual = MOST_WITH_ROD if model.moves_rod else MOST_PROGRAMS if model.domains else MOST_BOXES
-        most = problem.search.boxes_or(usual)
+        maximum = problem.search.boxes_or(usual)
         if boxes is None:
             return BoxResult(0.0, 0)
         if known < value < math.inf:
             # a room is a share of the value
             value, room = known, room * known / value
         place = program.columns(program.shares(design.values))[program.sized]
-        return divided_sizes(boxes, value, room, most, known_of(design, place) if value < math.inf else None)
+        return divided_sizes(boxes, value, room, maximum, known_of(design, place) if value < math.inf else None)
 
     outcome = proven(program, best, bounded)
     if boxes is not None and outcome.excludes_all:
@@ -143,7 +143,7 @@ def ask_cones(program: AffineProblem, exactly: bool = False) -> tuple[Array | No
     fewer = replace(
         program,
         terms=tuple((weight, _thinned(norm, steps)) for weight, norm in program.terms),
-        limits=tuple((most, _thinned(norm, steps)) for most, norm in program.limits),
+        limits=tuple((maximum, _thinned(norm, steps)) for maximum, norm in program.limits),
     )
     solution = solve_cones(fewer)
     return solution.x, solution.multipliers

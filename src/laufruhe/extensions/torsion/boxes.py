@@ -80,7 +80,7 @@ class _OfInertia:
         self._rises = not falls_with_flywheel(measure.channel)
         self._engine, self._fidelity = evaluation.engine, evaluation.fidelity
 
-    def least(self, chains: Sequence[Torsion]) -> float:
+    def minimum(self, chains: Sequence[Torsion]) -> float:
         """Return the least value on a box, from the chains of its lower corner, centre and upper corner."""
         inertia = turning_inertia(self._engine.with_extra(chains[0 if self._rises else -1]), self._fidelity)
         return 0.0 if inertia is None else self._number(Flywheel(inertia))
@@ -147,10 +147,13 @@ class TwistBoxes:
             return math.inf, int(np.argmax(wide))
         centre, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
         chains = [self.coordinates.chain(x) for x in (lower, centre, upper)]
-        if any(of.least(chains) > most * (1.0 + SLACK) for most, of in self._uneven):
+        if any(of.minimum(chains) > maximum * (1.0 + SLACK) for maximum, of in self._uneven):
             return math.inf, int(np.argmax(wide))
         twists = [self._expanded(lines, chains[1], centre, half) for lines in self._lines]
-        if any(_root_bound([(1.0, self._under(q, chains, twists))]) > most * (1.0 + SLACK) for most, q in self._limits):
+        if any(
+            _root_bound([(1.0, self._under(q, chains, twists))]) > maximum * (1.0 + SLACK)
+            for maximum, q in self._limits
+        ):
             return math.inf, int(np.argmax(wide))
         if any(self._overheats(limit, chains, twists) for limit in self._heat):
             return math.inf, int(np.argmax(wide))
@@ -160,7 +163,7 @@ class TwistBoxes:
             np.nan_to_num(sum((w * under.bends[0] for w, under in terms), np.zeros(len(wide)))),
         )
         pull = pull / max(float(pull.max(initial=0.0)), 1e-300)
-        turning = sum(weight * of.least(chains) for weight, of in self._turning)
+        turning = sum(weight * of.minimum(chains) for weight, of in self._turning)
         if not self._terms:
             # each goes one way with every inertia, and nothing else moves it
             pull = wide
@@ -255,8 +258,8 @@ class TwistBoxes:
             return answer
         moved = np.broadcast_to(scaled[chosen], (1, len(lines.orders), len(chosen), len(root)))
         alone = mapped(twist, moved)
-        most = np.abs(alone.value) + np.abs(alone.slopes).sum(axis=2) + alone.rest[..., None]
-        return replace(answer, rest=answer.rest + np.linalg.norm(np.where(bend > 0.0, bend * most, 0.0), axis=-1))
+        maximum = np.abs(alone.value) + np.abs(alone.slopes).sum(axis=2) + alone.rest[..., None]
+        return replace(answer, rest=answer.rest + np.linalg.norm(np.where(bend > 0.0, bend * maximum, 0.0), axis=-1))
 
     def _mean(self, measure: Measure, chains: Sequence[Torsion], lines: _Lines, chosen: Indices) -> LinearResponse:
         zero, speed, factors = np.zeros(1), lines.loads.point.speed, FACTORS[measure.channel]

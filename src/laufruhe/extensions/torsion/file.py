@@ -28,11 +28,11 @@ T = TypeVar("T")
 MOST_DISCS = 60
 # share by which the inertia of discs may differ from what is given of all that turns: numbers are written rounded
 _ROUNDED = 0.01
-Inertias: TypeAlias = Annotated[list[float], OneOrEach(Annotated[float, Number("kg m^2", least=0.0)])]
-TorsionalDamping: TypeAlias = Annotated[float, Number("N m s/rad", least=0.0)]
+Inertias: TypeAlias = Annotated[list[float], OneOrEach(Annotated[float, Number("kg m^2", minimum=0.0)])]
+TorsionalDamping: TypeAlias = Annotated[float, Number("N m s/rad", minimum=0.0)]
 TorsionalDampings: TypeAlias = Annotated[list[float], OneOrEach(TorsionalDamping)]
 OpenTorsionalStiffness: TypeAlias = Annotated[float | Open, Number("N m/rad", above=0.0, openable=True)]
-OpenTorsionalDamping: TypeAlias = Annotated[float | Open, Number("N m s/rad", least=0.0, openable=True)]
+OpenTorsionalDamping: TypeAlias = Annotated[float | Open, Number("N m s/rad", minimum=0.0, openable=True)]
 TorsionalStiffnesses: TypeAlias = Annotated[list[float | Open], OneOrEach(OpenTorsionalStiffness)]
 
 
@@ -283,8 +283,8 @@ def _check_inertia(chain: Torsion, decisions: Sequence[Decision], problem: Probl
                 where, None, f"gives an inertia that follows from {decision.name}, which is open", "leave it out"
             )
     inertia, without_rings = wheel.inertia, chain.turning_inertia(problem.engine.slider_cranks)
-    most = without_rings + sum(absorber.inertia for absorber in chain.absorbers)
-    if not without_rings * (1.0 - _ROUNDED) <= inertia <= most * (1.0 + _ROUNDED):
+    maximum = without_rings + sum(absorber.inertia for absorber in chain.absorbers)
+    if not without_rings * (1.0 - _ROUNDED) <= inertia <= maximum * (1.0 + _ROUNDED):
         of_discs = units.shown(without_rings, "kg m^2")
         rule = f"differs from the {of_discs} that the discs of [torsion] have without pistons and rods"
         remedy = "leave [flywheel] out, and it follows from them" if where == "flywheel" else "let them agree"

@@ -37,15 +37,15 @@ def solve_torsion(problem: Problem) -> Result:
     best = best_local_optimum(program, [program.shares(problem.start), *spread_starts(problem)], problem.search.starts)
     boxes = TwistBoxes(problem, initial)
     known = boxes.coordinates.is_exact and boxes.is_sampled_fully
-    most = problem.search.boxes_or(MOST_BOXES if len(problem.decisions) <= MOST_OPEN else 0) if known else 0
+    maximum = problem.search.boxes_or(MOST_BOXES if len(problem.decisions) <= MOST_OPEN else 0) if known else 0
 
     def bounded(value: float, room: float, design: Design) -> BoxResult:
-        if not most or (value < math.inf and not boxes.has_terms):
+        if not maximum or (value < math.inf and not boxes.has_terms):
             return BoxResult(0.0, 0)
         coordinates = boxes.coordinates
         place = coordinates.from_decisions(np.array([float(x.real) for x in design.values]))
         known = known_of(design, place) if value < math.inf else None
-        divided = divide(boxes, coordinates.lower, coordinates.upper, value, room, most, known)
+        divided = divide(boxes, coordinates.lower, coordinates.upper, value, room, maximum, known)
         return replace(divided, places=tuple(coordinates.decisions(x) for x in divided.places))
 
     outcome = proven(program, best, bounded)

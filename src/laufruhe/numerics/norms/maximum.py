@@ -72,7 +72,7 @@ class Maximum(Norm):
         count = len(grid.weights)
         return Cones(np.ones(1), np.zeros(count, dtype=np.intp), np.ones(count))
 
-    def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return a variable that no softened row exceeds (E22)."""
         import casadi as ca
 
@@ -81,12 +81,12 @@ class Maximum(Norm):
         return top * unit
 
     def limited(
-        self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
+        self, program: SmoothProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
         """Limit the squares, which are smooth at zero."""
         import casadi as ca
 
-        return ca.sum2(rows * rows), most * most, 2.0 * most
+        return ca.sum2(rows * rows), maximum * maximum, 2.0 * maximum
 
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Bound by the sum of the orders' amplitudes."""
@@ -102,8 +102,8 @@ class Maximum(Norm):
                 size, step = fine_lengths(signal, coarse, times)
                 bends.append(step**2 / 8.0 * float(curvature(signal)[0].max(initial=0.0)))
                 bent = lengths(signal.values(signal.bends)).max(axis=0, initial=0.0)
-                most, least = size.max(axis=(0, 1)), size.max(axis=0).min(axis=0)
-                errors.append(float((np.maximum(most, bent) - np.maximum(least, bent)).max(initial=0.0)))
+                maximum, minimum = size.max(axis=(0, 1)), size.max(axis=0).min(axis=0)
+                errors.append(float((np.maximum(maximum, bent) - np.maximum(minimum, bent)).max(initial=0.0)))
         return max(errors) + max(bends)
 
 

@@ -92,7 +92,7 @@ class Mean(Norm):
         count = len(grid.weights)
         return Cones(grid.weights, np.arange(count), np.ones(count))
 
-    def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return the softened lengths."""
         import casadi as ca
 

@@ -242,18 +242,18 @@ class Norm(ABC):
         """Return the norm as second-order cones."""
         raise self._unclaimed("cones")
 
-    def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return a smooth expression to minimise, off by no more than the share of `unit` (N3, E22)."""
         raise self._unclaimed("smooth form")
 
     def limited(
-        self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
+        self, program: SmoothProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
-        """Return a smooth expression for norm <= `most`, its largest value, and the slope of that by `most`.
+        """Return a smooth expression for norm <= `maximum`, its largest value, and the slope of that by `maximum`.
 
         Smooth where the rows are zero too, and off by no more than the share of one; that to minimise where it is so.
         """
-        return self.least(program, grid, rows, 1.0, share), most, 1.0
+        return self.smooth_expression(program, grid, rows, 1.0, share), maximum, 1.0
 
     @abstractmethod
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
@@ -330,12 +330,12 @@ def curvature(signal: Spectrum) -> tuple[Array, Array]:
     """Bound the second derivative over crank angle between kinks, and its mean with them, shape (places,)."""
     smooth = signal.smooth
     bent = Spectrum(smooth.base, smooth.coefficients * (smooth.orders**2)[:, None, None])
-    most, mean = amplitudes(bent), np.sqrt(mean_square(bent))
+    maximum, mean = amplitudes(bent), np.sqrt(mean_square(bent))
     if signal.kinks is None:
-        return most, mean
+        return maximum, mean
     size = lengths(signal.kinks.curvature(signal.period))
     bends = lengths(np.abs(signal.kinks.jumps[:, 1]).sum(axis=0)) / signal.period
-    return most + size.max(axis=0), mean + size.mean(axis=0) + bends
+    return maximum + size.max(axis=0), mean + size.mean(axis=0) + bends
 
 
 def jumped(signal: Spectrum) -> Array:

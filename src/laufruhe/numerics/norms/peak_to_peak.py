@@ -114,7 +114,7 @@ class PeakToPeak(Norm):
         count = len(grid.weights)
         return Cones(np.full(1, 2.0), np.zeros(count, dtype=np.intp), np.ones(count), centred=True)
 
-    def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return a variable over all radii (E22)."""
         return 2.0 * unit * self._radius(program, grid, rows / unit, share)
 

@@ -63,7 +63,7 @@ class RootMeanSquare(Norm):
         """Return a single cone over all rows, each times the root of its weight."""
         return Cones(np.ones(1), np.zeros(1, dtype=np.intp), np.sqrt(grid.weights), whole=True)
 
-    def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return the norm softened as a single length."""
         import casadi as ca
 
@@ -71,12 +71,12 @@ class RootMeanSquare(Norm):
         return ca.sqrt(ca.dot(ca.DM(grid.weights), ca.sum2(rows * rows)) + softness**2) - softness
 
     def limited(
-        self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
+        self, program: SmoothProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
         """Limit the mean square, which is smooth at zero."""
         import casadi as ca
 
-        return ca.dot(ca.DM(grid.weights), ca.sum2(rows * rows)), most * most, 2.0 * most
+        return ca.dot(ca.DM(grid.weights), ca.sum2(rows * rows)), maximum * maximum, 2.0 * maximum
 
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Return Parseval's sum, exact except for orders of kinks."""

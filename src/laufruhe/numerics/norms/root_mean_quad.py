@@ -85,7 +85,7 @@ class RootMeanQuad(Norm):
             ),
         )
 
-    def least(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
+    def smooth_expression(self, program: SmoothProgram, grid: Grid, rows: Any, unit: Any, share: Any) -> Any:
         """Return the norm of the rows and of one length of the share of `unit`, less that length."""
         import casadi as ca
 
@@ -93,13 +93,13 @@ class RootMeanQuad(Norm):
         return unit * (ca.sqrt(ca.sqrt(ca.dot(ca.DM(grid.weights), squares * squares) + share**4)) - share)
 
     def limited(
-        self, program: SmoothProgram, grid: Grid, rows: Any, most: float, share: float
+        self, program: SmoothProgram, grid: Grid, rows: Any, maximum: float, share: float
     ) -> tuple[Any, float, float]:
         """Return the mean of fourth powers, which is smooth at zero."""
         import casadi as ca
 
         squares = ca.sum2(rows * rows)
-        return ca.dot(ca.DM(grid.weights), squares * squares), most**4, 4.0 * most**3
+        return ca.dot(ca.DM(grid.weights), squares * squares), maximum**4, 4.0 * maximum**3
 
     def above(self, signals: Sequence[Spectrum], shares: Array) -> float:
         """Return a bound by Hölder's inequality: |v|^4 has at most the largest square times the mean square."""

@@ -52,8 +52,8 @@ def figure(result: Result) -> Figure:
 
 def _measures(design: Evaluation, k: int) -> Array:
     each = measured(design, k)
-    mean, most = np.array([m.mean for m in each]), np.array([m.max for m in each])
-    return np.array([[*mean, mean.mean()], [*most, most.max()]])
+    mean, maximum = np.array([m.mean for m in each]), np.array([m.max for m in each])
+    return np.array([[*mean, mean.mean()], [*maximum, maximum.max()]])
 
 
 def _groups(axes: Axes, values: list[Array], series: list[Series], part: range, top: float) -> None:
@@ -64,11 +64,11 @@ def _groups(axes: Axes, values: list[Array], series: list[Series], part: range, 
     # least height of a bar with a number inside
     room = 0.18 * axes.figure.dpi / axes.bbox.height * factor * top
     for k, (table, one) in enumerate(zip(values, series, strict=True)):
-        mean, most = factor * table[:, part]
+        mean, maximum = factor * table[:, part]
         at = places + (k - 0.5 * (len(values) - 1)) * (WIDTH + 0.04)
         axes.bar(at, mean, WIDTH, color=one.colour, linewidth=0, label="mean")
-        axes.bar(at, most, WIDTH, facecolor="none", edgecolor=one.colour, linewidth=1.4, label="maximum")
-        for x, low, high in zip(at, mean, most, strict=True):
+        axes.bar(at, maximum, WIDTH, facecolor="none", edgecolor=one.colour, linewidth=1.4, label="maximum")
+        for x, low, high in zip(at, mean, maximum, strict=True):
             words = number(high, 3, factor * top)
             axes.annotate(words, (x, high), (0, 2), textcoords="offset points", ha="center", size=SMALL, color=INK)
             if low > room:

@@ -150,10 +150,10 @@ def _rows(series: Sequence[Series], k: int, mounts: Sequence[int]) -> Iterator[R
     loads = [one.design.loads[k] for one in series]
     base = series[0].design.engine.cycle.base_order
     x, y, z, roll, pitch, yaw = np.moveaxis(np.stack([_closed(load.wrench, base) for load in loads]), -1, 0)
-    most = max(float(np.abs(load.wrench.coefficients).max(initial=0.0)) for load in loads)
-    yield _row("shaking force", "N", {"vertical": z, "lateral": y, "longitudinal": x}, most)
-    yield _row("roll moment", "N m", {"": roll}, most)
-    yield _row("rocking couple", "N m", {"pitch": pitch, "yaw": yaw}, most)
+    maximum = max(float(np.abs(load.wrench.coefficients).max(initial=0.0)) for load in loads)
+    yield _row("shaking force", "N", {"vertical": z, "lateral": y, "longitudinal": x}, maximum)
+    yield _row("roll moment", "N m", {"": roll}, maximum)
+    yield _row("rocking couple", "N m", {"pitch": pitch, "yaw": yaw}, maximum)
     forces = [_closed(load.mount_forces, base) for load in loads if load.mount_forces is not None]
     sizes = [np.linalg.norm(np.stack([force[:, m] for force in forces]), axis=-1) for m in mounts]
     # one scale makes mounts comparable
@@ -167,13 +167,13 @@ def _closed(signal: Spectrum, base: Fraction) -> Array:
     return np.concatenate([samples, samples[:1]])
 
 
-def _row(label: str, unit: str, curves: Mapping[str, Array], most: float) -> Row:
+def _row(label: str, unit: str, curves: Mapping[str, Array], maximum: float) -> Row:
     size = {name: float(np.abs(curve).max()) for name, curve in curves.items()}
     top = max(size.values())
-    if words := omitted_words(top, most, unit):
+    if words := omitted_words(top, maximum, unit):
         return Row(label, unit, {}, (0.0, top), words)
-    least = SHARE * top
-    visible = {name: curve for name, curve in curves.items() if size[name] > least}
+    minimum = SHARE * top
+    visible = {name: curve for name, curve in curves.items() if size[name] > minimum}
     ends = [float(end) for curve in visible.values() for end in (curve.min(), curve.max())]
     return Row(label, unit, visible, (min(ends, default=0.0), max(ends, default=0.0)))
 

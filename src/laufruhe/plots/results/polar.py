@@ -62,12 +62,12 @@ class Frame:
     @classmethod
     def from_paths(cls, paths: Sequence[Array], count: int) -> Frame:
         """Return the frame of the paths of the first `count` mounts."""
-        most = {c: max(float(np.abs(path[:, :count, c]).max(initial=0.0)) for path in paths) for c in NAMES}
-        small, large = sorted(NAMES, key=lambda c: most[c])
-        share = most[small] / axis_end([most[large]])
+        maximum = {c: max(float(np.abs(path[:, :count, c]).max(initial=0.0)) for path in paths) for c in NAMES}
+        small, large = sorted(NAMES, key=lambda c: maximum[c])
+        share = maximum[small] / axis_end([maximum[large]])
         times = next(factor for factor in ENLARGED if factor * share <= 1.0)
         along = large if share < NEEDLE else None
-        return cls(1.08 * axis_end([most[large]]), {large: 1, small: times}, along, most[small])
+        return cls(1.08 * axis_end([maximum[large]]), {large: 1, small: times}, along, maximum[small])
 
 
 @styled()

@@ -58,11 +58,11 @@ def figure(result: Result) -> Figure:
 def _limits(axes: Axes, result: Result, top: float) -> list[Artist]:
     # over the speeds that the limits hold at [rpm]
     limits = limits_on(result, channels.TRANSMISSIBILITY)
-    most = [(limit.maximum, limit.measure.points) for limit in limits]
-    for maximum, named in most:
+    lines = [(limit.maximum, limit.measure.points) for limit in limits]
+    for maximum, named in lines:
         speeds = [point.speed * RPM for point in result.problem.points if named is None or point.name in named]
         low, high = min(speeds), max(speeds)
         if high - low < 0.02 * top:
             low, high = low - 0.02 * top, high + 0.02 * top
         axes.plot([low, high], [maximum] * 2, color=LIMIT, linewidth=2.4, solid_capstyle="butt", zorder=4)
-    return [entry("limit", color=LIMIT, linewidth=2.4)] if most else []
+    return [entry("limit", color=LIMIT, linewidth=2.4)] if lines else []

@@ -33,8 +33,8 @@ def figure(result: Result) -> Figure:
     drawn = page(2, 3, (SIZE, SIZE), gap=0.7, lead=0.3, across=0.72)
     _firings(drawn.panels[0], result)
     parts, initial = parts_of(result, engine, k), parts_of(result, result.initial.engine, k)
-    most = max(_sizes(each, kind) for each in (parts, initial) for kind in KINDS)
-    parts, initial = _visible(parts, most), _visible(initial, most)
+    maximum = max(_sizes(each, kind) for each in (parts, initial) for kind in KINDS)
+    parts, initial = _visible(parts, maximum), _visible(initial, maximum)
     largest = {kind: max(_sizes(parts, kind), _sizes(initial, kind)) for kind in KINDS}
     _bars(drawn.panels[3], parts, largest)
     for row, kind in enumerate(KINDS):
@@ -64,9 +64,9 @@ def _sizes(parts: Parts, kind: str) -> float:
     )
 
 
-def _visible(parts: Parts, most: float) -> Parts:
+def _visible(parts: Parts, maximum: float) -> Parts:
     return {
-        key: (ahead * (abs(ahead) > UNSEEN * most), back * (abs(back) > UNSEEN * most))
+        key: (ahead * (abs(ahead) > UNSEEN * maximum), back * (abs(back) > UNSEEN * maximum))
         for key, (ahead, back) in parts.items()
     }
 
@@ -109,12 +109,12 @@ def _bars(axes: Axes, parts: Parts, largest: Mapping[str, float]) -> None:
     """Draw forward and backward parts, forces and couples each relative to the largest of its kind."""
     names = []
     for row, ((kind, order), pair) in enumerate(parts.items()):
-        most, (factor, unit) = largest[kind] or 1.0, in_thousands(largest[kind], KINDS[kind][1])
+        maximum, (factor, unit) = largest[kind] or 1.0, in_thousands(largest[kind], KINDS[kind][1])
         for j, (part, colour) in enumerate(zip(pair, (FORWARD, BACKWARD), strict=True)):
             at = -row - 0.36 * j
-            axes.barh(at, abs(part) / most, 0.32, color=colour)
-            size = number(factor * abs(part), 3, scale=factor * most)
-            axes.text(abs(part) / most + 0.03, at, f"{size} {unit}", va="center", size=SMALL)
+            axes.barh(at, abs(part) / maximum, 0.32, color=colour)
+            size = number(factor * abs(part), 3, scale=factor * maximum)
+            axes.text(abs(part) / maximum + 0.03, at, f"{size} {unit}", va="center", size=SMALL)
         names.append(f"{ORDERS[order]}\n{kind}")
     axes.set_yticks([-row - 0.18 for row in range(len(parts))], names)
     axes.set(xlim=(0.0, 1.75), xticks=[])

@@ -68,14 +68,14 @@ class _Rest:
     ----------
     whole
         Upper bound of its norm.
-    most
+    maximum
         Upper bound of its length between kinks, by signal, shape (signals,).
     bends
         Angles of kinks at the start leads, and jumps of slope and value there, by signal.
     """
 
     whole: float
-    most: Array
+    maximum: Array
     bends: tuple[tuple[Array, Array, Array], ...]
 
 
@@ -143,11 +143,11 @@ class LeadBoxes:
                     rests[s] += self._remainder(measure, s, led, z, middle, float(half[s]))
         arcs = least_on_arcs(self.model.domains, self._ratios, half, under.gradient, slopes, tilts)
         value = under.constant + arcs - float(rests.sum())
-        at_middle = under.constant + sum(domain.least(under.gradient) for domain in self.model.domains)
+        at_middle = under.constant + sum(domain.minimum(under.gradient) for domain in self.model.domains)
         excluded = False
         if not program.terms:
             prices = replace(under.multipliers, terms=()).shadow_prices(program)
-            sizes = [most + norm.value(np.zeros(program.size)) for most, norm in program.limits]
+            sizes = [maximum + norm.value(np.zeros(program.size)) for maximum, norm in program.limits]
             excluded = value > ROUNDING * sum(price * size for price, size in zip(prices, sizes, strict=True))
         return LeadBound(
             math.inf if excluded or broken else degree + max(value, 0.0),
@@ -161,8 +161,8 @@ class LeadBoxes:
         rest, norm = self._rests[measure][s], led.norm
         if measure.norm.refinement == 1:
             return 0.5 * half**2 * rest.whole * norm.dual_norm(z)
-        size = lengths(z).reshape(len(rest.most), -1)
-        total = 0.5 * half**2 * float(size.sum(axis=1) @ rest.most)
+        size = lengths(z).reshape(len(rest.maximum), -1)
+        total = 0.5 * half**2 * float(size.sum(axis=1) @ rest.maximum)
         by = float(middle[s] - self.model.start[s])
         for k, (angles, slopes, jumps) in enumerate(rest.bends):
             used = np.flatnonzero(size[k])
@@ -176,16 +176,16 @@ class LeadBoxes:
 
     def _point_of_signal(self, measure: Measure, signal: int) -> int:
         counted = np.flatnonzero(measure.shares(self.model.problem.points) > 0.0)
-        return int(counted[signal * len(counted) // len(self._rests[measure][0].most)])
+        return int(counted[signal * len(counted) // len(self._rests[measure][0].maximum)])
 
     def _rest(self, measure: Measure, s: int) -> _Rest:
         shares = measure.shares(self.model.problem.points)
-        square, most, bends = 0.0, [], []
+        square, maximum, bends = 0.0, [], []
         for weight, own in zip(shares[shares > 0.0], self.model.counted(measure, s), strict=True):
             square += weight * float(np.mean(mean_square(own.series.derivative.derivative)))
-            most.append(curvature(own)[0])
+            maximum.append(curvature(own)[0])
             bends += _bends(own)
-        return _Rest(math.sqrt(square), np.concatenate(most), tuple(bends))
+        return _Rest(math.sqrt(square), np.concatenate(maximum), tuple(bends))
 
 
 def least_on_arcs(
@@ -209,14 +209,14 @@ def least_on_arcs(
     if arcs.max() > WIDE:
         return -math.inf
     sides = [((math.cos(a), math.sin(a)), (math.cos(a), -math.sin(a)), (1.0 / math.cos(a), 0.0)) for a in arcs]
-    least = math.inf
+    minimum = math.inf
     for corner in itertools.product(*sides):
         along, across = np.array(corner).T
         by = across / ratios
         turned = gradient + (along - 1.0) @ tilts[0] + by @ tilts[1]
-        least = min(least, float(by @ slopes) + sum(domain.least(turned) for domain in domains))
+        minimum = min(minimum, float(by @ slopes) + sum(domain.minimum(turned) for domain in domains))
     # d differs from sin(n d) / n by the cube
-    return least - float((np.abs(slopes) * ratios**2 * half**3).sum()) / 6.0
+    return minimum - float((np.abs(slopes) * ratios**2 * half**3).sum()) / 6.0
 
 
 def _bends(signal: Spectrum) -> list[tuple[Array, Array, Array]]:

@@ -122,7 +122,7 @@ class _Around:
 
 
 def divided(
-    problem: MonotoneProblem, value: float, room: float, most: int = MOST_BOXES, known: Known | None = None
+    problem: MonotoneProblem, value: float, room: float, maximum: int = MOST_BOXES, known: Known | None = None
 ) -> BoxResult:  # fmt: skip
     """Halve boxes until none may hold a design that is `room` better than `value` (T9).
 
@@ -132,7 +132,7 @@ def divided(
         Objective of the incumbent [SI]; infinite if there is none.
     room
         Absolute gap tolerance [SI].
-    most
+    maximum
         Largest number of boxes.
     known
         The incumbent, to check bounds.
@@ -140,7 +140,7 @@ def divided(
     boxes = _MonotoneBoxes(problem, value, room, known)
     if known is not None:
         check_around(_Around(problem, known), known.place, known)
-    return boxes.run(boxes.bounded(problem.lower, problem.upper), most)
+    return boxes.run(boxes.bounded(problem.lower, problem.upper), maximum)
 
 
 def _cut(problem: MonotoneProblem, lower: Array, upper: Array) -> tuple[Array, Array] | None:
@@ -157,13 +157,14 @@ def _cut(problem: MonotoneProblem, lower: Array, upper: Array) -> tuple[Array, A
 
 def _violates(problem: MonotoneProblem, lower: Array, upper: Array, k: int, sign: float) -> Callable[[float], bool]:
     # tests whether the slice at a value of number k violates a limit everywhere
-    limits = [(most, f, f.lowest_corner(lower, upper)) for most, f in problem.limits if f.signs[k] == sign]
+    limits = [(maximum, f, f.lowest_corner(lower, upper)) for maximum, f in problem.limits if f.signs[k] == sign]
 
     def violated(at: float) -> bool:
         slices = (
-            (most, function, np.where(np.arange(len(lower)) == k, at, corner)) for most, function, corner in limits
+            (maximum, function, np.where(np.arange(len(lower)) == k, at, corner))
+            for maximum, function, corner in limits
         )
-        return any(function.value(x) > most for most, function, x in slices)
+        return any(function.value(x) > maximum for maximum, function, x in slices)
 
     return violated
 

@@ -60,7 +60,7 @@ class _Travel:
         return np.asarray(-self.radius * kinematics.piston_acceleration(np, np.asarray(angle), self.ratio))
 
     @property
-    def most(self) -> tuple[float, float, float]:
+    def maximum(self) -> tuple[float, float, float]:
         """Upper bounds of the first three derivatives [m]: sums of amplitudes of orders."""
         orders = np.abs(np.fft.rfft(self.at(math.tau * np.arange(_STEPS) / _STEPS)))[1:] * (2.0 / _STEPS)
         h = np.arange(1, len(orders) + 1)
@@ -82,17 +82,17 @@ def torque_change(gas: Seiliger, part: SliderCrank, cycle: Cycle, half: float) -
     count = CELLS * cycle.turns
     own, far, ahead = _Travel(part.crank_radius, part.rod_ratio), _Travel(*_size(other)), other.ahead
     gamma, g = cycle.angle * (np.arange(count) + 0.5) / count, 0.5 * cycle.angle / count
-    (m1, m2, _), (n1, n2, n3) = own.most, far.most
+    (m1, m2, _), (n1, n2, n3) = own.maximum, far.maximum
     top, bottom = (ratio * angle for angle in chamber.dead_centres)
-    least, room = (float(own.at(a) + far.at(a + ahead)) for a in (top, bottom))
-    room -= least
+    minimum, room = (float(own.at(a) + far.at(a + ahead)) for a in (top, bottom))
+    room -= minimum
     first, last = float(far.slope(top + ahead)), float(far.slope(bottom + ahead))
     # both dead centres move by no more than the lead
     grows, loose = last - first, 4.0 * half * n2
     narrow = room - half * (abs(grows) + loose)
     if narrow <= 0.0:
         return np.full(count, math.inf)
-    swept = (own.at(gamma) + far.at(gamma + ahead) - least) / room
+    swept = (own.at(gamma) + far.at(gamma + ahead) - minimum) / room
     rate, bend = far.slope(gamma + ahead), far.bend(gamma + ahead)
     rough = (half * 4.0 * n1 + g * (m1 + n1)) / narrow
     off = (g + half) * n2 + 2.0 * half * n2 + rough * (abs(grows) + loose) + loose
@@ -134,8 +134,8 @@ def _pressed(
     slopes = (n1 * squeezed / low, np.where(high > cut, n2 * spent / burnt, 0.0), np.zeros_like(low))
     over, steep = np.zeros_like(low), np.zeros_like(low)
     for here, pair, slope in zip(strokes, ends, slopes, strict=True):
-        most = np.maximum(*(np.abs(each - gas.crankcase_pressure) for each in pair))
-        over, steep = np.maximum(over, np.where(here, most, 0.0)), np.maximum(steep, np.where(here, slope, 0.0))
+        maximum = np.maximum(*(np.abs(each - gas.crankcase_pressure) for each in pair))
+        over, steep = np.maximum(over, np.where(here, maximum, 0.0)), np.maximum(steep, np.where(here, slope, 0.0))
     return over, steep
 
 
@@ -215,7 +215,7 @@ class SharedGasBoxes:
             return 0.0
         changes = self._torques(evaluation.engine, float(half.sum()))
 
-        def least(measure: Measure) -> float:
+        def minimum(measure: Measure) -> float:
             if not measure.is_load:
                 return evaluation.value(measure)
             signals = evaluation.signals(measure.load)
@@ -226,9 +226,9 @@ class SharedGasBoxes:
             return rows.value - by_mass - self._by_gas(measure, changes)
 
         limits = [limit for limit in self.problem.limits if limit.measure.is_load or limit.measure.is_mass]
-        if any(least(limit.measure) > limit.maximum * (1.0 + 1e-6) for limit in limits):
+        if any(minimum(limit.measure) > limit.maximum * (1.0 + 1e-6) for limit in limits):
             return math.inf
-        return max(sum(term.weight * least(term.measure) for term in self.problem.objective), 0.0)
+        return max(sum(term.weight * minimum(term.measure) for term in self.problem.objective), 0.0)
 
     def _torques(self, engine: Engine, half: float) -> list[Array]:
         """Return the change of torque of all shared chambers at every operating point, on cells of a cycle [N m]."""

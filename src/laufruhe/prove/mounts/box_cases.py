@@ -96,10 +96,10 @@ def _with_stops(
     error = reach * np.sum(excess * _along(corner, stops.rows), axis=1, keepdims=True) + excess @ np.abs(ends).T
     rest = answer.rest[:, 0, None] + np.linalg.norm(error.reshape(*size.shape, 3), axis=-1)
     # the series diverges close to a free mode
-    least = np.where(np.isfinite(rest), size - np.abs(slope).sum(axis=-1) - rest, -np.inf)
-    box, best = np.arange(len(size)), np.argmax(least, axis=1)
+    minimum = np.where(np.isfinite(rest), size - np.abs(slope).sum(axis=-1) - rest, -np.inf)
+    box, best = np.arange(len(size)), np.argmax(minimum, axis=1)
     bound = LinearBound(size[box, best], slope[box, best], rest[box, best], answer.bends[:, 0])
-    return bound.where(np.isfinite(least[box, best])), span
+    return bound.where(np.isfinite(minimum[box, best])), span
 
 
 def _equilibrium(matrices: Array, stops: Stops, load: Array) -> Array:

@@ -43,20 +43,20 @@ class LinearRelaxation:
         limits = [(over[which], by[which]) for over, by in self.limits]
         return LinearRelaxation(self.value[which], self.slopes[which], limits, [pull[which] for pull in self.pulls])
 
-    def add(self, weight: float, least: LinearBound, left_out: float = 0.0) -> None:
+    def add(self, weight: float, minimum: LinearBound, left_out: float = 0.0) -> None:
         """Add a term to the objective, or zero where its bound is not positive."""
-        value = least.value - least.rest - left_out
+        value = minimum.value - minimum.rest - left_out
         known = np.isfinite(value) & (value > 0.0)
         self.value = self.value + weight * np.where(known, value, 0.0)
-        self.slopes = self.slopes + weight * np.where(known[:, None], least.slopes, 0.0)
+        self.slopes = self.slopes + weight * np.where(known[:, None], minimum.slopes, 0.0)
 
-    def add_limit(self, least: LinearBound, left_out: float, maximum: float) -> None:
+    def add_limit(self, minimum: LinearBound, left_out: float, maximum: float) -> None:
         """Add a limit."""
         unit = maximum or 1.0
-        over = (least.value - least.rest - left_out - maximum) / unit
-        known = np.isfinite(over) & np.all(np.isfinite(least.slopes), axis=1)
-        self.limits.append((np.where(known, over, -1.0), np.where(known[:, None], least.slopes / unit, 0.0)))
-        self.pulls.append(np.where(known[:, None], np.nan_to_num(least.bends) / unit, 0.0))
+        over = (minimum.value - minimum.rest - left_out - maximum) / unit
+        known = np.isfinite(over) & np.all(np.isfinite(minimum.slopes), axis=1)
+        self.limits.append((np.where(known, over, -1.0), np.where(known[:, None], minimum.slopes / unit, 0.0)))
+        self.pulls.append(np.where(known[:, None], np.nan_to_num(minimum.bends) / unit, 0.0))
 
     @property
     def excess(self) -> Array:
@@ -93,7 +93,7 @@ class LinearRelaxation:
         return np.asarray(np.max([np.zeros_like(self.slopes), *self.pulls], axis=0))
 
     @property
-    def least(self) -> Array:
+    def minimum(self) -> Array:
         """Lower bound of the feasible objective in each box, shape (boxes,); infinite where limits are violated.
 
         Multipliers of the limits (P4) are set one by one. The bound is piecewise linear in a multiplier, with kinks

@@ -36,7 +36,7 @@ class LinearBound:
     bends: Array
 
     @property
-    def least(self) -> Array:
+    def minimum(self) -> Array:
         """Least value over every box, shape (boxes,)."""
         return np.asarray(self.value - self.rest - np.abs(self.slopes).sum(axis=-1))
 
@@ -48,7 +48,7 @@ class LinearBound:
 
     def or_else(self, other: LinearBound) -> LinearBound:
         """Return for every box the bound with the larger least value."""
-        better = self.least >= other.least
+        better = self.minimum >= other.minimum
         first, second = self.where(better), other.where(~better)
         return LinearBound(*(getattr(first, part) + getattr(second, part) for part in PARTS))
 
@@ -141,8 +141,8 @@ def _sampled(quantity: Measure, answer: LinearResponse, lines: LoadedOrders, p: 
             return LinearBound(value, slope, *rests)
 
         # where the sum of squares is least, rows of equal weight have no slope
-        most = np.broadcast_to(size.max(axis=(1, 2), keepdims=True), size.shape)
-        return pair_with(size).or_else(pair_with(most))
+        maximum = np.broadcast_to(size.max(axis=(1, 2), keepdims=True), size.shape)
+        return pair_with(size).or_else(pair_with(maximum))
     # a maximum is the length of a row, and a peak to peak the distance of two rows
     box, first, times = np.arange(boxes), np.zeros((boxes, 3, mounts)), 1.0
     if quantity.norm.is_diameter:

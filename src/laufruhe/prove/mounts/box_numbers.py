@@ -49,8 +49,8 @@ def axis_residual(model: BoxModel, asked: Measure, lower: Array, upper: Array) -
     for k, matrix in enumerate(model.stiffness(0.5 * (lower + upper))):
         rows = axis.rows(matrix)
         y, constant = axis.under(rows / (float(np.linalg.norm(rows)) or 1.0))
-        least = float(y @ axis.answer(matrix)) - constant - np.abs(slopes @ y) @ (0.5 * (upper[k] - lower[k]))
-        bounds[k] = max(float(least), 0.0)
+        minimum = float(y @ axis.answer(matrix)) - constant - np.abs(slopes @ y) @ (0.5 * (upper[k] - lower[k]))
+        bounds[k] = max(float(minimum), 0.0)
     return bounds
 
 
@@ -76,8 +76,8 @@ RANGES: Mapping[Channel, Ranges] = {
     channels.TORQUE_ROLL: lambda *at: (axis_residual(*at), math.inf),
     channels.RAW_TORQUE_ROLL: lambda *at: (axis_residual(*at), math.inf),
     channels.DECOUPLING: lambda *at: (-math.inf, most_shares(*at).min(axis=0)),
-    channels.STATIC_TRAVEL: lambda *at: (static_loads(*at).least, math.inf),
-    channels.STATIC_FORCE: lambda *at: (static_loads(*at).least, math.inf),
+    channels.STATIC_TRAVEL: lambda *at: (static_loads(*at).minimum, math.inf),
+    channels.STATIC_FORCE: lambda *at: (static_loads(*at).minimum, math.inf),
     channels.DECOUPLING_SHORTFALL: lambda *at: (shortfall(*at), math.inf),
     channels.FREQUENCIES: lambda model, _, lower, upper: (
         _frequencies(model, lower)[:, -1], _frequencies(model, upper)[:, 0]
@@ -99,9 +99,9 @@ SAID = frozenset({channels.STATIC_TRAVEL, channels.STATIC_FORCE})
 
 def breaks(model: BoxModel, limit: Limit, lower: Array, upper: Array) -> Mask:
     """Return whether a limit is violated all over a box, shape (boxes,) (E39)."""
-    least, most = RANGES[limit.measure.channel](model, limit.measure, lower, upper)
-    out = np.zeros(len(lower), dtype=bool) | (least > limit.maximum * (1.0 + SLACK))
-    out |= most < limit.minimum * (1.0 - SLACK)
+    minimum, maximum = RANGES[limit.measure.channel](model, limit.measure, lower, upper)
+    out = np.zeros(len(lower), dtype=bool) | (minimum > limit.maximum * (1.0 + SLACK))
+    out |= maximum < limit.minimum * (1.0 - SLACK)
     if limit.outside is not None:
         a, b = limit.outside[0] * (1.0 + SLACK), limit.outside[1] * (1.0 - SLACK)
         out |= np.any((_frequencies(model, lower) > a) & (_frequencies(model, upper) < b), axis=1)

@@ -251,10 +251,10 @@ class BoxModel:
         stiffest = self.mounting(self.upper)
         # springs that share a mount count one by one, since their sum may be smaller
         separate = replace(stiffest, mounts=tuple(spring for _, spring in every_spring(stiffest.mounts)))
-        most, top = max(len(mount.springs) for mount in stiffest.mounts), self._parts(separate)
-        still = math.sqrt(most) * float(np.linalg.norm(top.springs + 1j * top.losses))
+        maximum, top = max(len(mount.springs) for mount in stiffest.mounts), self._parts(separate)
+        still = math.sqrt(maximum) * float(np.linalg.norm(top.springs + 1j * top.losses))
         still = still + np.linalg.norm(self.added_forces(lines.omegas), axis=(1, 2))
-        return np.asarray(motion * (still + lines.omegas * math.sqrt(most) * float(np.linalg.norm(top.dampers))))
+        return np.asarray(motion * (still + lines.omegas * math.sqrt(maximum) * float(np.linalg.norm(top.dampers))))
 
 
 def _dynamic(lines: LoadedOrders, springs: Array, losses: Array, dampers: Array) -> ComplexArray:

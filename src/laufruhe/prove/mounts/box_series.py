@@ -140,7 +140,7 @@ class LinearResponse:
     bends: Array
 
     @property
-    def most(self) -> Array:
+    def maximum(self) -> Array:
         """Upper bound of the length anywhere in a box, shape (...)."""
         size = np.linalg.norm(self.value, axis=-1) + np.linalg.norm(self.slopes, axis=-1).sum(axis=-1)
         return np.asarray(size + self.rest)
@@ -164,8 +164,8 @@ def series(
     moved = np.matmul(inverse, np.matmul(columns[:, None], inside))
     gain = np.matmul(np.swapaxes(columns, -2, -1)[:, None], moved)
     met = np.matmul(motion[..., None, :], columns[:, None])[..., 0, :]
-    balance, even, most = balanced(gain)
-    rest = rest_of(even, most, np.abs(met) * balance)
+    balance, even, maximum = balanced(gain)
+    rest = rest_of(even, maximum, np.abs(met) * balance)
     return Expansion(centres, halves, sides, motion, moved, gain, met, balance, rest)
 
 
@@ -178,12 +178,12 @@ def balanced(gain: Any) -> tuple[Array, ComplexArray, Array]:
     return balance, even, norm_over(even)
 
 
-def rest_of(even: ComplexArray, most: Array, hit: Array) -> Array:
+def rest_of(even: ComplexArray, maximum: Array, hit: Array) -> Array:
     """Bound g / (1 - g) |T G S z0| by |T z0|, (..., m) to (...); infinite if the series may diverge."""
-    second = np.minimum((np.linalg.norm(even, axis=-2) * hit).sum(axis=-1), most * np.linalg.norm(hit, axis=-1))
-    share = np.where(most < 1.0, most / np.where(most < 1.0, 1.0 - most, 1.0), np.inf)
+    second = np.minimum((np.linalg.norm(even, axis=-2) * hit).sum(axis=-1), maximum * np.linalg.norm(hit, axis=-1))
+    share = np.where(maximum < 1.0, maximum / np.where(maximum < 1.0, 1.0 - maximum, 1.0), np.inf)
     rest = share * np.where(second > 0.0, second, 1.0)
-    return np.asarray(np.where(second > 0.0, rest, np.where(most < 1.0, 0.0, np.inf)))
+    return np.asarray(np.where(second > 0.0, rest, np.where(maximum < 1.0, 0.0, np.inf)))
 
 
 def mapped(at: Expansion, value: Any, turned: Any = None) -> LinearResponse:

@@ -92,9 +92,9 @@ def box_modes(model: BoxModel, lower: Array, upper: Array) -> BoxModes:
     over, under = low[:, :, None] - (squares + own)[:, None, :], (squares - own)[:, None, :] - high[:, :, None]
     gaps = np.maximum(np.maximum(over, under), 0.0)
     across = np.where(_EYE, 0.0, change)
-    parts, most = np.ones_like(across), np.linalg.norm(across, axis=2)[:, None, :]
+    parts, maximum = np.ones_like(across), np.linalg.norm(across, axis=2)[:, None, :]
     for _ in range(ROUNDS):
-        coupling = np.minimum(np.einsum("bjk,bik->bij", across, parts), most)
+        coupling = np.minimum(np.einsum("bjk,bik->bij", across, parts), maximum)
         bound = np.where(gaps > 0.0, coupling / np.where(gaps > 0.0, gaps, 1.0), 1.0)
         parts = np.where(_EYE, 1.0, np.minimum(parts, bound))
     others = np.sum(np.where(_EYE, 0.0, parts) ** 2, axis=2)
@@ -113,7 +113,7 @@ def _rounding(squares: Array) -> Array:
 def most_shares(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
     """Return upper bounds of the largest share of each motion in a mode, shape (motions, boxes) (E7, E39)."""
     at = box_modes(model, lower, upper)
-    return np.array([_shares(model, at, motion).most.max(axis=1) for motion in motion_indices(measure)])
+    return np.array([_shares(model, at, motion).maximum.max(axis=1) for motion in motion_indices(measure)])
 
 
 def shortfall(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
@@ -122,8 +122,8 @@ def shortfall(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> 
     total, slopes = np.zeros(len(lower)), np.zeros_like(lower)
     alone = np.zeros(len(lower))
     for motion in motion_indices(measure):
-        value, slope, most = _of_the_largest(_shares(model, at, motion))
-        alone += np.maximum(measure.wanted - most, 0.0)
+        value, slope, maximum = _of_the_largest(_shares(model, at, motion))
+        alone += np.maximum(measure.wanted - maximum, 0.0)
         # a shortfall is at least zero, and at least its linear bound
         linear = measure.wanted - value
         counts = (linear > 0.0) & (linear + np.abs(slope).sum(axis=1) > 0.0)
@@ -140,13 +140,13 @@ class _Shares:
     ----------
     value, slopes
         Shapes (boxes, modes) and (boxes, modes, n).
-    most
+    maximum
         Constant bounds, shape (boxes, modes).
     """
 
     value: Array
     slopes: Array
-    most: Array
+    maximum: Array
 
 
 def _shares(model: BoxModel, at: BoxModes, motion: int) -> _Shares:
@@ -175,7 +175,7 @@ def _of_the_largest(shares: _Shares) -> tuple[Array, Array, Array]:
     value, slope = shares.value[boxes, best], shares.slopes[boxes, best]
     above = shares.value - value[:, None] + np.abs(shares.slopes - slope[:, None]).sum(axis=2)
     above[boxes, best] = 0.0
-    return value + np.maximum(above, 0.0).max(axis=1), slope, shares.most.max(axis=1)
+    return value + np.maximum(above, 0.0).max(axis=1), slope, shares.maximum.max(axis=1)
 
 
 def _most_along(along: Array, parts: Array) -> Array:

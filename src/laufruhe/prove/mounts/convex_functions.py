@@ -185,8 +185,8 @@ def dual_bound(program: ConvexProgram, x: Array, duals: ConvexDuals) -> tuple[fl
     for limit, price, dual in zip(program.limits, duals.prices, duals.limits, strict=True):
         c, g = limit.function.minorant(x, dual)
         constant, gradient = constant + price * (c - limit.maximum), gradient + price * g
-    least = np.minimum(gradient * program.lower, gradient * program.upper)
-    return constant + float(least.sum()), gradient
+    minimum = np.minimum(gradient * program.lower, gradient * program.upper)
+    return constant + float(minimum.sum()), gradient
 
 
 def excludes(program: ConvexProgram, x: Array, duals: ConvexDuals) -> bool:

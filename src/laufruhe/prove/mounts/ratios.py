@@ -53,9 +53,9 @@ def ratio_under(over: LinearResponse, firm: LinearResponse, groups: Sequence[Mas
         square = np.einsum("k,bk->b", weights, np.linalg.norm(firm.slopes, axis=-1).sum(axis=-1) ** 2)
         known = np.all(np.isfinite(firm.rest[:, group]), axis=1) & (bottom.value > 0.0)
         curvature = square / (2.0 * np.where(known, bottom.value, 1.0))
-        least = _least_ratio(top, replace(bottom, rest=bottom.rest + curvature))
-        best = np.maximum(best, np.where(known, least, 0.0))
-        scores = np.maximum(scores, (top.bends + least[:, None] * bottom.bends) / bottom.value[:, None])
+        minimum = _least_ratio(top, replace(bottom, rest=bottom.rest + curvature))
+        best = np.maximum(best, np.where(known, minimum, 0.0))
+        scores = np.maximum(scores, (top.bends + minimum[:, None] * bottom.bends) / bottom.value[:, None])
     return best, scores
 
 

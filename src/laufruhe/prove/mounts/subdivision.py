@@ -73,9 +73,9 @@ def divided_bounds(
         Incumbent, to check bounds.
     """
     search = StiffnessBoxes(problem, LEFT_OUT * room, value - NEARLY * room if value < math.inf else math.inf)
-    most = search.most_boxes
-    if most and search.is_sampled_fully:
-        counts = [math.ceil(share * most) for share in shares]
+    maximum = search.most_boxes
+    if maximum and search.is_sampled_fully:
+        counts = [math.ceil(share * maximum) for share in shares]
         yield from divide_in_rounds(search, search.model.lower, search.model.upper, value, room, counts, known)
 
 
@@ -185,20 +185,20 @@ class StiffnessBoxes:
         boxes, scores, size = LinearRelaxation.zero(lower), np.zeros_like(lower), np.full(len(lower), self.constant)
         for weight, quantity, lines, left_out in self._terms:
             at = self.model.expanded(lines, lower, upper)
-            least = under(self.model, quantity, lines, at)
-            boxes.add(weight, least, left_out)
-            scores, size = scores + weight * least.bends, size + weight * least.value
+            minimum = under(self.model, quantity, lines, at)
+            boxes.add(weight, minimum, left_out)
+            scores, size = scores + weight * minimum.bends, size + weight * minimum.value
         self._add_limits(boxes, lower, upper)
         numbers, score = self._numbers(lower, upper)
         violated = self._violated(lower, upper)
-        bounds = self.constant + numbers + boxes.least
+        bounds = self.constant + numbers + boxes.minimum
         scores = (scores + score) / np.where(size + numbers > 0.0, size + numbers, 1.0)[:, None]
         # simulations cost most, and come last
         left = np.flatnonzero(~violated & (bounds < self.enough))
         if self.simulated is not None and len(left):
             rest = boxes.subset(left)
             scores[left] = np.maximum(scores[left], self._add_simulated(rest, lower[left], upper[left]))
-            bounds[left] = self.constant + numbers[left] + rest.least
+            bounds[left] = self.constant + numbers[left] + rest.minimum
             boxes.pulls.append(np.zeros_like(scores))
             boxes.pulls[-1][left] = rest.pull
         if math.isinf(self.enough):
@@ -209,11 +209,11 @@ class StiffnessBoxes:
 
     def _add_limits(self, boxes: LinearRelaxation, lower: Array, upper: Array) -> None:
         for maximum, quantity, lines, left_out in self._limits:
-            least = under(self.model, quantity, lines, self.model.expanded(lines, lower, upper))
-            boxes.add_limit(least, left_out, maximum)
+            minimum = under(self.model, quantity, lines, self.model.expanded(lines, lower, upper))
+            boxes.add_limit(minimum, left_out, maximum)
         for limit in self._priced:
-            least = UNDER[limit.measure.channel](self.model, limit.measure, lower, upper)
-            boxes.add_limit(least, 0.0, limit.maximum * (1.0 + SLACK))
+            minimum = UNDER[limit.measure.channel](self.model, limit.measure, lower, upper)
+            boxes.add_limit(minimum, 0.0, limit.maximum * (1.0 + SLACK))
 
     def _add_simulated(self, boxes: LinearRelaxation, lower: Array, upper: Array) -> Array:
         """Add bounds of simulated measures (E65), and return branching scores, shape (boxes, n)."""
@@ -222,12 +222,12 @@ class StiffnessBoxes:
         weights = {term.measure: term.weight for term in problem.objective}
         for measure in self.simulated.measures:
             # a box that violates one limit needs no other
-            least = self.simulated.under(measure, lower, upper, boxes.excess <= 0.0)
-            boxes.add(weights.get(measure, 0.0), least)
+            minimum = self.simulated.under(measure, lower, upper, boxes.excess <= 0.0)
+            boxes.add(weights.get(measure, 0.0), minimum)
             for limit in problem.limits:
                 if limit.measure == measure:
-                    boxes.add_limit(least, 0.0, limit.maximum * (1.0 + SLACK))
-            scores = np.maximum(scores, least.bends / np.where(least.value > 0.0, least.value, 1.0)[:, None])
+                    boxes.add_limit(minimum, 0.0, limit.maximum * (1.0 + SLACK))
+            scores = np.maximum(scores, minimum.bends / np.where(minimum.value > 0.0, minimum.value, 1.0)[:, None])
         return scores
 
     def _numbers(self, lower: Array, upper: Array) -> tuple[Array, Array]:
@@ -235,11 +235,11 @@ class StiffnessBoxes:
         bounds, scores = np.zeros(len(lower)), np.zeros_like(lower)
         for term in self.problem.mount_terms:
             if is_ratio(term.measure):
-                least, score = self._ratio(term.measure, lower, upper)
+                minimum, score = self._ratio(term.measure, lower, upper)
                 scores = scores + term.weight * score
             else:
-                least = np.asarray(RANGES[term.measure.channel](self.model, term.measure, lower, upper)[0])
-            bounds = np.asarray(bounds + term.weight * least)
+                minimum = np.asarray(RANGES[term.measure.channel](self.model, term.measure, lower, upper)[0])
+            bounds = np.asarray(bounds + term.weight * minimum)
         return bounds, scores
 
     def _violated(self, lower: Array, upper: Array) -> Mask:

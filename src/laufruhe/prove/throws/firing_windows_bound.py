@@ -121,8 +121,8 @@ def windows(phasing: Phasing, intervals: Intervals) -> tuple[Array, Array]:
     lattice = firing_lattice(phasing.cycle, count)
     lower, upper = np.full(lattice.steps, math.inf), np.full(lattice.steps, -math.inf)
     for s, step in enumerate(lattice.slots):
-        early = max(s * intervals.least, cycle - (count - s) * intervals.most) - s * even
-        late = min(s * intervals.most, cycle - (count - s) * intervals.least) - s * even
+        early = max(s * intervals.minimum, cycle - (count - s) * intervals.maximum) - s * even
+        late = min(s * intervals.maximum, cycle - (count - s) * intervals.minimum) - s * even
         p = -step % lattice.steps
         lower[p], upper[p] = min(lower[p], -late), max(upper[p], -early)
     # the first throw stays

@@ -59,12 +59,12 @@ class Cut:
             total += self.moves[k, stars[:, k]]
         # min g . x of every decision, shape (stars, decisions)
         if self.turns is None:
-            minima = np.tile([domain.least(self.gradient) for domain in self.domains], (len(stars), 1))
+            minima = np.tile([domain.minimum(self.gradient) for domain in self.domains], (len(stars), 1))
         else:
             gradients = np.tile(self.gradient, (len(stars), 1))
             for k in range(stars.shape[1]):
                 gradients += self.turns[k, stars[:, k]]
-            minima = np.array([[domain.least(g) for domain in self.domains] for g in gradients])
+            minima = np.array([[domain.minimum(g) for domain in self.domains] for g in gradients])
         out = np.empty((len(stars), len(sets)))
         for column, built in enumerate(sets):
             chosen = [d for d, owner in enumerate(owners) if owner < 0 or owner in built]
@@ -77,7 +77,7 @@ class Cut:
 
         if self.turns is not None:
             return 0.0
-        rest = sum(domain.least(self.gradient) for domain in self.domains)
+        rest = sum(domain.minimum(self.gradient) for domain in self.domains)
         values = []
         for pattern in space.patterns:
             # the first throw stands on step 0
@@ -99,9 +99,9 @@ def cut_of(fine: StarProblem, multipliers: Multipliers) -> Cut:
         parts.append((weight * norm.norm.dual_feasible(norm.grid, rows), norm))
     for (maximum, norm), rows in zip(fine.limits, multipliers.limits, strict=True):
         z = norm.norm.balanced(norm.grid, rows)
-        most = norm.norm.dual_norm(norm.grid, z) * maximum
-        constant -= most
-        scale += most
+        reach = norm.norm.dual_norm(norm.grid, z) * maximum
+        constant -= reach
+        scale += reach
         parts.append((z, norm))
     for z, norm in parts:
         reach = np.abs(norm.constant) + np.abs(norm.moves).max(axis=1).sum(axis=0)

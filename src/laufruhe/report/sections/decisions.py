@@ -31,7 +31,7 @@ def _free(result: Result) -> str:
 
 def _row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str, ...]:
     name, factor = readable(d.unit)
-    most = max(abs(d.lower), abs(d.upper))
+    maximum = max(abs(d.lower), abs(d.upper))
     bounds = f"{trimmed(d.lower * factor)} to {trimmed(d.upper * factor)} {name}".rstrip()
     # the angle of a zero size is meaningless
     size = before if d.name.endswith(".angle") else None
@@ -40,5 +40,5 @@ def _row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str
         return d.name, initial, DASH, bounds, DASH, DASH
     upper = abs(d.value - d.upper) <= abs(d.value - d.lower)
     mark = DASH if not d.at_bound else "upper" if upper else "lower"
-    decided = figure(d.value, d.unit, scale=most) + in_grams(d.value, d.unit, most)
+    decided = figure(d.value, d.unit, scale=maximum) + in_grams(d.value, d.unit, maximum)
     return d.name, initial, decided, bounds, mark, prices_of(d, unit)

@@ -44,5 +44,5 @@ def _cells(each: list[CycleMeasures], scale: float) -> list[str]:
     if len(each) == 1:
         return [number(value, scale=scale) for value in (b.mean, b.max, b.rms)]
     change = percent(b.mean / a.mean - 1.0) if a.mean > 1e-9 * scale else DASH
-    means, most = ([number(value, scale=scale) for value in pair] for pair in ((a.mean, b.mean), (a.max, b.max)))
-    return [*means, change, *most]
+    means, maximum = ([number(value, scale=scale) for value in pair] for pair in ((a.mean, b.mean), (a.max, b.max)))
+    return [*means, change, *maximum]

@@ -36,7 +36,7 @@ def tables(result: Result) -> list[Table]:
 
 def _row(number: int, rank: RankValue, last: RankValue) -> tuple[str, ...]:
     scale = rank.initial
-    values = (figure(value, rank.unit, scale=scale) for value in (rank.initial, rank.least, rank.lower_bound))
+    values = (figure(value, rank.unit, scale=scale) for value in (rank.initial, rank.minimum, rank.lower_bound))
     price = DASH if rank is last else price_of(rank.price, last.unit, rank.unit)
     return f"{number} {rank.name}", *values, str(rank.proof), figure(rank.final, rank.unit, scale=scale), price
 
@@ -48,7 +48,7 @@ def _ends(rank: RankValue, name: str) -> str:
     unit, factor = readable(entry.unit)
     is_open = any(entry is each for each in rank.equal)
     # values below this are roundings
-    least = 1e-3 * max(abs(each.high) for each in rank.designs)
+    minimum = 1e-3 * max(abs(each.high) for each in rank.designs)
     values = (entry.low, entry.high) if is_open else (0.5 * (entry.low + entry.high),)
-    ends = (trimmed(0.0 if abs(value) <= least else factor * value, 3) for value in values)
+    ends = (trimmed(0.0 if abs(value) <= minimum else factor * value, 3) for value in values)
     return f"{' to '.join(ends)} {unit}".rstrip()

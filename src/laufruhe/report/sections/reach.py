@@ -46,15 +46,15 @@ def _sentence(limit: AttainableLimit, lead: str) -> str:
         return f"'{limit.name}' stays at {stands}: {limit.why}; {required} is asked."
     if limit.why:
         return f"What '{limit.name}' can reach is not told: {limit.why}."
-    least, beyond = ("least", "lower") if limit.side == "at most" else ("largest", "higher")
+    minimum, beyond = ("least", "lower") if limit.side == "at most" else ("largest", "higher")
     value, bound = figure(limit.value, limit.unit), figure(limit.bound, limit.unit)
     proof = Proof.GLOBAL if value == bound else limit.proof
     words = {
-        Proof.GLOBAL: f"the {least} that '{limit.name}' can reach is {value}, which is proven",
-        Proof.WITHIN_GAP: f"the {least} found of '{limit.name}' is {value}, and none {beyond} than {bound} is proven",
+        Proof.GLOBAL: f"the {minimum} that '{limit.name}' can reach is {value}, which is proven",
+        Proof.WITHIN_GAP: f"the {minimum} found of '{limit.name}' is {value}, and none {beyond} than {bound} is proven",
     }
     known = f"; no design is {beyond} than {bound}" if limit.bound > 0.0 else ", and nothing is proven of it"
-    said = words.get(proof, f"the {least} found of '{limit.name}' is {value}, a local optimum{known}")
+    said = words.get(proof, f"the {minimum} found of '{limit.name}' is {value}, a local optimum{known}")
     ended = " Its search ended for want of time; give more by a time limit." if limit.ended else ""
     text = f"{lead}{said}; {limit.side} {with_unit(limit.limit, limit.unit)} is asked.{ended}"
     return text[:1].upper() + text[1:]

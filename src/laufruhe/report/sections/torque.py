@@ -26,8 +26,8 @@ def tables(result: Result) -> list[Table]:
 
 
 def _row(name: str, facts: TorqueFacts) -> tuple[str, ...]:
-    size = max(abs(facts.least), abs(facts.largest))
-    numbers = [number(value, scale=size) for value in (facts.mean, 1e-3 * facts.power, facts.least, facts.largest)]
+    size = max(abs(facts.minimum), abs(facts.largest))
+    numbers = [number(value, scale=size) for value in (facts.mean, 1e-3 * facts.power, facts.minimum, facts.largest)]
     uneven = facts.irregularity
     even = DASH if uneven is None else "0" if not uneven else f"{number(uneven, 3)} (1/{1.0 / uneven:.4g})"
     return name, *numbers, number(facts.excursion), even

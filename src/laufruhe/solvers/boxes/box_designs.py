@@ -103,7 +103,7 @@ class RebalancedSearch(Search[S, RebalancedDesign]):
         names = {*self.conflict, *conflict}
         self.conflict = tuple(limit.name for limit in self.problem.limits if limit.name in names)
 
-    def solved(self, root: S | Over, first: RebalancedDesign | None, most: int, what: str, how: str) -> Result:
+    def solved(self, root: S | Over, first: RebalancedDesign | None, maximum: int, what: str, how: str) -> Result:
         """Return the best design of a branch and bound search, with its certificate.
 
         Parameters
@@ -112,7 +112,7 @@ class RebalancedSearch(Search[S, RebalancedDesign]):
             Box of all open numbers, or the proof that no design is feasible.
         first
             Incumbent to start with.
-        most
+        maximum
             Largest number of boxes.
         what, how
             Names of the open numbers and of the bounding method.
@@ -121,7 +121,7 @@ class RebalancedSearch(Search[S, RebalancedDesign]):
         initial, best, bound, boxes = evaluate(problem), first, math.inf, 1
         if not isinstance(root, Over) and first is not None:
             nothing = numerical_zero(problem)
-            best, bound, boxes = divided(self, root, first, nothing, problem.tolerance, most, f"boxes of {what}")
+            best, bound, boxes = divided(self, root, first, nothing, problem.tolerance, maximum, f"boxes of {what}")
         timing = {"solve": time.perf_counter() - started}
         if best is None or (math.isinf(bound) and best.design.rank[0]):
             return infeasible_result(problem, initial, self.conflict, timing)

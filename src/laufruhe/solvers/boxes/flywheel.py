@@ -128,7 +128,7 @@ class _WheelProgram(LocalProgram):
     def numbers(self, shares: Array) -> Array:
         """Return the objective, then the relative distance to each limit."""
         x, problem = np.array(self.values(shares)), self.functions
-        rooms = (1.0 - function.value(x) / most - INSIDE for most, function in problem.limits)
+        rooms = (1.0 - function.value(x) / maximum - INSIDE for maximum, function in problem.limits)
         return np.array([problem.value(x), *rooms])
 
 

@@ -112,8 +112,8 @@ class LeadSearch(RebalancedSearch[_Box]):
         self, middle: Array, half: Array, program: AffineProblem, norms: tuple[PhaseLeadNorm, ...]
     ) -> LeadBound:  # fmt: skip
         none = tuple(np.zeros_like(norm.constant) for _, norm in program.limits)
-        for k, (most, norm) in enumerate(program.limits):
-            if norm.value(np.zeros(0)) > most * (1.0 + SLACK):
+        for k, (maximum, norm) in enumerate(program.limits):
+            if norm.value(np.zeros(0)) > maximum * (1.0 + SLACK):
                 only = tuple(norm.subgradient(np.zeros(0)) if j == k else z for j, z in enumerate(none))
                 excluded = self._excluded(middle, half, program, norms[len(program.terms) :], only)
                 if excluded is not None:
@@ -191,6 +191,6 @@ class LeadSearch(RebalancedSearch[_Box]):
         program, _ = self.model.at(inside, self.samples)
         (swing, broken), x = self.boxes.degrees(inside, np.zeros_like(inside)), np.zeros(0)
         total = program.objective(x) + swing
-        over = sum(max(norm.value(x) / (most or 1.0) - 1.0, 0.0) for most, norm in program.limits)
+        over = sum(max(norm.value(x) / (maximum or 1.0) - 1.0, 0.0) for maximum, norm in program.limits)
         over += sum(broken.values())
         return float(total * (1.0 + 1e3 * over) + over)

@@ -243,8 +243,8 @@ def _from_zero(values: Set) -> Set:
 
 def _limit_on_sum(decision: Decision, drive: RotorDrive, parts: Sequence[Rotor]) -> Limit:
     radius = parts[0].radius or 1.0
-    most = _from_zero(decision.set).scale * abs(drive.gain) / radius
-    return Limit(decision.name, Measure(ADDED_MASS, rotors=tuple(part.name for part in parts)), most)
+    maximum = _from_zero(decision.set).scale * abs(drive.gain) / radius
+    return Limit(decision.name, Measure(ADDED_MASS, rotors=tuple(part.name for part in parts)), maximum)
 
 
 def _renamed(measure: Measure, names: dict[str, list[str]]) -> Measure:

@@ -91,10 +91,10 @@ def solve_places_with(problem: Problem, prove: Solve, how: str, propose: Propose
     propose
         Local search that starts from given values of the decisions.
     """
-    started, most = time.perf_counter(), problem.search.boxes_or(MOST_OTHERS)
+    started, maximum = time.perf_counter(), problem.search.boxes_or(MOST_OTHERS)
 
     def prove_roughly(part: Problem) -> Result:
-        return prove(replace(part, tolerance=HALF * problem.tolerance, search=replace(part.search, boxes=most)))
+        return prove(replace(part, tolerance=HALF * problem.tolerance, search=replace(part.search, boxes=maximum)))
 
     search = _PlaceSearchByMethod(problem, prove_roughly)
     root = search.box(*search.bounds)
@@ -176,12 +176,12 @@ class PlaceSearch(RebalancedSearch[_Box]):
         low = self.problem.design(lower.tolist(), self.places)
         high = low if np.array_equal(lower, upper) else self.problem.design(upper.tolist(), self.places)
         for limit in self._envelope:
-            for least, most in limit.measure.channel.span(limit.measure, low, high):
-                yield limit, least, most
+            for minimum, maximum in limit.measure.channel.span(limit.measure, low, high):
+                yield limit, minimum, maximum
 
     def _violated(self, lower: Array, upper: Array) -> tuple[str, ...]:
-        for limit, least, most in self._spans(lower, upper):
-            if least > limit.maximum + REACH or most < limit.minimum - REACH:
+        for limit, minimum, maximum in self._spans(lower, upper):
+            if minimum > limit.maximum + REACH or maximum < limit.minimum - REACH:
                 return (limit.name,)
         return ()
 

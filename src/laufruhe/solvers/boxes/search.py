@@ -138,7 +138,7 @@ class _Branching(BranchAndBound[B], Generic[B, D]):
 
 
 def divided(
-    search: Search[B, D], root: B, best: D, nothing: float, tolerance: float, most: int, what: str
+    search: Search[B, D], root: B, best: D, nothing: float, tolerance: float, maximum: int, what: str
 ) -> tuple[D, float, int]:
     """Divide boxes until the least bound meets the best design.
 
@@ -150,7 +150,7 @@ def divided(
         Objective that counts as zero [SI].
     tolerance
         Relative gap at which the search ends.
-    most
+    maximum
         Largest number of boxes.
     what
         Name of the boxes in progress reports.
@@ -161,7 +161,7 @@ def divided(
     """
     with speculation(_parted) as ahead:
         boxes = _Branching(search, best, nothing, tolerance, what, ahead)
-        bound = boxes.divide((root.bound, root), most)
+        bound = boxes.divide((root.bound, root), maximum)
     if boxes.known is not None:
         around: Bounder[D, B | Over] = _Around(search, what)
         check_around(around, boxes.best, boxes.known)
@@ -191,7 +191,7 @@ def _parted(step: tuple[Any, Any, float]) -> tuple[Iterable[tuple[Any, Any]], tu
 
 
 def search_from_grid(
-    penalised: Callable[[Array], float], lower: Array, upper: Array, steps: int, most: int, most_steps: int
+    penalised: Callable[[Array], float], lower: Array, upper: Array, steps: int, maximum: int, most_steps: int
 ) -> list[Array]:
     """Return the ends of simplex searches from the best points of a grid.
 
@@ -201,14 +201,14 @@ def search_from_grid(
         Objective with penalties on violated limits.
     lower, upper
         Bounds, shape (n,).
-    steps, most
+    steps, maximum
         Points of the grid along a side, and in all.
     most_steps
         Iterations of one search.
     """
     from scipy.optimize import minimize
 
-    count = min(steps, max(int(most ** (1.0 / len(lower))), 2))
+    count = min(steps, max(int(maximum ** (1.0 / len(lower))), 2))
     sides = [np.linspace(a, b, count) for a, b in zip(lower, upper, strict=True)]
     points = sorted((np.array(point) for point in itertools.product(*sides)), key=penalised)
     bounds: Any = list(zip(lower, upper, strict=True))

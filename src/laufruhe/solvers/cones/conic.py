@@ -83,12 +83,12 @@ def solve_cones(problem: AffineProblem, equations: tuple[Array, Array] | None = 
 
 def _may_bind(problem: AffineProblem, maximum: float, norm: AffineNorm) -> bool:
     # by the triangle inequality
-    most = norm.norm.value(norm.grid, norm.constant)
+    largest = norm.norm.value(norm.grid, norm.constant)
     for column, scale in enumerate(problem.scales):
-        if most > maximum * (1.0 + FEASIBLE):
+        if largest > maximum * (1.0 + FEASIBLE):
             return True
-        most += scale * norm.norm.value(norm.grid, norm.slope[..., column])
-    return most > maximum * (1.0 + FEASIBLE)
+        largest += scale * norm.norm.value(norm.grid, norm.slope[..., column])
+    return largest > maximum * (1.0 + FEASIBLE)
 
 
 def _solve_with_few_rows(problem: AffineProblem, equations: tuple[Array, Array] | None) -> ConicSolution:
@@ -98,8 +98,10 @@ def _solve_with_few_rows(problem: AffineProblem, equations: tuple[Array, Array] 
     """
     peaks = [norm.norm.is_largest and len(norm.grid.weights) > FEW_ROWS for _, norm in problem.limits]
     chosen = [
-        np.union1d(0, rows_near(most, norm, problem.start, NEAR_LIMIT)) if peak else np.arange(len(norm.grid.weights))
-        for peak, (most, norm) in zip(peaks, problem.limits, strict=True)
+        np.union1d(0, rows_near(maximum, norm, problem.start, NEAR_LIMIT))
+        if peak
+        else np.arange(len(norm.grid.weights))
+        for peak, (maximum, norm) in zip(peaks, problem.limits, strict=True)
     ]
     for _ in range(ROUNDS if any(peaks) else 0):
         limits = [(maximum, rows_of(norm, rows)) for (maximum, norm), rows in zip(problem.limits, chosen, strict=True)]

@@ -117,7 +117,9 @@ def _has_no_cones(measure: Measure) -> bool:
 
 def _widen_limits(rows: AffineProblem, x: Array) -> AffineProblem:
     # at few angles a mean is another one
-    limits = tuple((max(most, norm.value(x) * (1.0 + ROOM)) if most else 0.0, norm) for most, norm in rows.limits)
+    limits = tuple(
+        (max(maximum, norm.value(x) * (1.0 + ROOM)) if maximum else 0.0, norm) for maximum, norm in rows.limits
+    )
     return replace(rows, limits=limits)
 
 
@@ -137,11 +139,13 @@ def _approach(rows: AffineProblem, goal: AffineNorm, weight: float) -> list[Arra
 
 def _moving(rows: AffineProblem, designs: Sequence[Array]) -> list[Domain]:
     spans = np.ptp(designs, axis=0)
-    most = {d.decision.unit: 0.0 for d in rows.domains}
+    maximum = {d.decision.unit: 0.0 for d in rows.domains}
     for domain in rows.domains:
         sizes = [abs(_size(domain, design)) for design in designs]
-        most[domain.decision.unit] = max(most[domain.decision.unit], *sizes, NEGLIGIBLE * rows.units[domain.start])
-    return [d for d in rows.domains if np.hypot.reduce(spans[d.columns]) > FREE * most[d.decision.unit]]
+        maximum[domain.decision.unit] = max(
+            maximum[domain.decision.unit], *sizes, NEGLIGIBLE * rows.units[domain.start]
+        )
+    return [d for d in rows.domains if np.hypot.reduce(spans[d.columns]) > FREE * maximum[d.decision.unit]]
 
 
 def ranges_of(domain: Domain, designs: Sequence[Array]) -> list[DecisionRange]:

@@ -93,9 +93,9 @@ def _newton_steps(problem: AffineProblem, x: Array) -> tuple[Array, tuple[Array,
     end, zero = None, x == 0.0
     for _ in range(MOST_STEPS):
         gradient, curvature = derivatives(problem, x)
-        most = problem.objective(x) * (1.0 + ROUNDING)
+        maximum = problem.objective(x) * (1.0 + ROUNDING)
         steps = (solve_quadratic(problem, gradient, curvature, x, damping) for damping in DAMPING)
-        step = next((step for step in steps if step is not None and problem.objective(step[0]) <= most), None)
+        step = next((step for step in steps if step is not None and problem.objective(step[0]) <= maximum), None)
         if step is None:
             break
         y = np.where(zero & (np.abs(step[0]) <= NO_STEP * problem.scales), 0.0, step[0])

@@ -70,7 +70,9 @@ def _minimise_mass(affine: AffineProblem, x: Array, directions: Array) -> Array:
         replace(d, decision=replace(d.decision, set=d.set.within(total / w if w else size)))
         for d, w, size in zip(domains, weights, sizes, strict=True)
     )
-    limits = tuple((max(most, norm.value(x)), norm) for most, norm in affine.limits if is_moved_along(norm, directions))
+    limits = tuple(
+        (max(maximum, norm.value(x)), norm) for maximum, norm in affine.limits if is_moved_along(norm, directions)
+    )
     terms = tuple((w, distance(d, np.zeros(d.width), affine.size)) for w, d in zip(weights, domains, strict=True) if w)
     scales = np.concatenate([np.full(d.width, d.scale) for d in domains])
     # across the directions, in units of the sizes, nothing moves

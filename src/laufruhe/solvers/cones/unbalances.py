@@ -150,8 +150,8 @@ def _refine(problem: Problem, model: AffineModel, nothing: float, begin: int) ->
     first = half if model.full_samples % 2 == 0 and has_many_rows else model.full_samples
     samples, best = max(first, begin), None
     # a limit that is nearly the least mean possible needs many angles
-    most = max(MOST_DOUBLINGS, math.ceil(math.log2(2 * FINE_SAMPLES / samples)))
-    for k in in_time(range(most + 1)):
+    maximum = max(MOST_DOUBLINGS, math.ceil(math.log2(2 * FINE_SAMPLES / samples)))
+    for k in in_time(range(maximum + 1)):
         optimum = allowed_optimum(problem, model, samples, nothing)
         if optimum is None:
             if best is not None and best.excess <= KEPT and _keeps_limits_finely(problem, best):

@@ -115,9 +115,9 @@ class _Program:
         unit = float(np.linalg.norm(answer)) or 1.0
         one = unit / float(np.linalg.norm(axis.mass))
         top, square = cp.Variable(), cp.Variable()
-        self._constraints.append(square >= axis.least / one)
-        if axis.most < np.inf:
-            self._constraints.append(square <= axis.most / one)
+        self._constraints.append(square >= axis.minimum / one)
+        if axis.maximum < np.inf:
+            self._constraints.append(square <= axis.maximum / one)
         rows = (self.unit / unit) * (axis.left @ self.matrix @ axis.right) - square * (one / unit) * axis.mass
         cone = cp.SOC(top, rows)
         self._constraints.append(cone)

@@ -57,7 +57,7 @@ def _rank(design: StarDesign) -> tuple[bool, float]:
     return not design.result.status.has_design, design.value
 
 
-def _least(found: list[StarDesign]) -> float:
+def _minimum(found: list[StarDesign]) -> float:
     return min((value for broken, value in map(_rank, found) if not broken), default=math.inf)
 
 
@@ -177,7 +177,7 @@ def _solved_fully(problem: Problem, found: list[StarDesign]) -> list[StarDesign]
         if star_problem.search.starts >= starts or each.bound >= found[0].value * (1.0 - problem.tolerance):
             continue
         whole = min(len(found), MOST_SEARCHED)
-        report_progress("best stars once more", k, whole, value=_least(out))
+        report_progress("best stars once more", k, whole, value=_minimum(out))
         more = replace(star_problem, search=replace(star_problem.search, starts=starts))
         with within(f"best star {k + 1} of {whole}"):
             again = replace(each, result=solve_mounts(more, among=True))
@@ -187,15 +187,15 @@ def _solved_fully(problem: Problem, found: list[StarDesign]) -> list[StarDesign]
 
 def _bounded(found: list[StarDesign], phasing: Phasing, designs: int) -> list[StarDesign]:
     """Return all stars with bounds of their mounts, for designs no worse than the best of all stars (E54)."""
-    least = _least(found)
-    if len(found) < designs or phasing.continuous or not 0.0 < least < math.inf:
+    minimum = _minimum(found)
+    if len(found) < designs or phasing.continuous or not 0.0 < minimum < math.inf:
         return found
-    first = bounded_under(found[0].result, least, of_many=len(found) > 1)
+    first = bounded_under(found[0].result, minimum, of_many=len(found) > 1)
     out = [replace(found[0], result=first), *found[1:]]
     # the least bound of all stars is that of the problem
-    enough = first.certificate.lower_bound if first.certificate is not None else least
+    enough = first.certificate.lower_bound if first.certificate is not None else minimum
     pieces = [(k, each.result) for k, each in enumerate(found)][1:]
-    work = partial(_bounded_one, value=least, enough=enough)
+    work = partial(_bounded_one, value=minimum, enough=enough)
     for k, result in ordered_map(work, pieces, "bounds of stars on their mounts"):
         out[k] = replace(out[k], result=result)
     return out
@@ -214,7 +214,7 @@ def _moved(problem: Problem, phasing: Phasing, found: list[StarDesign]) -> list[
     starts = starts or [(start, None) for start in starts_of(phasing, None)[:MOST_SEARCHED]]
     out: list[StarDesign] = []
     for k, (candidate, even) in enumerate(() if found and passed() else starts):
-        report_progress("throws that leave their star", k, len(starts), value=_least([*found, *out]))
+        report_progress("throws that leave their star", k, len(starts), value=_minimum([*found, *out]))
         star_problem = _problem_of(problem, phasing, candidate, problem.search.starts)
         moves = ThrowMoves(phasing, phasing.layout_of(candidate), candidate, phasing.intervals)
         result, moved = solve_moved(star_problem, moves, even)

@@ -121,8 +121,8 @@ def _promising(problem: Problem, initial: Evaluation, pool: Array, scored: Array
     chosen = list(best[: wanted - wanted // 3])
     chosen += [k for k in range(len(pool)) if k not in set(chosen)][: wanted - len(chosen)]
     given_value = math.inf if initial.resonance else objective_value(problem, initial)
-    least = min((float(v) for v in (*known, given_value) if 0.0 < v < math.inf), default=1.0)
-    return pool[chosen], least
+    minimum = min((float(v) for v in (*known, given_value) if 0.0 < v < math.inf), default=1.0)
+    return pool[chosen], minimum
 
 
 @contextmanager
@@ -174,7 +174,7 @@ def _scores(share: tuple[Problem, Evaluation, Array]) -> Array:
 def _of_peaks(problem: Problem, peaks: Peaks, row: Array) -> tuple[float, float]:
     # relative excess over limits, and share of the objective
     parts = np.split(peaks.values(row), np.cumsum(peaks.counts)[:-1])
-    most = dict(zip(simulated_measures(problem), map(np.max, parts), strict=True))
-    over = (float(most[x.measure]) / (x.maximum or 1.0) - 1.0 for x in problem.limits if x.measure in most)
-    terms = (term.weight * float(most[term.measure]) for term in problem.objective if term.measure in most)
+    maximum = dict(zip(simulated_measures(problem), map(np.max, parts), strict=True))
+    over = (float(maximum[x.measure]) / (x.maximum or 1.0) - 1.0 for x in problem.limits if x.measure in maximum)
+    terms = (term.weight * float(maximum[term.measure]) for term in problem.objective if term.measure in maximum)
     return sum(max(each, 0.0) for each in over), sum(terms)

@@ -37,7 +37,7 @@ class Gathered:
     floors: list[float] = field(default_factory=list)
 
     def add(
-        self, expression: Any, lower: float, upper: float, name: str, least: Slope = None, most: Slope = None
+        self, expression: Any, lower: float, upper: float, name: str, minimum: Slope = None, maximum: Slope = None
     ) -> None:
         """Add a scalar or column constraint, and the limits that its lower and upper sides give a price to."""
         expression = ca.MX(expression)
@@ -46,7 +46,7 @@ class Gathered:
         self.lower += [lower] * count
         self.upper += [upper] * count
         self.names += [name] * count
-        self.slopes += [(least, most)] * count
+        self.slopes += [(minimum, maximum)] * count
 
     def named(self, name: str, symbol: Any = ca.MX) -> Named:
         """Return a collector that a norm adds its variables and constraints to, under the name of its measure."""

@@ -73,8 +73,8 @@ class ModeVariables:
 
     def _least_shares(self, limit: Limit) -> None:
         for share in self._shares(limit.measure):
-            least = (limit, "at least"), 1.0
-            self._held.add(share, max(limit.minimum, 0.0), np.inf, limit.name, least)
+            minimum = (limit, "at least"), 1.0
+            self._held.add(share, max(limit.minimum, 0.0), np.inf, limit.name, minimum)
 
     def shortfall(self, measure: Measure) -> Any:
         """Sum of variables, each over nothing and over what is wanting to a share (E47)."""

@@ -271,10 +271,10 @@ def _polished(task: Task, groups: Sequence[LocalOptimum], several: Several) -> l
         return list(groups)
     if passed():
         return [replace(end, ending=Ending.UNFINISHED) if end.usable else end for end in groups]
-    least = min((end.value for end in groups if end.usable), default=math.inf)
+    minimum = min((end.value for end in groups if end.usable), default=math.inf)
     # what is not there yet and worse than what is goes no further
     going = [end for end in groups if end.ending not in (Ending.FAILED, Ending.INFEASIBLE)
-             and (end.usable or end.value < least)]  # fmt: skip
+             and (end.usable or end.value < minimum)]  # fmt: skip
     further, later = replace(task, stages=task.stages[1:]), dict[int, LocalOptimum]()
     # the best first: what is worse where norms are softened more is so where they are softened less (N4)
     for some in (going[:1], going[1:]):

@@ -122,22 +122,22 @@ class SmoothProgram:
         return MovedThrows(self.problem, moves, model, self._t, self._u)
 
     def _built(self) -> NonlinearProgram:
-        least = ca.MX(0.0)
+        minimum = ca.MX(0.0)
         for term in self.problem.objective:
-            least += term.weight * self._least(term.measure, self.unit / (term.weight or 1.0))
+            minimum += term.weight * self._minimum(term.measure, self.unit / (term.weight or 1.0))
         for limit in self.problem.limits:
             self._limit(limit)
         self._hold_unbalances()
         if self.moves is not None:
             rows, names = self.moves.firing(self._t)
             for row, name in zip(rows, names, strict=True):
-                self._held.add(row, self.moves.intervals.least, self.moves.intervals.most, name)
+                self._held.add(row, self.moves.intervals.minimum, self.moves.intervals.maximum, name)
         tops = ca.vertcat(*(top for top, _ in self._held.heads)) if self._held.heads else ca.MX(0, 1)
         lower, upper = self._bounds()
         constraints = ca.densify(ca.vertcat(*self._held.expressions)) if self._held.expressions else None
         return NonlinearProgram(
             ca.vertcat(self._v, self._u, self._t, self._modes.symbols, tops),
-            least,
+            minimum,
             lower,
             upper,
             constraints=constraints,
@@ -163,9 +163,9 @@ class SmoothProgram:
         low = self._inner([d.lower for d in self._decisions]).tolist()
         high = self._inner([d.upper for d in self._decisions]).tolist()
         for domain in self.domains:
-            most = domain.set.upper
-            low += [domain.set.lower] if domain.width == 1 else [-most, -most]
-            high += [most] * domain.width
+            maximum = domain.set.upper
+            low += [domain.set.lower] if domain.width == 1 else [-maximum, -maximum]
+            high += [maximum] * domain.width
         if self.moves is not None:
             low += self.moves.lower.tolist()
             high += self.moves.upper.tolist()
@@ -203,7 +203,7 @@ class SmoothProgram:
             return sampled_rows(self._points, names, measure)
         return self._loads.rows(measure)
 
-    def _least(self, measure: Measure, unit: float) -> Any:
+    def _minimum(self, measure: Measure, unit: float) -> Any:
         # N3: softened by a share of its unit; a constant if no decision affects it
         kinds = {d.kind for d in self.problem.decisions} | ({Kind.STAR} if self.moves is not None else set())
         if not depends(measure.channel, kinds, self.problem):
@@ -211,9 +211,9 @@ class SmoothProgram:
         if measure.is_mounting:
             return self._mount_number(measure)
         if measure.channel.simulation:
-            return self._simulated.least(measure)
+            return self._simulated.minimum(measure)
         rows, grid = self._rows(measure)
-        return measure.norm.least(self._held.named(measure.name), grid, rows, unit, self._e)
+        return measure.norm.smooth_expression(self._held.named(measure.name), grid, rows, unit, self._e)
 
     def _limit(self, limit: Limit) -> None:
         measure = limit.measure
@@ -227,8 +227,10 @@ class SmoothProgram:
         rows, grid = self._rows(measure)
         unit = limit.maximum * tight or self.unit
         held = self._held.named(limit.name)
-        value, most, slope = measure.norm.limited(held, grid, rows / unit, limit.maximum * tight / unit, self._softest)
-        self._held.add(value, -np.inf, most, limit.name, most=((limit, "at most"), slope / unit))
+        value, maximum, slope = measure.norm.limited(
+            held, grid, rows / unit, limit.maximum * tight / unit, self._softest
+        )
+        self._held.add(value, -np.inf, maximum, limit.name, maximum=((limit, "at most"), slope / unit))
 
     def _hold_unbalances(self) -> None:
         # P4
@@ -276,8 +278,8 @@ class SmoothProgram:
         given = axis.answer(self._root @ self._mounting.stiffness @ self._root.T)
         unit = float(np.linalg.norm(given)) or 1.0
         answer, mass = ca.DM(axis.left) @ self._mounts.stiffness @ ca.DM(axis.right), ca.DM(axis.mass)
-        best = ca.fmax(ca.dot(mass, answer) / ca.dot(mass, mass), axis.least)
-        rows = answer - (ca.fmin(best, axis.most) if axis.most < math.inf else best) * mass
+        best = ca.fmax(ca.dot(mass, answer) / ca.dot(mass, mass), axis.minimum)
+        rows = answer - (ca.fmin(best, axis.maximum) if axis.maximum < math.inf else best) * mass
         return unit * softened_lengths(rows.T / unit, self._e)
 
     def _limit_mounts(self, limit: Limit) -> None:
@@ -285,9 +287,9 @@ class SmoothProgram:
         if self._modes.limit(limit):
             return
         if quantity.channel is channels.TRANSMISSIBILITY:
-            most = limit.maximum
+            maximum = limit.maximum
             for force, firm in transmitted(self._points, quantity):
-                self._held.add(ca.sqrt(force / firm), -np.inf, most, limit.name, most=((limit, "at most"), 1.0))
+                self._held.add(ca.sqrt(force / firm), -np.inf, maximum, limit.name, maximum=((limit, "at most"), 1.0))
         else:
             unit = (limit.maximum if limit.maximum < math.inf else limit.minimum) or 1.0
             low, high = limit.minimum / unit, limit.maximum / unit
@@ -299,8 +301,8 @@ class SmoothProgram:
     def prices(self, optimum: LocalOptimum) -> dict[Side, Price]:
         """Fall of the objective per unit by which each side of a limit is relaxed."""
         found: dict[Side, float] = defaultdict(float)
-        for (least, most), m in zip(self._held.slopes, optimum.multipliers, strict=True):
-            for held, own in ((least, max(-m, 0.0)), (most, max(m, 0.0))):
+        for (minimum, maximum), m in zip(self._held.slopes, optimum.multipliers, strict=True):
+            for held, own in ((minimum, max(-m, 0.0)), (maximum, max(m, 0.0))):
                 if held is not None:
                     found[held[0]] += float(held[1] * own)
         first, symbols = self._turned.stop, self._modes.symbols.numel()

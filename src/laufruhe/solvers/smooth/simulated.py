@@ -44,8 +44,8 @@ class SimulatedVariables:
         given = self.at([d.start_number for d in problem.mount_decisions], columns)
         for measure, end, count in zip(measures, ends.tolist(), self._peaks.counts, strict=True):
             self._own[measure] = self.symbols[end - count : end]
-            most = float(np.max(given[end - count : end]))
-            self._sizes[measure] = most if 0.0 < most < math.inf else 1.0
+            maximum = float(np.max(given[end - count : end]))
+            self._sizes[measure] = maximum if 0.0 < maximum < math.inf else 1.0
 
     @property
     def told(self) -> Told | None:
@@ -56,7 +56,7 @@ class SimulatedVariables:
         """Peaks of a design."""
         return np.zeros(0) if self._peaks is None else self._peaks.values(np.concatenate([mounts, columns]))
 
-    def least(self, measure: Measure) -> Any:
+    def minimum(self, measure: Measure) -> Any:
         """The largest peak, as a variable that none exceeds (E22)."""
         size, named = self._sizes[measure], self._held.named(measure.name)
         peaks = self._own[measure] / size
@@ -68,4 +68,6 @@ class SimulatedVariables:
         """Constrain every peak to at most a share of its limit."""
         unit = limit.maximum or 1.0
         side = ((limit, "at most"), tight / unit)
-        self._held.add(self._own[limit.measure] / unit, -math.inf, tight * limit.maximum / unit, limit.name, most=side)
+        self._held.add(
+            self._own[limit.measure] / unit, -math.inf, tight * limit.maximum / unit, limit.name, maximum=side
+        )

@@ -194,7 +194,7 @@ def even_stars(phasing: Phasing) -> list[Star]:
 
 def solve_each_order(
     problem: Problem, phasing: Phasing, stars: Sequence[Star], decide: Decide = lambda own, _: solve_fixed(own),
-    most: int | None = None,
+    maximum: int | None = None,
 ) -> Result:  # fmt: skip
     """Solve every firing order that loads tell apart, of every star with every set of shafts, each by itself.
 
@@ -202,7 +202,7 @@ def solve_each_order(
     ----------
     decide
         Solver of all else that is open, given a problem and the least value so far.
-    most
+    maximum
         Number of designs, drawn of all, that are decided where no bound is requested; None for every one, with its
         bound.
     """
@@ -212,21 +212,21 @@ def solve_each_order(
     # the small ones first: a shaft that buys nothing is not built
     sets = sorted(phasing.shafts.allowed, key=lambda chosen: (len(chosen), chosen))
     fired = [(star, order.order) for star, steps in stars for order in distinct_orders(problem, phasing, star, steps)]
-    if most is None and len(fired) * len(sets) >= MOST_ORDERS:
+    if maximum is None and len(fired) * len(sets) >= MOST_ORDERS:
         many = f"{MOST_ORDERS} and more firing orders and sets of shafts are too many to decide one by one"
         raise ModelError(f"{many}; give a firing order, or throws")
     designs = [replace(star, firing_order=o, left_out=phasing.without(built)) for built in sets for star, o in fired]
     whole = len(designs)
-    if most is not None and whole > most:
-        drawn = np.random.default_rng(problem.search.seed).choice(whole, most, replace=False)
+    if maximum is not None and whole > maximum:
+        drawn = np.random.default_rng(problem.search.seed).choice(whole, maximum, replace=False)
         designs = [designs[k] for k in sorted({0, *drawn.tolist()})]
     started, every = time.perf_counter(), list[StarDesign]()
     for k, candidate in enumerate(designs):
-        least = min((one.value for one in every), default=math.inf)
-        report_progress("firing orders and sets of shafts", k, len(designs), least)
+        minimum = min((one.value for one in every), default=math.inf)
+        report_progress("firing orders and sets of shafts", k, len(designs), minimum)
         if every and (passed() or time.perf_counter() - started > phasing.time_limit):
             break
-        every.append(StarDesign(candidate, decide(_with_half_tolerance(phasing.realise(candidate)), least)))
+        every.append(StarDesign(candidate, decide(_with_half_tolerance(phasing.realise(candidate)), minimum)))
     complete = len(every) == whole
     solved = [design for design in every if design.is_met]
     if not solved:
@@ -247,7 +247,7 @@ def solve_each_order(
         method += f", {len(every)} of all {whole} drawn and decided"
     proof = best.result.certificate
     how, residual = (f"{proof.method}; {method}", proof.kkt_residual) if proof else (method, 0.0)
-    reach = ProofStrength.WHOLE if most is None else ProofStrength.ASIDE
+    reach = ProofStrength.WHOLE if maximum is None else ProofStrength.ASIDE
     result, doubt = result_under(best.result, bound, nothing)
     best = replace(best, result=result)
     certificate = certified(best.value, bound, nothing, problem.tolerance, reach, residual, how, doubt)

@@ -91,7 +91,7 @@ def solve_design(
         if solution.x is None:
             # a mean at a few angles may be more than over the cycle, averages never are (P7)
             rough = model.at(samples, averaged=True)
-            wide = replace(rough, limits=tuple((most * (1.0 + KEPT), norm) for most, norm in rough.limits))
+            wide = replace(rough, limits=tuple((maximum * (1.0 + KEPT), norm) for maximum, norm in rough.limits))
             cut = _limit_cut(wide, solution.multipliers, fixed)
             if cut.excludes(np.array([star]), [built], owners).all():
                 return None, cut

@@ -105,7 +105,7 @@ def solve_moved_throws(problem: Problem, phasing: Phasing, search: Callable[[Pro
 def _angle_decisions(phasing: Phasing, start: Candidate) -> Iterator[Decision]:
     """Yield throws, bank angle and split pins of a crank as numbers, where they may move."""
     even, allowed = phasing.even_interval, phasing.intervals
-    freedom = min(max(even - allowed.least, allowed.most - even), math.pi)
+    freedom = min(max(even - allowed.minimum, allowed.maximum - even), math.pi)
     angles: list[tuple[str, Path, float, float, float]] = []
     for k, angle in enumerate(start.throws):
         if phasing.throw_bounds is not None:

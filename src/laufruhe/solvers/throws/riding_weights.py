@@ -177,9 +177,9 @@ class Riders:
         if ties:
             # 0 <= r - sum q <= most, each counted from its middle
             slope = np.zeros((len(ties), 1, matrix.shape[1]))
-            for k, (most, tie) in enumerate(ties):
+            for k, (maximum, tie) in enumerate(ties):
                 for column, sign in tie:
-                    slope[k, 0, column] = sign / most
+                    slope[k, 0, column] = sign / maximum
             grid = Grid(np.ones(len(slope)), len(slope))
             limits = ((0.5, AffineNorm(NORMS["maximum"], np.full((len(slope), 1), -0.5), slope, grid)),)
         return BoxColumns(domains_of(decisions), matrix, limits, tuple(first_columns))

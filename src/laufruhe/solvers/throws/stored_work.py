@@ -38,7 +38,7 @@ def proposing(problem: Problem) -> Problem:
     def slope(measure: Measure, name: str) -> float:
         return degree(measure, name) / (_stored(initial, name) or 1.0)
 
-    return _exchange(problem, degree, slope, lambda m, name, most: most / (slope(m, name) or 1.0))
+    return _exchange(problem, degree, slope, lambda m, name, maximum: maximum / (slope(m, name) or 1.0))
 
 
 def bounding(problem: Problem, value: float) -> Callable[[Problem], Problem]:
@@ -59,15 +59,15 @@ def bounding(problem: Problem, value: float) -> Callable[[Problem], Problem]:
     slopes: dict[tuple[Measure, str], float] = {}
     for term in problem.objective:
         for name in _points(problem, term.measure) if term.measure.channel.of_torque else ():
-            most = sum(_stored(one, name) for one in alone)
+            maximum = sum(_stored(one, name) for one in alone)
             if value < math.inf and term.weight > 0.0:
-                most = min(most, bounds[name].work(value / term.weight))
-            slopes[term.measure, name] = bounds[name].degree(most) / most if most > 0.0 and is_exact else 0.0
+                maximum = min(maximum, bounds[name].work(value / term.weight))
+            slopes[term.measure, name] = bounds[name].degree(maximum) / maximum if maximum > 0.0 and is_exact else 0.0
     return lambda other: _exchange(
         other,
         lambda measure, name: slopes[measure, name] * _stored(initial, name),
         lambda measure, name: slopes[measure, name],
-        lambda _, name, most: bounds[name].work(most),
+        lambda _, name, maximum: bounds[name].work(maximum),
     )
 
 
@@ -75,7 +75,7 @@ def _exchange(
     problem: Problem,
     size: Callable[[Measure, str], float],
     slope: Callable[[Measure, str], float],
-    most: Callable[[Measure, str, float], float],
+    maximum: Callable[[Measure, str, float], float],
 ) -> Problem:
     """Put work in place of every degree: of a term a share of the work at one point, of a limit the work at each.
 
@@ -85,7 +85,7 @@ def _exchange(
         Size of a measure at an operating point: that of the largest stands for the term.
     slope
         Degree that counts as one joule of work at a point.
-    most
+    maximum
         Work at a point that a limit on a degree allows.
     """
     terms: list[Term] = []
@@ -103,7 +103,7 @@ def _exchange(
             limits.append(limit)
             continue
         limits += [
-            Limit(limit.name, _work(name), most(measure, name, limit.maximum)) for name in _points(problem, measure)
+            Limit(limit.name, _work(name), maximum(measure, name, limit.maximum)) for name in _points(problem, measure)
         ]
     return replace(problem, objective=tuple(terms), limits=tuple(limits))
 

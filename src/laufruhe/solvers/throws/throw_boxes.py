@@ -170,7 +170,7 @@ class ThrowPrograms:
             pulls += size[: self._riders.size] / (float(by_order.max()) or 1.0)
         heavy = AffineProblem(
             tuple((weight, self._without_faint_orders(norm)) for weight, norm in terms),
-            tuple((most, self._without_faint_orders(norm)) for most, norm in limits), (), 1,
+            tuple((maximum, self._without_faint_orders(norm)) for maximum, norm in limits), (), 1,
         )  # fmt: skip
         names = tuple(limit.name for limit, _ in self._limits)
         return Program(window, AffineProblem(terms, limits, (), 1), heavy, names, weights, pulls)
@@ -206,8 +206,8 @@ class ThrowPrograms:
         """Return firing intervals, counted from the middle of their bounds in halves of these."""
         matrix, constants = self._firing.rows(window)
         firing = self._firing
-        most = min(firing.most, firing.cycle.angle - (len(constants) - 1) * firing.least)
-        middle, half = 0.5 * (most + firing.least), max(0.5 * (most - firing.least), 0.0) + SLACK
+        maximum = min(firing.maximum, firing.cycle.angle - (len(constants) - 1) * firing.minimum)
+        middle, half = 0.5 * (maximum + firing.minimum), max(0.5 * (maximum - firing.minimum), 0.0) + SLACK
         slope = np.zeros((len(constants), 1, self.waves.throws, 2 * len(self.waves.orders) + 1))
         slope[:, 0, :, -1] = matrix[:, : self.waves.throws] / half
         riders, shared = np.zeros((len(constants), 1, self._riders.size)), matrix[:, None, self.waves.throws :] / half
@@ -298,7 +298,7 @@ class ThrowPrograms:
             ties = AffineProblem((), columns.limits, columns.domains, 1)
             tied = minorant(ties, Multipliers((), multipliers.limits[count : count + len(columns.limits)]))
             value, pull = value + tied.constant, pull + tied.gradient
-        value += sum(domain.least(pull) for domain in columns.domains)
+        value += sum(domain.minimum(pull) for domain in columns.domains)
         count, by_throw = len(self.waves.orders), self._columns_by_throw(under.gradient)
         shared = under.gradient[len(under.gradient) - self.waves.orders.shape[1] + 1 :]
         arcs = arc_box.functions(by_throw[:, :count] - 1j * by_throw[:, count:-1], by_throw[:, -1], shared)
@@ -308,7 +308,9 @@ class ThrowPrograms:
         limits = replace(program.rows, terms=())
         value, _ = self._bound(limits, columns, multipliers, arc_box)
         prices = [norm.dual_norm(z) for (_, norm), z in zip(limits.limits, multipliers.limits, strict=False)]
-        sizes = [most + float(np.abs(norm.constant).sum() + np.abs(norm.slope).sum()) for most, norm in limits.limits]
+        sizes = [
+            maximum + float(np.abs(norm.constant).sum() + np.abs(norm.slope).sum()) for maximum, norm in limits.limits
+        ]
         if value <= ROUNDING * sum(price * size for price, size in zip(prices, sizes, strict=True)):
             return False
         self.conflict |= {name for name, price in zip(program.names, prices, strict=True) if price > 0.0}
@@ -357,7 +359,7 @@ class Mixture:
         throws, shared_count = len(program.weights), orders.shape[1] - 1
         rows, self._weights = program.heavy, program.weights[:, : len(orders)]
         is_heavy = self._weights > _FAINT * self._weights.max()
-        most = (_MOST[shared_count],) * throws + (_MOST_SHARED[shared_count],) * shared_count
+        step_limits = (_MOST[shared_count],) * throws + (_MOST_SHARED[shared_count],) * shared_count
         side_orders = [
             *(np.where(row, orders[:, 0], 0.0) for row in is_heavy),
             *np.where(is_heavy.any(axis=0), orders[:, 1:].T, 0.0),
@@ -366,7 +368,7 @@ class Mixture:
             min(max(math.ceil(float(np.abs(row).max(initial=0.0)) * width / _APART) + 1, _FEWEST), limit)
             if width > 0.0
             else 1
-            for row, width, limit in zip(side_orders, upper - lower, most, strict=True)
+            for row, width, limit in zip(side_orders, upper - lower, step_limits, strict=True)
         ]
         every = [np.linspace(a, b, n) for a, b, n in zip(lower, upper, steps, strict=True)]
         self._angles, shared = every[:throws], list(product(*every[throws:]))

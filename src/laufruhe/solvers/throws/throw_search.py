@@ -102,16 +102,16 @@ class Stage:
         Objective of the best design.
     left_out
         Return the part of the objective that the orders left out may have.
-    most, tolerable
+    maximum, tolerable
         Largest number of steps, and the share of the value that they may cost.
     """
 
     def __init__(
         self, make: Callable[[int], ThrowPrograms], samples: int, lost: Callable[[int], float], value: float,
-        left_out: Callable[[int], float], most: int = MOST_SAMPLES, tolerable: float = STEPS_COST,
+        left_out: Callable[[int], float], maximum: int = MOST_SAMPLES, tolerable: float = STEPS_COST,
     ) -> None:  # fmt: skip
         self._make, self._samples, self._lost, self._value, self._left_out = make, samples, lost, value, left_out
-        self._most, self._enough = most, tolerable
+        self._maximum, self._enough = maximum, tolerable
 
     @cached_property
     def programs(self) -> ThrowPrograms:
@@ -127,9 +127,9 @@ class Stage:
     def next(self) -> Stage | None:
         """Stage with twice as many steps; None where these are enough."""
         finer = 2 * self._samples
-        if self._lost(self._samples) <= self._enough * self._value or finer > self._most:
+        if self._lost(self._samples) <= self._enough * self._value or finer > self._maximum:
             return None
-        stage = Stage(self._make, finer, self._lost, self._value, self._left_out, self._most, self._enough)
+        stage = Stage(self._make, finer, self._lost, self._value, self._left_out, self._maximum, self._enough)
         # short averages know less of a pressure that jumps
         return stage if stage.cost < self.cost else None
 
@@ -220,8 +220,8 @@ def search_throws(
             _ = stage.programs
     except ModelError:
         return None
-    most = len(search.roots) + problem.search.boxes_or(MOST_BOXES)
-    incumbent, bound, boxes = divided(search, _Part(floor), _Best(best), nothing, search.reached, most, search.what)
+    maximum = len(search.roots) + problem.search.boxes_or(MOST_BOXES)
+    incumbent, bound, boxes = divided(search, _Part(floor), _Best(best), nothing, search.reached, maximum, search.what)
     return ThrowBound(bound, incumbent.design, boxes, search.conflict, search.what)
 
 
@@ -355,8 +355,8 @@ class ThrowSearch(Search[_Part, _Best]):
         for _, window, left_out in self.roots:
             place = place_in(self._phasing, window, best.candidate)
             if left_out == best.candidate.left_out and place is not None:
-                programs, most = stage.programs, self._highest_objective(best) * (1.0 + EXCESS)
-                box = programs.box(programs.program(window), *thin(place, *window.box), 0.0, most)
+                programs, maximum = stage.programs, self._highest_objective(best) * (1.0 + EXCESS)
+                box = programs.box(programs.program(window), *thin(place, *window.box), 0.0, maximum)
                 return box if isinstance(box, Over) else _Part(box.bound, box, stage, left_out)
         return None
 

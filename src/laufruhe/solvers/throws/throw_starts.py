@@ -108,7 +108,7 @@ def _firing_patterns(phasing: Phasing) -> tuple[list[FiringPattern], bool]:
     low, high = (sum(pair) for pair in zip(phasing.bank or (0.0, 0.0), phasing.split or (0.0, 0.0), strict=True))
     slots = FiringSlots(
         phasing.cycle, len(layout.throw_positions), tuple(layout.side(k) for k in first), (low, high),
-        max(phasing.intervals.least, SOONEST), phasing.intervals.most,
+        max(phasing.intervals.minimum, SOONEST), phasing.intervals.maximum,
     )  # fmt: skip
     members = None
     if phasing.firing_order is not None:
@@ -176,14 +176,14 @@ def _cranks_of_pattern(phasing: Phasing, pattern: FiringPattern, number: int) ->
     return cranks
 
 
-def _throw_orders(phasing: Phasing, count: int, most: int) -> NDArray[np.intp]:
+def _throw_orders(phasing: Phasing, count: int, maximum: int) -> NDArray[np.intp]:
     if phasing.firing_order is not None:
         return np.arange(count)[None]
-    most = max(most, _FEWEST)
-    if math.factorial(count) <= most:
+    maximum = max(maximum, _FEWEST)
+    if math.factorial(count) <= maximum:
         return np.array(list(itertools.permutations(range(count))))
     rng = np.random.default_rng(1964)
-    return np.array([rng.permutation(count) for _ in range(most)])
+    return np.array([rng.permutation(count) for _ in range(maximum)])
 
 
 def _within_bounds(phasing: Phasing, bank: float | None, split: float | None) -> list[Candidate]:
@@ -192,7 +192,7 @@ def _within_bounds(phasing: Phasing, bank: float | None, split: float | None) ->
     allowed = phasing.intervals
 
     def excess(intervals: Sequence[float]) -> float:
-        return round(sum(max(allowed.least - i, 0.0) + max(i - allowed.most, 0.0) for i in intervals), 9)
+        return round(sum(max(allowed.minimum - i, 0.0) + max(i - allowed.maximum, 0.0) for i in intervals), 9)
 
     low, high = np.array(phasing.throw_bounds).T
     drawn = np.random.default_rng(1964).uniform(low, high, (_DRAWN, len(low)))

@@ -27,7 +27,7 @@ def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
     """Return every way to fire within the bounds, one of images that are worth the same; None if there are too many."""
     layout, allowed = phasing.layout(*phasing.least_geometry), phasing.intervals
     firing = firing_bounds(phasing)
-    is_free = allowed.least <= 0.0 and allowed.most >= phasing.cycle.angle
+    is_free = allowed.minimum <= 0.0 and allowed.maximum >= phasing.cycle.angle
     if phasing.throw_bounds is not None and is_free and phasing.firing_order is None and not problem.feels_gas:
         # in which order they fire makes no difference
         return [firing.anywhere]
@@ -68,7 +68,7 @@ def firing_bounds(phasing: Phasing) -> FiringBounds:
     """Return the bounds that firing has to keep."""
     layout, allowed = phasing.layout(*phasing.least_geometry), phasing.intervals
     return FiringBounds(
-        phasing.cycle, layout, max(allowed.least, 0.0), allowed.most, phasing.throw_bounds, phasing.firing_order,
+        phasing.cycle, layout, max(allowed.minimum, 0.0), allowed.maximum, phasing.throw_bounds, phasing.firing_order,
         tuple(p for p, is_open in zip((phasing.bank, phasing.split), phasing.opened, strict=True) if p and is_open),
     )  # fmt: skip
 

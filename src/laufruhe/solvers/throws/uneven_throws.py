@@ -69,13 +69,13 @@ def solve_uneven(problem: Problem, phasing: Phasing, even: Result | None) -> Res
         why, proven = why_none_fires(phasing)
         if proven:
             return no_star(problem, why)
-    shares = TRADE_STEPS if phasing.thorough and even is not None and phasing.intervals.most < math.inf else (1.0,)
+    shares = TRADE_STEPS if phasing.thorough and even is not None and phasing.intervals.maximum < math.inf else (1.0,)
     designs: list[StarDesign] = []
     trade: list[TradePoint] = []
     for k, share in enumerate(in_time(shares)):
         report_progress("shares of the deviation allowed", k, len(shares), designs[0].value if designs else math.inf)
         mean, allowed = phasing.even_interval, phasing.intervals
-        allowed = Intervals(mean - share * (mean - allowed.least), mean + share * (allowed.most - mean))
+        allowed = Intervals(mean - share * (mean - allowed.minimum), mean + share * (allowed.maximum - mean))
         # what is best with less freedom is a start, so that more of it is never worse
         chosen = starts[: STARTS if share == 1.0 and phasing.thorough else TRADE_STARTS]
         cranks = dict.fromkeys([*(design.candidate for design in designs[:1]), *chosen])
@@ -136,7 +136,7 @@ def evaluate_crank(phasing: Phasing, candidate: Candidate) -> StarDesign | None:
 def _trade_point(problem: Problem, phasing: Phasing, allowed: Intervals, best: StarDesign) -> TradePoint:
     even = phasing.even_interval
     deviation = max(abs(i - even) for i in firing_intervals(phasing, best.candidate))
-    freedom = max(even - allowed.least, allowed.most - even)
+    freedom = max(even - allowed.minimum, allowed.maximum - even)
     deviation = deviation if deviation > 1e-9 else 0.0
     bound, _ = _bound(problem, phasing, allowed)
     return TradePoint(freedom, deviation, best.value, best.candidate.throws, best.kkt_residual, bound)

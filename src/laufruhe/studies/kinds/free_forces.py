@@ -149,9 +149,9 @@ class FreeForces(Part):
         rows = []
         for name in data["case"].values:
             row = data.sel(case=name)
-            least, most = float(row["least_interval"]), float(row["largest_interval"])
-            even = most - least < 1e-6
-            cells = [str(name), f"{most:.4g}" if even else f"{least:.4g} to {most:.4g}"]
+            minimum, maximum = float(row["least_interval"]), float(row["largest_interval"])
+            even = maximum - minimum < 1e-6
+            cells = [str(name), f"{maximum:.4g}" if even else f"{minimum:.4g} to {maximum:.4g}"]
             cells += [_print_beside(row.sel(order=order), what) for what, order in columns]
             first = row.sel(order=1)
             rows.append([*cells, *(_plain(float(first[f"{what}_against"])) for what in WHAT)])
@@ -189,14 +189,14 @@ def _column(data: xr.Dataset, what: str, order: Any, first: bool) -> p.Panel:
     here = data.sel(order=order)
     free, against, printed = (here[name].values for name in (what, f"{what}_against", f"{what}_printed"))
     rows = range(len(free))
-    most = float(max(free.max(initial=0.0), np.nanmax(printed, initial=0.0))) or 1.0
+    maximum = float(max(free.max(initial=0.0), np.nanmax(printed, initial=0.0))) or 1.0
     marks: list[p.Mark] = [
         p.Bars(rows, free, 0.62, upright=False),
         p.Bars(rows, against, 0.26, "pale", upright=False),
         p.Line(printed, rows, width=0.0, marker="o", size=3.5),
     ]
     for row, value in zip(rows, free, strict=True):
-        marks.append(p.Words(value + 0.04 * most, row, f"{value:.4g}" if value > 1e-9 else "0"))
+        marks.append(p.Words(value + 0.04 * maximum, row, f"{value:.4g}" if value > 1e-9 else "0"))
     ticks = [(float(k), str(name)) for k, name in enumerate(data["case"].values)] if first else []
     side = p.Axis(ends=(rows[-1] + 0.6, -0.6), ticks=ticks, grid=False)
-    return p.Panel(marks, p.Axis(ends=(0.0, 1.3 * most)), side, f"{what}, order {order}")
+    return p.Panel(marks, p.Axis(ends=(0.0, 1.3 * maximum)), side, f"{what}, order {order}")

@@ -106,12 +106,12 @@ class RandomDesigns(Sampled):
         rows = []
         for k, name in enumerate(data["case"].values):
             feasible = _feasible(data, objective, k)
-            _, middle, most = percentiles_of(feasible)
+            _, middle, maximum = percentiles_of(feasible)
             cells = [str(name), f"{objective.shape[1]:,}", f"{100.0 * len(feasible) / objective.shape[1]:.3g} %"]
             cells += [
                 number(float(feasible.min(initial=math.inf)) if len(feasible) else math.nan),
                 number(middle),
-                number(most),
+                number(maximum),
             ]
             cells += [number(float(best[k])), number(float(bound[k])), str(data["proof"].values[k])]
             rows.append([*cells, str(int((feasible < bound[k] * (1.0 - 1e-9)).sum()))])

@@ -195,8 +195,8 @@ class SpeedMap(Part):
 def _row_of(speeds: Array, values: Array, limits: Array) -> list[str] | None:
     if np.isnan(values).all():
         return None
-    most, known = int(np.nanargmax(values)), limits[np.isfinite(limits)]
-    cells = [number(np.nanmin(values)), number(values[most]), f"{speeds[most]:.4g}"]
+    maximum, known = int(np.nanargmax(values)), limits[np.isfinite(limits)]
+    cells = [number(np.nanmin(values)), number(values[maximum]), f"{speeds[maximum]:.4g}"]
     over = speeds[values > limits * (1.0 + 1e-6)]
     where = f"{over.min():.4g} to {over.max():.4g}" if len(over) else "nowhere"
     return [*cells, number(known[0]), where] if len(known) else [*cells, NOTHING, NOTHING]
