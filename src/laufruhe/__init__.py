@@ -12,7 +12,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, Union
 
-from laufruhe.errors import InputError, LaufruheError, ModelError, SolverError, check_whole, wrong_call
+from laufruhe.errors import InputError, LaufruheError, ModelError, SolverError, check_integer, wrong_call
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -181,7 +181,7 @@ def study(source: Source, jobs: int = 1) -> dict[str, xr.Dataset]:
     from laufruhe.studies.reader import load_study
     from laufruhe.studies.runner import run
 
-    check_whole("jobs", jobs, 1)
+    check_integer("jobs", jobs, 1)
     _, path = tables_and_path(source)
     with TemporaryDirectory() as folder:
         datasets, _ = run(load_study(source), path.parent, Path(folder) / FINISHED_POINTS, jobs=jobs)

@@ -128,7 +128,7 @@ def wrong_call(where: str, argument: object, rule: str, remedy: str) -> InputErr
     return refused(where, printed(repr(argument), 60), rule, remedy)
 
 
-def check_whole(where: str, argument: object, lower: int, upper: float = math.inf) -> None:
+def check_integer(where: str, argument: object, lower: int, upper: float = math.inf) -> None:
     """Refuse an argument that is no whole number between two bounds."""
     if isinstance(argument, bool) or not isinstance(argument, Integral) or not lower <= int(argument) <= upper:
         span = f"{lower} or more" if upper == math.inf else f"{lower} to {upper}"

@@ -25,7 +25,8 @@ def least_deviation(cycle, throws, angle):
     count, minimum = 2 * throws, math.inf
     for rest in itertools.product(range(0, 360, GRID), repeat=throws - 1):
         centres = [
-            math.degrees(float(layout.own_turn(k)) * math.tau) - (0, *rest)[layout.pins[k]] for k in range(count)
+            math.degrees(float(layout.dead_centre_turn(k)) * math.tau) - (0, *rest)[layout.pins[k]]
+            for k in range(count)
         ]
         for laps in itertools.product(range(cycle.turns), repeat=count - 1):
             moments = np.sort(

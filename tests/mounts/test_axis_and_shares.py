@@ -19,7 +19,7 @@ from laufruhe.problem.mount_resonance import evaluate_start
 from laufruhe.prove.certificate import Proof
 from laufruhe.prove.mounts.box_numbers import RANGES
 from laufruhe.prove.mounts.box_response import BoxModel
-from laufruhe.prove.mounts.box_shares import most_shares, shortfall
+from laufruhe.prove.mounts.box_shares import maximum_shares, shortfall
 from laufruhe.solvers import solve
 from mounts.files import BLOCK, ENGINE, MOUNTS, problem_of
 from mounts.powertrain import powertrain, random_mounting
@@ -162,7 +162,7 @@ def test_no_shares_of_a_box_are_over_what_it_has_at_most(tmp_path, size):
     crossing = drawn[np.argsort((np.diff(squares) / squares[:, 1:]).min(axis=1))[:20]]
     middle, half = np.concatenate([crossing, drawn[:20]]), 0.5 * size * generator.random((40, 2)) * wide
     lower, upper = np.maximum(middle - half, low), np.minimum(middle + half, model.upper)
-    minimum, maximum = shortfall(model, measure, lower, upper), most_shares(model, measure, lower, upper)
+    minimum, maximum = shortfall(model, measure, lower, upper), maximum_shares(model, measure, lower, upper)
     inside = lower + generator.random((30, 1, 1)) * (upper - lower)
     inside[:4] = lower, upper, np.stack([lower[:, 0], upper[:, 1]], 1), np.stack([upper[:, 0], lower[:, 1]], 1)
     modes = np.linalg.eigh(model.stiffness(inside.reshape(-1, 2)))[1]

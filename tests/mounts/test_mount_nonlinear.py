@@ -266,7 +266,7 @@ def test_no_neighbour_within_the_limits_is_better(solved):
 def test_unbalances_on_fixed_elastic_mounts_are_proven_globally(tmp_path):
     fixed = MOUNTS.replace('{ between = ["20 N/mm", "4000 N/mm"], start = "400 N/mm" }', '"300 N/mm"')
     problem = problem_of(tmp_path, ENGINE, BLOCK, fixed, SHAFTS, FORCE.format(measure="mean"))
-    assert not problem.asks_mounts
+    assert not problem.uses_mounts
     result = solve(problem)
     assert result.status is Status.OPTIMAL
     assert result.certificate.kind is Proof.GLOBAL

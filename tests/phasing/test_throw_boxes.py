@@ -78,11 +78,11 @@ def scene(folder, name):
 def programs_of(problem, phasing, window, samples=64):
     """Programs of boxes, as the search makes them."""
     throws = nearest(window, 0.5 * sum(window.box))
-    candidate = Candidate(tuple(float(a) % math.tau for a in throws), window.order or None, *phasing.least_geometry)
+    candidate = Candidate(tuple(float(a) % math.tau for a in throws), window.order or None, *phasing.minimum_geometry)
     realised = replace(phasing.realise(candidate), phasing=None)
     rides = rides_of(phasing, candidate)
     riders = Riders(realised, rides, candidate.throws)
-    waves = ThrowWaves(riders.problem, phasing.layout(*phasing.least_geometry), rides)
+    waves = ThrowWaves(riders.problem, phasing.layout(*phasing.minimum_geometry), rides)
     return ThrowPrograms(waves, riders, firing_bounds(phasing), samples)
 
 
@@ -98,7 +98,7 @@ def drawn(rng, window):
 
 def exact(phasing, window, throws):
     """The problem of one crank."""
-    candidate = Candidate(tuple(float(a) % math.tau for a in throws), window.order or None, *phasing.least_geometry)
+    candidate = Candidate(tuple(float(a) % math.tau for a in throws), window.order or None, *phasing.minimum_geometry)
     return replace(phasing.realise(candidate), phasing=None)
 
 
@@ -188,14 +188,14 @@ def test_every_way_to_fire_is_in_one_window(tmp_path, layout, cycle, count):
     )
     phasing = problem.phasing
     windows, firing = windows_of(problem, phasing), firing_bounds(phasing)
-    own = phasing.layout(*phasing.least_geometry)
+    own = phasing.layout(*phasing.minimum_geometry)
     rng = np.random.default_rng(4)
     kept = 0
     for trial in range(400):
         throws = rng.uniform(0.0, math.tau, len(own.throw_positions))
         if trial % 2:
             throws = drawn(rng, windows[rng.integers(len(windows))])
-        throws[0] = angle_of(own.own_turn(0))
+        throws[0] = angle_of(own.dead_centre_turn(0))
         throws = tuple(float(angle) % math.tau for angle in throws)
         for order in itertools.islice(lap_orders(cycle=phasing.cycle, layout=own, throws=throws), 200):
             intervals = intervals_of(phasing.cycle, firing_turns(own, throws, order))

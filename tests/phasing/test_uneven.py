@@ -14,7 +14,7 @@ from laufruhe.load_models.uneven_model import Symbols, UnevenModel, rides_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.phasing import Candidate, Intervals
 from laufruhe.prove.certificate import Proof
-from laufruhe.prove.throws.firing_windows_bound import least_bound, star_bounds, throw_costs, uneven_bound
+from laufruhe.prove.throws.firing_windows_bound import minimum_bound, star_bounds, throw_costs, uneven_bound
 from laufruhe.solvers import solve
 from laufruhe.solvers.stars.enumeration import enumerate_stars
 from laufruhe.solvers.stars.families import families_of
@@ -191,10 +191,10 @@ def test_the_least_bound_of_stars_is_that_of_all_directions(directions):
         costs = size * rng.normal(size=(directions, 4, 5))
         stars = rng.integers(0, 5, (60, 4)).astype(np.uint8)
         every = star_bounds(costs, stars)
-        assert least_bound(costs, stars, np.inf) == every.min()
+        assert minimum_bound(costs, stars, np.inf) == every.min()
         for known in (every.min() - size, np.median(every)):
-            assert least_bound(costs, stars, known) == min(known, every.min())
-        assert least_bound(costs, stars[:0], size) == size
+            assert minimum_bound(costs, stars, known) == min(known, every.min())
+        assert minimum_bound(costs, stars[:0], size) == size
 
 
 @pytest.mark.parametrize("cycle", ["two-stroke", "four-stroke"])

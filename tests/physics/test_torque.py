@@ -187,14 +187,14 @@ def test_a_thin_rim_has_the_stress_of_its_speed() -> None:
     assert tangential.max() == pytest.approx(thick.stress(w), rel=1e-9)
 
 
-def least_inertia(engine: Engine, point: laufruhe.problem.problem.OperatingPoint, degree: float) -> float:
+def minimum_inertia(engine: Engine, point: laufruhe.problem.problem.OperatingPoint, degree: float) -> float:
     return float(brentq(lambda own: irregularity(engine, point, own) - degree, 1e-2, 1e4, rtol=1e-12))
 
 
 @pytest.mark.parametrize("degree", [0.02, 1.0 / 200.0])
 def test_least_flywheel_keeps_the_degree_and_no_smaller_one_does(degree: float) -> None:
     engine, point = case("tractor-three")
-    inertia = least_inertia(engine, point, degree)
+    inertia = minimum_inertia(engine, point, degree)
     assert irregularity(engine, point, inertia) == pytest.approx(degree, rel=1e-6)
     assert crank_motion(engine, point, exact(inertia)).unevenness == pytest.approx(degree, rel=1e-3)
     assert irregularity(engine, point, 0.999 * inertia) > degree
@@ -206,7 +206,7 @@ def test_least_flywheel_keeps_the_degree_and_no_smaller_one_does(degree: float) 
 def test_irregularity_is_that_of_the_motion_in_time() -> None:
     """Integrated in time with the torque and the inertia at the present angle, from one cycle into the next."""
     engine, point = case("tractor-single")
-    inertia = least_inertia(engine, point, 0.03)
+    inertia = minimum_inertia(engine, point, 0.03)
     fidelity = replace(EXACT, crank_inertia=inertia)
     torque = crank_torque(engine, replace(point, speed=1.0), replace(EXACT, gas=True))
     gas_only = crank_torque(engine, point), crank_torque(engine, replace(point, gas=None))

@@ -14,7 +14,7 @@ from laufruhe.present.static_load import static_sentence
 from laufruhe.problem.channels import CHANNELS
 from laufruhe.problem.evaluation import evaluate, objective_value
 from laufruhe.problem.measure import Measure
-from laufruhe.problem.static_load import static_part, with_alternating_loads, with_whole_loads
+from laufruhe.problem.static_load import static_part, with_alternating_loads, with_mean_loads
 from problem_files import PROBLEMS
 
 SAMPLES = 23040
@@ -101,7 +101,7 @@ def test_the_optimum_of_alternating_loads_is_proven_and_no_other_design_is_bette
     assert result.objective is not None
     assert result.certificate is not None
     assert result.objective.name == "mean alternating mount force"
-    assert (result.certificate.kind, with_whole_loads(result.problem).objective) == ("global", given.objective)
+    assert (result.certificate.kind, with_mean_loads(result.problem).objective) == ("global", given.objective)
     assert result.objective.value < objective_value(result.problem, whole.final)
     rng, problem = np.random.default_rng(3), result.problem
     for _ in range(40):

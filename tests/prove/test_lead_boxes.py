@@ -9,7 +9,7 @@ import pytest
 
 from laufruhe.problem.decision import Decision, RotorDrive, domains_of
 from laufruhe.problem.sets import Interval, Sector
-from laufruhe.prove.boxes.leads import least_on_arcs
+from laufruhe.prove.boxes.leads import minimum_on_arcs
 
 DOMAINS = domains_of((
     Decision("size", "kg m", Interval(-0.3, 0.7), 0.0, (RotorDrive("web", 1.0),)),
@@ -26,7 +26,7 @@ def test_no_leads_of_a_box_are_under_its_bound(size: float, turned: float, seed:
     rng, half = np.random.default_rng(seed), size * 1.1 / RATIOS
     columns = sum(domain.width for domain in DOMAINS)
     gradient, slopes, tilts = rng.normal(size=columns), rng.normal(size=2), turned * rng.normal(size=(2, 2, columns))
-    bound = least_on_arcs(DOMAINS, RATIOS, half, gradient, slopes, tilts)
+    bound = minimum_on_arcs(DOMAINS, RATIOS, half, gradient, slopes, tilts)
     minimum = np.inf
     for shares in itertools.product(np.linspace(-1.0, 1.0, 41), repeat=2):
         d = np.array(shares) * half
@@ -40,9 +40,11 @@ def test_no_leads_of_a_box_are_under_its_bound(size: float, turned: float, seed:
 
 def test_leads_alone_are_least_at_a_corner() -> None:
     slopes, half = np.array([2.0, -3.0]), np.array([1.5, 0.4])
-    bound = least_on_arcs((), RATIOS, half, np.zeros(0), slopes, np.zeros((2, 2, 0)))
+    bound = minimum_on_arcs((), RATIOS, half, np.zeros(0), slopes, np.zeros((2, 2, 0)))
     assert bound == pytest.approx(min(np.array(ends) * half @ slopes for ends in itertools.product((-1, 1), repeat=2)))
 
 
 def test_nothing_is_known_of_long_arcs() -> None:
-    assert least_on_arcs(DOMAINS, RATIOS, np.array([3.0, 0.1]), np.ones(3), np.ones(2), np.zeros((2, 2, 3))) == -np.inf
+    assert (
+        minimum_on_arcs(DOMAINS, RATIOS, np.array([3.0, 0.1]), np.ones(3), np.ones(2), np.zeros((2, 2, 3))) == -np.inf
+    )

@@ -25,7 +25,7 @@ PAGES = sorted(
 LINK = re.compile(r"\]\((?!https?:|mailto:)([^)\s]*)\)")
 
 
-def is_kept(path: Path) -> bool:
+def is_active(path: Path) -> bool:
     below = WRITTEN in path.parents
     return path.exists() and (not below or any(path == kept or kept in path.parents for kept in KEPT))
 
@@ -40,7 +40,7 @@ def broken(page: Path) -> list[str]:
     for link in LINK.findall(page.read_text(encoding="utf-8")):
         place, _, anchor = link.partition("#")
         target = (page.parent / place).resolve() if place else page
-        if not is_kept(target) or (anchor and anchor not in anchors(target)):
+        if not is_active(target) or (anchor and anchor not in anchors(target)):
             found.append(link)
     return found
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from laufruhe.cli.screen import Ask, pace, typed
 from laufruhe.errors import printed, refused
-from laufruhe.files.reader import shown_as
+from laufruhe.files.reader import display_path
 from laufruhe.numerics.cores import processors
 from laufruhe.present.picture import Picture
 from laufruhe.report import files
@@ -28,7 +28,7 @@ def run_study(
         raise refused("--jobs", str(jobs), "must be one or more", "leave it out to use every core")
     started = time.perf_counter()
     study = load_study(path)
-    folder = out if out is not None else Path("results") / shown_as(path).stem
+    folder = out if out is not None else Path("results") / display_path(path).stem
     points = folder / FINISHED_POINTS
     option, file_list = "--out" if out is not None else "results", file_names(study)
     with files.staged(files.FileSet(folder, option, "study", file_list, beside=[FINISHED_POINTS])) as stage:

@@ -77,7 +77,7 @@ class Knob:
         return []
 
 
-def first_enough(
+def first_sufficient(
     fidelity: Fidelity, key: str, values: Sequence[int | None], enough: Callable[[Fidelity], bool]
 ) -> Fidelity:
     """Return the fidelity with the first sufficient value; with the last one where no value suffices."""

@@ -12,7 +12,7 @@ from dataclasses import replace
 from typing import Any, ClassVar
 
 from laufruhe.fidelity.error_bounds import REFERENCE_SAMPLES, Scale
-from laufruhe.fidelity.knob import PART_SHARE, Knob, LeftOut, Rungs, first_enough, part_left_out
+from laufruhe.fidelity.knob import PART_SHARE, Knob, LeftOut, Rungs, first_sufficient, part_left_out
 from laufruhe.fidelity.mount_knobs import MOUNT_KNOBS
 from laufruhe.physics.fidelity import EXACT, CrankshaftModel, Fidelity, Kinematics, RodModel
 from laufruhe.physics.mechanism import rod_effects
@@ -42,7 +42,7 @@ class _Kinematics(Knob):
         return [("two-order, 48 steps", quick), (TWO_ORDER, Fidelity("two-order", 720))]
 
 
-class _WholePart(Knob):
+class _SwitchedPart(Knob):
     """A part of the loads that is there or not.
 
     Attributes
@@ -59,7 +59,7 @@ class _WholePart(Knob):
     def is_there(self, problem: Problem) -> bool:
         raise NotImplementedError
 
-    def is_kept(self, problem: Problem, fidelity: Fidelity) -> bool:
+    def is_active(self, problem: Problem, fidelity: Fidelity) -> bool:
         """Return True if the problem has this part and the fidelity keeps it."""
         return self.is_there(problem) and getattr(fidelity, self.key) == getattr(EXACT, self.key)
 
@@ -73,7 +73,7 @@ class _WholePart(Knob):
     def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
         if not self.is_there(scale.problem):
             return [LeftOut(self.what, "the problem describes none")]
-        if self.is_kept(scale.problem, fidelity):
+        if self.is_active(scale.problem, fidelity):
             return []
         why = "the objective hardly sees its roll moment"
         return [part_left_out(scale, fidelity, replace(fidelity, **self.whole), self.what, why)]
@@ -85,7 +85,7 @@ class _WholePart(Knob):
         return [(self.what, replace(problem.fidelity, **self.less))] if self.is_there(problem) else []
 
 
-class _Rod(_WholePart):
+class _Rod(_SwitchedPart):
     key, kind = "rod", RodModel
     what, rung = "inertia of the rods beyond two masses", "exact, rod of two masses, 720 steps"
     less: ClassVar = {"rod": "mass-only"}
@@ -95,10 +95,10 @@ class _Rod(_WholePart):
         return any(rod_effects(part, EXACT) for part in problem.engine.slider_cranks)
 
     def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
-        return ["inertia of the rods beyond that of two masses"] if self.is_kept(scale.problem, fidelity) else []
+        return ["inertia of the rods beyond that of two masses"] if self.is_active(scale.problem, fidelity) else []
 
 
-class _Gas(_WholePart):
+class _Gas(_SwitchedPart):
     key, kind = "gas", bool
     told: ClassVar = {"description": "false leaves the working gas out."}
     what, rung = "gas", NO_GAS
@@ -109,7 +109,7 @@ class _Gas(_WholePart):
         return any(point.gas is not None for point in problem.points)
 
     def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
-        if not self.is_kept(scale.problem, fidelity):
+        if not self.is_active(scale.problem, fidelity):
             return []
         return [f"gas, its torque taken at {fidelity.gas_steps} steps over the cycle, {_orders(fidelity)} of it"]
 
@@ -119,9 +119,9 @@ class _GasSamples(Knob):
     told: ClassVar = {"description": "Steps of the gas torque over the working cycle.", "ge": 48, "le": 100_000}
 
     def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
-        if not GAS.is_kept(scale.problem, fidelity):
+        if not GAS.is_active(scale.problem, fidelity):
             return replace(fidelity, gas_samples=None)
-        return first_enough(fidelity, self.key, GAS_SAMPLES, lambda f: scale.loses(f) <= GAS_SHARE * room)
+        return first_sufficient(fidelity, self.key, GAS_SAMPLES, lambda f: scale.loses(f) <= GAS_SHARE * room)
 
 
 class _Orders(Knob):
@@ -131,7 +131,7 @@ class _Orders(Knob):
     def chosen(self, scale: Scale, fidelity: Fidelity, room: float) -> Fidelity:
         if fidelity.is_uneven:
             return fidelity
-        return first_enough(fidelity, self.key, (*ORDERS, None), lambda f: scale.loses(f) <= PHYSICS_SHARE * room)
+        return first_sufficient(fidelity, self.key, (*ORDERS, None), lambda f: scale.loses(f) <= PHYSICS_SHARE * room)
 
     def left_out(self, scale: Scale, fidelity: Fidelity) -> list[LeftOut]:
         wrenches = [*(loads.wrench for loads in scale.best.loads), *scale.decided]
@@ -206,7 +206,7 @@ class _Samples(Knob):
         if fidelity.is_uneven:
             return fidelity
         lost, steps = scale.loses(fidelity), (*SAMPLES, REFERENCE_SAMPLES)
-        return first_enough(fidelity, self.key, steps, lambda f: lost + scale.misses(f) <= room)
+        return first_sufficient(fidelity, self.key, steps, lambda f: lost + scale.misses(f) <= room)
 
     def kept(self, scale: Scale, fidelity: Fidelity) -> list[str]:
         return [f"{fidelity.samples} steps over the cycle"]

@@ -16,9 +16,9 @@ from laufruhe.files.fields import CylinderNumber, Name, Open, Table
 from laufruhe.files.rotors import CounterweightTable, check_factors
 from laufruhe.machine import CRANKSHAFT, Cycle, Rod, Shaft, SliderCrank
 from laufruhe.machine.drives import DRIVES, Sizes
-from laufruhe.machine.facing import least_room, with_shared_chambers
-from laufruhe.machine.layouts import LAYOUTS, Asked, Layout, LayoutKind, Mechanism, Throw, even_throws, rod_of
-from laufruhe.machine.leads import led_parts
+from laufruhe.machine.facing import minimum_room, with_shared_chambers
+from laufruhe.machine.layouts import LAYOUTS, Layout, LayoutInput, LayoutKind, Mechanism, Throw, even_throws, rod_of
+from laufruhe.machine.leads import parts_with_leads
 from laufruhe.numerics.exact_angles import direction
 from laufruhe.problem.decision import Decision, Kind, NumberDrive
 
@@ -153,13 +153,13 @@ class EngineTable(Table):
         return {key: own for key in keys if isinstance(own := getattr(self, key), Open) and own.is_open}
 
     @property
-    def given_throws(self) -> list[float] | None:
+    def listed_throws(self) -> list[float] | None:
         """Angles of the throws [rad]; None unless all are numbers."""
         angles = [angle for angle in self.throws or () if isinstance(angle, float)]
         return angles if self.throws is not None and len(angles) == len(self.throws) else None
 
     @property
-    def given_order(self) -> list[int] | None:
+    def listed_order(self) -> list[int] | None:
         """Firing order; None unless it is a list."""
         return None if self.firing_order is None or self.firing_order == "open" else self.firing_order
 
@@ -200,17 +200,17 @@ def moving_parts(table: EngineTable, gas: bool) -> tuple[tuple[SliderCrank, ...]
     if kind.is_free:
         parts = _sharing_chambers(table, _free_parts(table), gas)
         return parts, tuple(Throw(p.x, p.throw, (k,), shaft=p.shaft) for k, p in enumerate(parts))
-    layout_input, layout = _layout_input(table, gas), layout_of(table)
+    inputs, layout = _layout_input(table, gas), layout_of(table)
     throws = _throws(table, layout)
-    with blamed_on("engine.firing_order" if table.given_order else "engine"):
-        parts, cranks = kind.parts(layout_input, layout, throws)
+    with blamed_on("engine.firing_order" if table.listed_order else "engine"):
+        parts, cranks = kind.parts(inputs, layout, throws)
     return _sharing_chambers(table, parts, gas), cranks
 
 
 def _sharing_chambers(table: EngineTable, parts: Sequence[SliderCrank], gas: bool) -> tuple[SliderCrank, ...]:
     for k, part in enumerate(parts):
         for other in parts[:k]:
-            if part.faces(other) and least_room(part, other) <= 0.0:
+            if part.faces(other) and minimum_room(part, other) <= 0.0:
                 rule = f"leaves {part.name} and {other.name} no chamber: their pins meet"
                 raise Refused("engine", None, rule, "move the cranks apart, or shorten the rods")
     with blamed_on("engine"):
@@ -233,7 +233,7 @@ def layout_of(table: EngineTable) -> Layout:
         return table.kind.place(_layout_input(table))
 
 
-def _layout_input(table: EngineTable, gas: bool = False) -> Asked:
+def _layout_input(table: EngineTable, gas: bool = False) -> LayoutInput:
     """Return the input of the layout."""
     values = {key.name: table.own(key.name) for key in table.kind.keys}
     masses = [key.name for key in table.kind.keys if key.kind in ("open mass", "open lead")]
@@ -242,7 +242,7 @@ def _layout_input(table: EngineTable, gas: bool = False) -> Asked:
         for name, value in values.items()
     }
     rods = {name: value.model_dump() for name, value in own.items() if isinstance(value, RodTable)}
-    order = None if table.given_order is None else tuple(table.given_order)
+    order = None if table.listed_order is None else tuple(table.listed_order)
     counts = cylinder_counts(table)
     if not counts:
         raise Refused("engine.cylinders", None, "is missing", "add it, or throws, or firing_order")
@@ -251,14 +251,14 @@ def _layout_input(table: EngineTable, gas: bool = False) -> Asked:
         if other != count:
             rule = f"makes {counted(other, 'cylinder')}, but engine.{first} makes {count}"
             raise Refused(f"engine.{key}", None, rule, "let them agree")
-    check_order(table.given_order, count)
+    check_order(table.listed_order, count)
     mechanism, rod = _mechanism(table, own)
-    return Asked(cycle_of(table), count, mechanism, own | rods, order, table.piston_mass.start, rod, gas)
+    return LayoutInput(cycle_of(table), count, mechanism, own | rods, order, table.piston_mass.start, rod, gas)
 
 
 def cylinder_counts(table: EngineTable) -> list[tuple[str, int]]:
     """Return the keys that give the number of cylinders, with that number."""
-    throws, order, per_throw = table.throws, table.given_order, table.kind.cylinders_per_throw
+    throws, order, per_throw = table.throws, table.listed_order, table.kind.cylinders_per_throw
     counts = [("cylinders", table.cylinders)] if table.cylinders is not None else []
     if order is not None and not order:
         raise Refused("engine.firing_order", [], "names no cylinder", "name every cylinder once")
@@ -274,16 +274,16 @@ def check_order(order: Sequence[int] | None, count: int) -> None:
 
 
 def _throws(table: EngineTable, layout: Layout) -> tuple[float, ...]:
-    if table.given_throws is not None:
-        return tuple(table.given_throws)
+    if table.listed_throws is not None:
+        return tuple(table.listed_throws)
     if layout.throws is not None:
         return layout.throws
-    if table.given_order is None:
+    if table.listed_order is None:
         if len(layout.throw_positions) == 1:
             return (layout.banks[0] - layout.pin_offsets[0],)
         raise Refused("engine.throws", None, "is missing", "add it, or firing_order for even firing")
     with blamed_on("engine.firing_order"):
-        return even_throws(cycle_of(table), layout, table.given_order)
+        return even_throws(cycle_of(table), layout, table.listed_order)
 
 
 def _mechanism(table: EngineTable, values: Mapping[str, Any] | None = None) -> tuple[Mechanism, Rod | None]:
@@ -370,7 +370,7 @@ def _free_parts(table: EngineTable) -> tuple[SliderCrank, ...]:
             first = (part.bank_angle - part.throw) / own_shaft.ratio % (math.tau / abs(own_shaft.ratio))
             fires = part.firing_angle if part.firing_angle is not None else first
             parts.append(mechanism.cylinder(k, part.x, part.throw, part.bank_angle, fires, rotating, own_shaft))
-    return led_parts(parts, {shaft.name: Open.from_value(shaft.lead).start for shaft in table.shafts})
+    return parts_with_leads(parts, {shaft.name: Open.from_value(shaft.lead).start for shaft in table.shafts})
 
 
 def piston_masses(

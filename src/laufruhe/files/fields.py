@@ -32,7 +32,7 @@ SMALLEST, LARGEST = 1e-40, 1e12
 SLOWEST = 1e-3
 
 T = TypeVar("T")
-Given = TypeVar("Given", bound=BaseModel)
+TableModel = TypeVar("TableModel", bound=BaseModel)
 
 
 # a tolerance behind a number; the reader checks it
@@ -222,7 +222,7 @@ class OrOpen:
 
 
 @dataclass(frozen=True)
-class OneOrEach:
+class ListOrSingle:
     """Pydantic field that reads a list, or a single value as a list of one."""
 
     inner: Any
@@ -379,6 +379,6 @@ def optional(text: str, default: Any = None) -> Any:
     return Field(default=default, description=text)
 
 
-def with_keys(table: type[Given], keys: Mapping[str, Any]) -> type[Given]:
+def with_keys(table: type[TableModel], keys: Mapping[str, Any]) -> type[TableModel]:
     """Return a table with further keys: the type and the field of each."""
     return create_model(table.__name__, __base__=table, __doc__=table.__doc__, __module__=table.__module__, **keys)

@@ -153,7 +153,7 @@ class LoadCaseTable(Table):
 
 
 @dataclass(frozen=True)
-class MountsFound:
+class MountsInput:
     """Mounts of a file, their block, and the decisions about them."""
 
     mounts: tuple[Mount, ...] = ()
@@ -162,12 +162,12 @@ class MountsFound:
     decisions: tuple[Decision, ...] = ()
 
 
-def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path) -> MountsFound:
+def mounts_of(table: MountsTable | None, block: BlockTable | None, folder: Path) -> MountsInput:
     """Return rigid mounts, or elastic ones with the block on them."""
     if table is None or table.kind == "rigid":
         if block is not None:
             raise Refused("block", None, "needs elastic mounts", 'add [mounts] with kind = "elastic", or leave it out')
-        return MountsFound(_rigid(table)) if table else MountsFound()
+        return MountsInput(_rigid(table)) if table else MountsInput()
     if block is None:
         raise Refused("block", None, "is missing, and elastic mounts carry it", "add [block] with mass and inertia")
     (a, b, c), (xy, xz, yz) = block.inertia, block.inertia_products
@@ -218,7 +218,7 @@ def _values(table: MountsTable, place: MountTable, key: str, where: str, remedy:
     return [value] if len(_FIELDS[key][1]) == 1 else value or [0.0, 0.0, 0.0]
 
 
-def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsFound:
+def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsInput:
     none_of(table, ("relative_stiffness",), "mounts", *_NOT_ELASTIC)
     places, names = _places(table)
     read, joins, laws = _Numbers([], []), list[int](), list[tuple[Dynamic, ...]]()
@@ -252,7 +252,7 @@ def _elastic(table: MountsTable, block: Block, folder: Path) -> MountsFound:
     if loose:
         remedy = "add a mount or a stiffness there; an open stiffness may be given a start"
         raise Refused("mounts", None, f"leave the block free in {loose}", remedy)
-    return MountsFound(mounts, block, tuple(map(tuple, read.rows)), tuple(read.decisions))
+    return MountsInput(mounts, block, tuple(map(tuple, read.rows)), tuple(read.decisions))
 
 
 def _laws(place: MountTable, folder: Path, where: str) -> tuple[Dynamic, ...]:

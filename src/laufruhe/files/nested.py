@@ -84,7 +84,7 @@ def _inside(annotation: Any, part: str | int) -> list[Any]:
         return [] if field is None else [Annotated[field.annotation, *field.metadata, None]]
     if get_origin(annotation) is list:
         return list(get_args(annotation))
-    if isinstance(annotation, f.OneOrEach):
+    if isinstance(annotation, f.ListOrSingle):
         # a list, or its one table alone
         return [annotation.inner, *_inside(annotation.inner, part)]
     if isinstance(annotation, f.OrOpen):
@@ -95,7 +95,7 @@ def _inside(annotation: Any, part: str | int) -> list[Any]:
 
 def _leaves(annotation: Any) -> Iterator[Any]:
     # members of a union and notes of annotated types, without entries of lists
-    if isinstance(annotation, f.OneOrEach):
+    if isinstance(annotation, f.ListOrSingle):
         yield from _leaves(annotation.inner)
     elif get_origin(annotation) is not list:
         yield annotation

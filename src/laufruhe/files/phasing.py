@@ -89,11 +89,11 @@ def opened(
     if not counts:
         raise Refused("engine.cylinders", None, "is missing, and open throws do not say how many", "add it")
     cycle, count, bounds = cycle_of(engine), counts[0], None
-    if isinstance(engine.throws, list) and engine.given_throws is None:
+    if isinstance(engine.throws, list) and engine.listed_throws is None:
         bounds = tuple(Open.from_value(angle).bounds for angle in engine.throws)
     # a layout that leaves its throws no choice
     fixed = None if engine.kind.is_free or engine.kind.takes("throws") else layout_of(_closed(engine, count))
-    throws = fixed.throws if fixed else engine.given_throws
+    throws = fixed.throws if fixed else engine.listed_throws
 
     def realise(candidate: Candidate) -> Problem:
         built = engine
@@ -153,9 +153,9 @@ def _bounds(value: float | Open | None) -> tuple[float, float] | None:
 
 def _order_of(engine: EngineTable, cycle: Cycle, count: int) -> tuple[int, ...] | None:
     # given order, or that of the first dead centres of given throws
-    if engine.given_order is not None:
-        return tuple(engine.given_order)
-    throws = engine.given_throws
+    if engine.listed_order is not None:
+        return tuple(engine.listed_order)
+    throws = engine.listed_throws
     if throws is None or engine.firing_order == "open" or any(_has_open(engine.own(key)) for key in _OPENABLE):
         return None
     layout = layout_of(_closed(engine, count, engine.own("bank_angle"), engine.own("split_pin_angle")))

@@ -35,7 +35,7 @@ Throws: TypeAlias = tuple[Throw, ...]
 
 
 @dataclass(frozen=True)
-class Given:
+class ExtensionContext:
     """Context in which the table of an extension is read.
 
     Attributes
@@ -81,7 +81,7 @@ class Key:
 
     name: str
     annotation: Any
-    read: Callable[[Any, Problem, Given], Problem]
+    read: Callable[[Any, Problem, ExtensionContext], Problem]
     numbers: Callable[[Any], Iterable[tuple[str, Place]]] = lambda _: ()
     single: bool = False
     adds: Callable[[Any, Cylinders, Throws, tuple[Bearing, ...]], tuple[Cylinders, Throws]] = lambda _, c, t, __: (c, t)
@@ -143,7 +143,7 @@ class ProblemFile(Table):
     geared_inertias: list[GearedInertiaTable] = Field(default_factory=list)
     counterweights: list[CounterweightTable] = Field(default_factory=list)
     balancer_shafts: list[BalancerShaftTable] = Field(default_factory=list)
-    objective: Annotated[list[ObjectiveTable], f.OneOrEach(ObjectiveTable)] | None = f.optional(
+    objective: Annotated[list[ObjectiveTable], f.ListOrSingle(ObjectiveTable)] | None = f.optional(
         "What is minimised; of several tables in order, each among the designs that are best by those before it."
     )
     constraints: list[ConstraintTable] = Field(default_factory=list)

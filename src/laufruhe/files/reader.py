@@ -30,7 +30,7 @@ from laufruhe.files.mounts import load_cases_of, mounts_of
 from laufruhe.files.nested import inside, plain, put
 from laufruhe.files.operating_points import Brake, operating_points
 from laufruhe.files.phasing import is_open, opened
-from laufruhe.files.problem_file import EXTENSION_KEYS, Given, Note, ProblemFile, file_model
+from laufruhe.files.problem_file import EXTENSION_KEYS, ExtensionContext, Note, ProblemFile, file_model
 from laufruhe.files.quantities import followed
 from laufruhe.files.rotors import RotorList, balancer_shafts, counterweights
 from laufruhe.files.toml_text import line_deeper_than, toml_complaint
@@ -72,7 +72,7 @@ def tables_and_path(source: str | Path | Mapping[str, Any]) -> tuple[dict[str, A
     if not str(source).strip():
         raise wrong_call("problem", source, "is empty", "give a path, the text of a problem file, or its tables")
     path = Path(source)
-    return tables_of(path), shown_as(path)
+    return tables_of(path), display_path(path)
 
 
 def load_tables(tables: Mapping[str, Any], path: Path) -> Problem:
@@ -115,13 +115,13 @@ def notes() -> tuple[Note, ...]:
     return tuple(extended("notes", Note, (open_numbers.NOTE,)).values())
 
 
-def shown_as(path: Path) -> Path:
+def display_path(path: Path) -> Path:
     """Return the path that messages name: `-` is standard input."""
     return Path("stdin") if path == STDIN else path
 
 
 def _of_file(file: ProblemFile, path: Path) -> Problem:
-    if file.geared_inertias and file.engine.throws is not None and file.engine.given_throws is None:
+    if file.geared_inertias and file.engine.throws is not None and file.engine.listed_throws is None:
         rule = "are known of throws that are given, and engine.throws is open"
         raise Refused("geared_inertias", None, rule, "fix the throws, or leave them out")
     if file.phasing is None and not is_open(file.engine, file.balancer_shafts):
@@ -165,7 +165,7 @@ def tables_of(path: Path) -> dict[str, Any]:
     `-` is standard input. An engine of the catalogue is written out in the tables.
     """
     if path == STDIN:
-        return _whole(_parsed(_standard_input(), shown_as(path)), shown_as(path))
+        return _whole(_parsed(_standard_input(), display_path(path)), display_path(path))
     try:
         with path.open("rb") as stream:
             content = stream.read(MOST_BYTES + 1)
@@ -270,7 +270,7 @@ def _assembled(file: ProblemFile, table: EngineTable, without_gas: bool = False,
         search=Search(**file.search.model_dump()),
         fires_together=table.fires_together,
     )
-    given = Given(file, table, throws, path.parent)
+    given = ExtensionContext(file, table, throws, path.parent)
     for key in keys:
         if key.always or getattr(file, key.name) is not None:
             problem = key.read(getattr(file, key.name), problem, given)

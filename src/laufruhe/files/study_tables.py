@@ -30,12 +30,14 @@ def _single(given: object) -> object:
     return given
 
 
-def _single_each(given: object) -> object:
+def _single_as_list(given: object) -> object:
     return [_single(each) for each in given] if isinstance(given, list) else _single(given)
 
 
 Value: TypeAlias = Annotated[bool | int | float | str, BeforeValidator(_single)]
-Setting: TypeAlias = Annotated[bool | int | float | str | list[bool | int | float | str], BeforeValidator(_single_each)]
+Setting: TypeAlias = Annotated[
+    bool | int | float | str | list[bool | int | float | str], BeforeValidator(_single_as_list)
+]
 End: TypeAlias = Annotated[int | float | str | None, BeforeValidator(_single)]
 
 

@@ -15,7 +15,7 @@ from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.norms import NORMS
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.problem.evaluation import over
-from laufruhe.problem.measure import Measure, bends_of, selected
+from laufruhe.problem.measure import Measure, kinks_of, selected
 
 PEAK = NORMS["maximum"]
 NORMS_OF_PAGE = frozenset({"mean", "maximum", "rms", "peak to peak", "worst mean"})
@@ -42,7 +42,7 @@ class Waves:
 
 
 @dataclass(frozen=True, eq=False)
-class Bends:
+class PiecewiseSignal:
     """Kinks of a signal: a smooth series and polynomials between the kinks (L5a).
 
     Attributes
@@ -83,9 +83,9 @@ class PointSignal:
 
     share: float
     series: Waves
-    bends: Bends | None
+    bends: PiecewiseSignal | None
     slope: Waves
-    bent: tuple[tuple[int, Bends], ...] = ()
+    bent: tuple[tuple[int, PiecewiseSignal], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +130,7 @@ def _of_load(model: AffineModel, measure: Measure) -> Signal:
     columns = [over(base, by) for _, by in pairs]
     # kinks of all signals, for every norm
     signals = [reduce(add, by, own) for own, by in zip(constant, columns, strict=True)]
-    bends = bends_of(replace(measure, norm=PEAK), signals, problem.engine)
+    bends = kinks_of(replace(measure, norm=PEAK), signals, problem.engine)
     points = []
     for share, own, by, at in zip(measure.shares(problem.points), constant, columns, bends, strict=True):
         counted = [selected(measure, signal, problem.engine) for signal in (own, *by)]
@@ -146,16 +146,16 @@ def _point(share: float, constant: Spectrum, columns: Sequence[Spectrum], at: Ar
     slope = np.zeros((maximum, *shape, len(columns)), dtype=complex)
     for k, column in enumerate(columns):
         slope[: len(column.coefficients), ..., k] = column.coefficients
-    bent = tuple((k, _bends(column, at)) for k, column in enumerate(columns) if column.kinks is not None)
-    bends = _bends(constant, at) if bent or constant.kinks is not None else None
+    bent = tuple((k, _piecewise(column, at)) for k, column in enumerate(columns) if column.kinks is not None)
+    bends = _piecewise(constant, at) if bent or constant.kinks is not None else None
     return PointSignal(share, Waves.from_series(constant.coefficients), bends, Waves.from_series(slope), bent)
 
 
-def _bends(signal: Spectrum, at: Array) -> Bends:
+def _piecewise(signal: Spectrum, at: Array) -> PiecewiseSignal:
     smooth, corners = Waves.from_series(signal.smooth.coefficients), signal.kinks
     if corners is None:
-        return Bends(smooth, np.zeros(0), np.zeros((1, 0, *signal.coefficients.shape[1:])), at)
-    return Bends(smooth, corners.angles, corners.pieces(signal.period), at)
+        return PiecewiseSignal(smooth, np.zeros(0), np.zeros((1, 0, *signal.coefficients.shape[1:])), at)
+    return PiecewiseSignal(smooth, corners.angles, corners.pieces(signal.period), at)
 
 
 def _of_masses(model: AffineModel, measure: Measure) -> Signal:

@@ -22,7 +22,7 @@ from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.decision import Decision, Domain, Kind, domains_of, scales_of, vector_of
 from laufruhe.problem.evaluation import Evaluation, evaluate
 from laufruhe.problem.loads import PointLoads
-from laufruhe.problem.measure import Limit, Measure, Rows, bends_of, load_rows, mass_rows
+from laufruhe.problem.measure import Limit, Measure, Rows, kinks_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
 
 MAXIMUM = NORMS["maximum"]
@@ -272,7 +272,7 @@ class AffineModel:
         samples = int(samples * self.base / base)
         # what is open does not bend, but has to be known at the same angles
         lead = [signal.over(base) for signal in (own if self.lead is None else self.lead.bare.signals(channel))]
-        bends = bends_of(measure, lead, self.problem.engine)
+        bends = kinks_of(measure, lead, self.problem.engine)
         bare = self._rows(measure, own, base, samples, parts, bends)
         if bare.vectors.size * len(self._changes) > MOST_NUMBERS:
             size = f"{bare.vectors.size * len(self._changes) / 1e6:.0f} million numbers at once"

@@ -21,7 +21,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.crank_stars import StarSpace
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import evaluate
-from laufruhe.problem.measure import Measure, bends_of, load_rows
+from laufruhe.problem.measure import Measure, kinks_of, load_rows
 from laufruhe.problem.problem import Phasing, Problem
 
 
@@ -80,7 +80,7 @@ class FiringModel(StarModel):
         signals = [signal.over(self.base) for signal in self._fired.signals(measure.load)]
         steps = samples if averaged and measure.norm.averages else None
         whole = load_rows(measure, self.problem.points, _averaged(signals, steps), self.problem.engine, samples)
-        bends, count = bends_of(measure, signals, self.problem.engine), self.space.throws
+        bends, count = kinks_of(measure, signals, self.problem.engine), self.space.throws
         moves = np.zeros((count, count, *whole.vectors.shape))
         for k in range(1, count):
             first = self._alone(measure.load, k)

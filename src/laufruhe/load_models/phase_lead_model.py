@@ -18,7 +18,7 @@ from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.norms import Grid
 from laufruhe.numerics.spectrum import Spectrum, common_base
 from laufruhe.problem.decision import Kind
-from laufruhe.problem.measure import Measure, bends_of, load_rows, selected
+from laufruhe.problem.measure import Measure, kinks_of, load_rows, selected
 from laufruhe.problem.problem import Problem
 
 FINE = 1440
@@ -104,7 +104,7 @@ class PhaseLeadModel:
         by = leads - self.start
         led = [_moved(share, float(d)) for share, d in zip(shafts, by, strict=True)]
         total = _sum(still, led)
-        bends = bends_of(measure, total.own, self.problem.engine)
+        bends = kinks_of(measure, total.own, self.problem.engine)
         averaged = averaged and measure.norm.averages
 
         def rows(signals: Sequence[Spectrum]) -> tuple[Grid, Array]:

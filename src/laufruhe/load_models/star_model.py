@@ -209,7 +209,7 @@ def _upright(decision: Decision) -> Decision:
     return replace(decision, drives=drives, start=decision.start * turn)
 
 
-def in_few_rows(parts: Sequence[Array]) -> list[Array] | None:
+def compress_rows(parts: Sequence[Array]) -> list[Array] | None:
     """Sums of these, shape (..., k, d), are as long in as few rows as they are: Q of a QR keeps every length (S12).
 
     None where they are as many as their numbers.
@@ -230,7 +230,7 @@ def compressed(norm: StarNorm) -> StarNorm:
     parts = [norm.constant * root, norm.moves * root, np.moveaxis(norm.slope * root[..., None], -1, 0)]
     if norm.turns is not None:
         parts.append(np.moveaxis(norm.turns * root[..., None], -1, 2))
-    few = in_few_rows(parts)
+    few = compress_rows(parts)
     if few is None:
         return norm
     (constant, moves, slope), turns = few[:3], None if norm.turns is None else np.moveaxis(few[3], 2, -1)

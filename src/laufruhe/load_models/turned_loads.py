@@ -31,7 +31,7 @@ _NOTHING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Felt:
+class OrderSelection:
     """Which orders of some components of a load are followed.
 
     Attributes
@@ -77,7 +77,7 @@ class TurnedLoads:
 
     def __init__(
         self, problem: Problem, point: int, signal: Callable[[PointLoads], Spectrum], banks: bool,
-        felt: Sequence[Felt], beside: bool,
+        felt: Sequence[OrderSelection], beside: bool,
     ) -> None:  # fmt: skip
         self._problem, self._signal, self._banks, self._beside = problem, signal, banks, beside
         self._point = replace(problem, points=(problem.points[point],))
@@ -148,7 +148,7 @@ def _padded(rows: ComplexArray, count: int) -> ComplexArray:
     return np.pad(rows, ((0, count - len(rows)), (0, 0)))
 
 
-def _kept(squares: Array, orders: Array, felt: Felt) -> Mask:
+def _kept(squares: Array, orders: Array, felt: OrderSelection) -> Mask:
     squares = squares * np.square([felt.gain(float(order)) for order in orders])
     tail = np.cumsum(squares[::-1])[::-1]
     found = (tail > felt.left_out**2 * tail[0]) & (squares > _NOTHING**2 * tail[0])

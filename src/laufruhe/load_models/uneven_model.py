@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from laufruhe.load_models.lines import Lines
 from laufruhe.load_models.mount_rows import SAMPLES_PER_ORDER
-from laufruhe.load_models.turned_loads import Felt, TurnedLoads
+from laufruhe.load_models.turned_loads import OrderSelection, TurnedLoads
 from laufruhe.machine import OperatingPoint, Rotor, SliderCrank
 from laufruhe.machine.layouts import Layout
 from laufruhe.numerics.arrays import Array
@@ -143,11 +143,11 @@ class UnevenModel:
         def signal(loads: PointLoads) -> Spectrum:
             return selected(quantity, quantity.load.signal(loads).series, engine).kept(HIGHEST)
 
-        return self._turned(point, at, signal, [Felt(slice(None), INSIDE_LEFT_OUT)], True)
+        return self._turned(point, at, signal, [OrderSelection(slice(None), INSIDE_LEFT_OUT)], True)
 
     def _turned(
-        self, point: OperatingPoint, at: Symbols, signal: Callable[[PointLoads], Spectrum], felt: Sequence[Felt],
-        beside: bool,
+        self, point: OperatingPoint, at: Symbols, signal: Callable[[PointLoads], Spectrum],
+        felt: Sequence[OrderSelection], beside: bool,
     ) -> list[Lines]:  # fmt: skip
         k, parts = self.problem.points.index(point), self.problem.engine.slider_cranks
         turned = TurnedLoads(self.problem, k, signal, at.bank is not None, felt, beside)
@@ -193,8 +193,8 @@ class UnevenModel:
 
     def _wrench(self, point: OperatingPoint, at: Symbols, gain: Callable[[float], float]) -> Lines:
         share = NEGLIGIBLE if self.problem.fidelity.gas_of(point) is None else self._left_out
-        others = [Felt(slice(k, k + 1), NEGLIGIBLE) for k in range(6) if k != ROLL]
-        roll = Felt(slice(ROLL, ROLL + 1), share, gain)
+        others = [OrderSelection(slice(k, k + 1), NEGLIGIBLE) for k in range(6) if k != ROLL]
+        roll = OrderSelection(slice(ROLL, ROLL + 1), share, gain)
         (found,) = self._turned(point, at, _wrench_of, [*others, roll], False)
         return found
 

@@ -144,7 +144,7 @@ def _facing(part: SliderCrank, other: SliderCrank, cycle_angle: float) -> Facing
     return Facing(other.crank_radius, other.rod_length, ahead)
 
 
-def least_room(part: SliderCrank, other: SliderCrank) -> float:
+def minimum_room(part: SliderCrank, other: SliderCrank) -> float:
     """Return the least distance between the pins of two facing pistons [m]; infinite for Scotch yokes."""
     apart = math.hypot(other.shaft.y - part.shaft.y, other.shaft.z - part.shaft.z)
     reach = part.crank_radius + part.rod_length + other.crank_radius + other.rod_length

@@ -68,18 +68,18 @@ def pin_steps(layout: Layout, lattice: FiringLattice) -> tuple[tuple[int, ...], 
     NoEvenStarError
         If two cylinders of one throw are apart by no whole number of steps.
     """
-    first = layout.own_turn(0)
+    first = layout.dead_centre_turn(0)
     out = []
     for pin in range(len(layout.throw_positions)):
         steps = []
         for k in (k for k, own in enumerate(layout.pins) if own == pin):
-            apart = (layout.own_turn(k) - first) * lattice.steps
+            apart = (layout.dead_centre_turn(k) - first) * lattice.steps
             nearest = round(float(apart))
             if abs(float(apart) - nearest) > SAME_TURN * lattice.steps:
                 raise NoEvenStarError(
                     "even firing needs the angle between dead centres on one throw (bank angle plus split pins, or "
                     f"leads of cranks) to be a multiple of {360.0 / lattice.steps:g} deg, and they make "
-                    f"{math.degrees(angle_of(layout.own_turn(0) - layout.own_turn(k))):.6g} deg; "
+                    f"{math.degrees(angle_of(layout.dead_centre_turn(0) - layout.dead_centre_turn(k))):.6g} deg; "
                     "change or open one of these angles, or allow uneven intervals"
                 )
             steps.append(nearest % lattice.steps)
@@ -136,7 +136,7 @@ def _patterns(lattice: FiringLattice, own: tuple[int, ...], throws: int) -> Iter
 
 def star_throws(layout: Layout, steps: Sequence[int], lattice_steps: int) -> tuple[float, ...]:
     """Return the throw angles of a star [rad], cylinder 1 at its dead centre at phi = 0 (C5)."""
-    first = layout.own_turn(0)
+    first = layout.dead_centre_turn(0)
     return tuple(angle_of((first + Fraction(int(step), lattice_steps)) % 1) for step in steps)
 
 

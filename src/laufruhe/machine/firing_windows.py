@@ -30,7 +30,7 @@ _ROUNDS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class OwnAngles:
+class CylinderAngles:
     """Own angles of cylinders: throw angle plus shares of open bank and pin angles.
 
     Attributes
@@ -112,7 +112,7 @@ class FiringWindow:
     order: tuple[int, ...]
     laps: tuple[int, ...]
     paths: Array
-    own: OwnAngles
+    own: CylinderAngles
     root: tuple[Array, Array]
 
     @cached_property
@@ -183,10 +183,12 @@ class FiringBounds:
         return [self._named.index((pin, self.share(k))) for k, pin in enumerate(self.layout.pins)]
 
     @cached_property
-    def own(self) -> OwnAngles:
+    def own(self) -> CylinderAngles:
         """Own angles of all cylinders."""
         shares = np.array([share for _, share in self._named])
-        return OwnAngles(np.array([pin for pin, _ in self._named]), np.tile(shares[:, None], len(self.open_angles)))
+        return CylinderAngles(
+            np.array([pin for pin, _ in self._named]), np.tile(shares[:, None], len(self.open_angles))
+        )
 
     @cached_property
     def _root(self) -> tuple[Array, Array]:

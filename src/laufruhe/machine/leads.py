@@ -11,7 +11,7 @@ from laufruhe.machine.facing import with_shared_chambers
 from laufruhe.machine.slider_crank import SliderCrank
 
 
-def led_parts(parts: Sequence[SliderCrank], leads: Mapping[str, float]) -> tuple[SliderCrank, ...]:
+def parts_with_leads(parts: Sequence[SliderCrank], leads: Mapping[str, float]) -> tuple[SliderCrank, ...]:
     """Return the slider-cranks with phase leads [rad] by the names of their shafts."""
     return tuple(_led(part, leads.get(part.shaft.name, 0.0)) for part in parts)
 
@@ -24,7 +24,7 @@ def _led(part: SliderCrank, lead: float) -> SliderCrank:
 
 def led(engine: Engine, leads: Mapping[str, float]) -> Engine:
     """Return the engine with phase leads of its shafts [rad], and so of all loads on them."""
-    parts = led_parts(engine.slider_cranks, leads)
+    parts = parts_with_leads(engine.slider_cranks, leads)
     if any(part.facing is not None for part in parts):
         parts = with_shared_chambers([replace(part, facing=None) for part in parts], engine.cycle.angle)
     turned = {shaft.name: cmath.exp(1j * shaft.ratio * leads.get(shaft.name, 0.0)) for shaft in engine.shafts}

@@ -17,7 +17,7 @@ _FLAT, _NOTHING = 1e-15, 1e-290
 
 
 @dataclass(frozen=True, eq=False)
-class Balls:
+class EnclosingBalls:
     """Smallest enclosing ball of each set.
 
     Attributes
@@ -26,7 +26,7 @@ class Balls:
         Shape (sets,).
     centres
         Shape (sets, d).
-    held
+    inside
         Points that hold a ball, some of them more than once, shape (sets, d + 1).
     shares
         Of these in the centre, shape (sets, d + 1); none is negative, and they add up to one.
@@ -34,11 +34,11 @@ class Balls:
 
     radii: Array
     centres: Array
-    held: Indices
+    inside: Indices
     shares: Array
 
 
-def enclosing_balls(points: Array) -> Balls:
+def enclosing_balls(points: Array) -> EnclosingBalls:
     """Return the smallest enclosing balls of points, shape (sets, k, d).
 
     The farthest point joins those that hold a ball, and the ball of these few is found by trying every choice of them
@@ -51,21 +51,21 @@ def enclosing_balls(points: Array) -> Balls:
     radii, shares = np.zeros(sets), np.zeros((sets, d + 1))
     shares[:, 0] = 1.0
     middle = 0.5 * (scaled.min(axis=1) + scaled.max(axis=1))
-    held = np.repeat(_squares(scaled, middle).argmax(axis=1)[:, None], d + 1, axis=1)
-    centres = scaled[every, held[:, 0]]
+    inside = np.repeat(_squares(scaled, middle).argmax(axis=1)[:, None], d + 1, axis=1)
+    centres = scaled[every, inside[:, 0]]
     left = every
     for _ in range(count):
         far = _squares(scaled[left], centres[left])
         farthest = far.argmax(axis=1)
         outside = np.sqrt(far[np.arange(len(left)), farthest]) > radii[left] * (1.0 + SAME)
-        more = outside & (held[left] != farthest[:, None]).all(axis=1)
+        more = outside & (inside[left] != farthest[:, None]).all(axis=1)
         left, farthest = left[more], farthest[more]
         if not len(left):
             break
-        few = np.concatenate([held[left], farthest[:, None]], axis=1)
+        few = np.concatenate([inside[left], farthest[:, None]], axis=1)
         chosen, radii[left], centres[left], shares[left] = _of_few(scaled[left[:, None], few])
-        held[left] = np.take_along_axis(few, chosen, axis=1)
-    return Balls(radii * units, centres * units[:, None], held, shares)
+        inside[left] = np.take_along_axis(few, chosen, axis=1)
+    return EnclosingBalls(radii * units, centres * units[:, None], inside, shares)
 
 
 def _squares(points: Array, centres: Array) -> Array:

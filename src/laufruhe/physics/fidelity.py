@@ -109,7 +109,7 @@ class Fidelity:
         """Return the working gas that loads the engine, or None."""
         return point.gas if self.gas else None
 
-    def kept_of_gas(self, torque: Spectrum) -> Spectrum:
+    def truncated_gas(self, torque: Spectrum) -> Spectrum:
         """Return the gas torque without truncated orders."""
         return torque if self.gas_orders is None else torque.kept(self.gas_orders)
 

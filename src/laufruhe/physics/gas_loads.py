@@ -47,7 +47,7 @@ def gas_coefficients(gas: GasModel, part: SliderCrank, cycle: Cycle, fidelity: F
     A cylinder that fires at phi_k has these coefficients times e^{-i h phi_k}.
     """
     key = _CylinderKey((type(part), alike_under(gas, part), part.shaft.ratio), part)
-    return fidelity.kept_of_gas(_one_cylinder(gas, key, cycle, fidelity.gas_steps))
+    return fidelity.truncated_gas(_one_cylinder(gas, key, cycle, fidelity.gas_steps))
 
 
 @dataclass(frozen=True)

@@ -188,7 +188,7 @@ class Swing:
             return np.inf
         return float((speeds.max() - speeds.min()) / self.speed)
 
-    def least_inertia(self, degree: float) -> float:
+    def minimum_inertia(self, degree: float) -> float:
         """Return the least inertia beside pistons and rods for a degree of irregularity [kg m2] (T3).
 
         Zero where none is needed. The degree falls as the inertia grows.

@@ -190,7 +190,7 @@ def objective_unit(result: Result) -> str:
     return result.objective.unit if result.objective else ""
 
 
-def asks_torque(result: Result) -> bool:
+def uses_torque(result: Result) -> bool:
     """Return True with a flywheel, or for measures inside the crankcase."""
     problem = result.problem
     is_requested = any(measure.is_inside for measure in problem.measures)

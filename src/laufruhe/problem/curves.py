@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from laufruhe.errors import ModelError, check_whole
+from laufruhe.errors import ModelError, check_integer
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.spectrum import Spectrum, common_base, order_amplitude
 from laufruhe.physics.bearing_loads import has_bearing_loads
@@ -110,7 +110,7 @@ class Fields:
 
 def forces_of(designs: Mapping[str, Evaluation], steps: int = STEPS) -> Fields:
     """Return the loads on the block, the mounts and the bearings, and the mount travel, over the cycle (C7)."""
-    check_whole("steps", steps, 1, MOST_STEPS)
+    check_integer("steps", steps, 1, MOST_STEPS)
     first = next(iter(designs.values()))
     turn = first.engine.cycle.angle
     angles = Axis("angle", tuple(float(k) for k in np.degrees(turn) * np.arange(steps) / steps), "deg")

@@ -209,14 +209,14 @@ def load_rows(
     samples
         Number of samples over the period of the signals.
     bends
-        Angles of kinks at every point [rad], as many at each; by default those of `bends_of`.
+        Angles of kinks at every point [rad], as many at each; by default those of `kinks_of`.
 
     Returns
     -------
     Rows of (points, places, samples and kinks) in that order; weights add up to one.
     """
     blocks, weights = [], []
-    bends = bends_of(measure, signals, engine) if bends is None else bends
+    bends = kinks_of(measure, signals, engine) if bends is None else bends
     for signal, share, own in zip(signals, measure.shares(points), bends, strict=True):
         if share == 0.0:
             continue
@@ -239,7 +239,7 @@ def load_rows(
     return Rows(measure.norm, rows, Grid(shares, samples + count, count, len(blocks)))
 
 
-def bends_of(measure: Measure, signals: Sequence[Spectrum], engine: Engine) -> list[Array]:
+def kinks_of(measure: Measure, signals: Sequence[Spectrum], engine: Engine) -> list[Array]:
     """Return the angles of kinks [rad] where a peak may stand, as many for every operating point (L5a)."""
     if measure.norm.refinement == 1:
         return [np.zeros(0)] * len(signals)

@@ -203,10 +203,10 @@ class PhasingOf(Generic[P]):
     @property
     def shares_throws(self) -> bool:
         """True if several cylinders share a throw."""
-        return len(self.layout(*self.least_geometry).throw_positions) < self.cylinders
+        return len(self.layout(*self.minimum_geometry).throw_positions) < self.cylinders
 
     @property
-    def least_geometry(self) -> tuple[float | None, float | None]:
+    def minimum_geometry(self) -> tuple[float | None, float | None]:
         """Lower bounds of bank angle and split pin [rad]; None if the layout has none."""
         return (None if self.bank is None else self.bank[0]), (None if self.split is None else self.split[0])
 

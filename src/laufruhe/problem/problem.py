@@ -281,7 +281,7 @@ class Problem:
         return tuple(limit for limit in self.limits if limit.measure.is_mounting)
 
     @property
-    def asks_mounts(self) -> bool:
+    def uses_mounts(self) -> bool:
         """True if numbers of elastic mounts are open, minimised or limited."""
         return bool(self.mount_decisions) or any(measure.is_mounting for measure in self.measures)
 

@@ -37,7 +37,7 @@ class StaticPart:
 
 def static_part(problem: Problem, evaluation: Evaluation) -> StaticPart | None:
     """Return the static part of loads on the block and its mounts in the objective, or None where it is negligible."""
-    whole = with_whole_loads(problem)
+    whole = with_mean_loads(problem)
     counted = [term for term in whole.objective if term.measure.counts_mean and not term.measure.is_inside]
     if evaluation.resonance or not counted:
         return None
@@ -53,7 +53,7 @@ def with_alternating_loads(problem: Problem) -> Problem:
     return _with_loads(problem, True)
 
 
-def with_whole_loads(problem: Problem) -> Problem:
+def with_mean_loads(problem: Problem) -> Problem:
     """Return the problem with an objective that keeps the mean of every load."""
     return _with_loads(problem, False)
 

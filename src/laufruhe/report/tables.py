@@ -32,7 +32,6 @@ from laufruhe.present.curves import (
 from laufruhe.present.measures import (
     BEARINGS,
     as_crank_turns,
-    asks_torque,
     bearing_paths,
     designs_with_loads,
     has_bearings,
@@ -42,6 +41,7 @@ from laufruhe.present.measures import (
     objective_unit,
     places_of,
     ranking_of,
+    uses_torque,
 )
 from laufruhe.present.mounting import critical_speed, facts_of, is_elastic
 from laufruhe.present.numbers import RPM
@@ -282,7 +282,7 @@ _TABLES: NumberTables = {
     "modes": (is_elastic, lambda result: Table.from_fields(modes_of(result.designs))),
     "transmissibility": (is_elastic, _transmissibility),
     "rankings": (has_ranking, _rankings),
-    "torque": (lambda result: asks_torque(result) and has_loads(result), _torque),
+    "torque": (lambda result: uses_torque(result) and has_loads(result), _torque),
     "indicator": (points_with_chambers, _indicator),
     "uneven-firing": (has_ranking, _uneven_firing),
     "willans": (lambda result: result.problem.friction, _willans),

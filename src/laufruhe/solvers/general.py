@@ -24,7 +24,7 @@ from laufruhe.prove.certificate import ProofStrength
 from laufruhe.solvers.conclusion import build_result, evaluate_design, values_of
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.smooth.local_programs import LocalProgram, best_local_optimum, shown, spread_starts
-from laufruhe.solvers.stars.phasing_solver import even_stars, solve_each_order
+from laufruhe.solvers.stars.phasing_solver import even_stars, solve_every_order
 from laufruhe.solvers.stars.star_results import no_star
 from laufruhe.solvers.throws.moved_throws import solve_moved_throws
 from laufruhe.solvers.throws.throw_starts import why_none_fires
@@ -104,4 +104,4 @@ def solve_star_by_star(problem: Problem, decide: Decide) -> Result:
     stars = even_stars(phasing)
     if not stars:
         return no_star(problem, why_none_fires(phasing)[0])
-    return solve_each_order(problem, phasing, stars, lambda own, _: decide(replace(own, phasing=None)), MOST_STARS)
+    return solve_every_order(problem, phasing, stars, lambda own, _: decide(replace(own, phasing=None)), MOST_STARS)

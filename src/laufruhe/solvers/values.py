@@ -46,7 +46,7 @@ class DecisionValue:
         return Price(self.shadow_price, self.shadow_price if other is None else other)
 
     @property
-    def is_nothing(self) -> bool:
+    def is_zero(self) -> bool:
         """Tell if the value is zero up to rounding, relative to its bounds."""
         return abs(self.value) <= NEXT_TO_NOTHING * max(abs(self.lower), abs(self.upper))
 
@@ -54,7 +54,7 @@ class DecisionValue:
 def meaningful(decisions: Sequence[DecisionValue]) -> list[DecisionValue]:
     """Without angles of sizes that are none."""
     pairs = pairwise([None, *decisions])
-    return [d for size, d in pairs if d is not None and not (d.name.endswith(".angle") and size and size.is_nothing)]
+    return [d for size, d in pairs if d is not None and not (d.name.endswith(".angle") and size and size.is_zero)]
 
 
 @dataclass(frozen=True)

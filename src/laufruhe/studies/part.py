@@ -63,7 +63,7 @@ class Part(Table):
         {},
     )
 
-    def each_reading(self) -> list[Part]:
+    def by_reading(self) -> list[Part]:
         """Return the part once per reading of a doubtful number; itself without readings."""
         return [self._in_reading(*reading) for reading in self.readings.items()] or [self]
 

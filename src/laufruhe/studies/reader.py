@@ -77,11 +77,11 @@ def load_study(source: str | Path | Mapping[str, Any]) -> StudyFile:
         file = StudyFile.model_validate(tables)
     except ValidationError as error:
         raise InputError(str(path), _merged(complaints_of(error, StudyFile), tables)) from None
-    parts = [reading for part in file.study.parts for reading in part.each_reading()]
+    parts = [reading for part in file.study.parts for reading in part.by_reading()]
     names = [part.name for part in parts]
     for k, part in enumerate(file.study.parts):
         where = f"study.parts[{k + 1}]"
-        if max(names.count(reading.name) for reading in part.each_reading()) > 1:
+        if max(names.count(reading.name) for reading in part.by_reading()) > 1:
             raise refused(f"{where}.name", part.name, "is given twice", "give each part its own name", path)
         cases = [case.name for case in part.cases]
         if len(set(cases)) < len(cases):

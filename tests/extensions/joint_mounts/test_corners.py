@@ -156,7 +156,7 @@ def test_loads_of_too_many_numbers_have_no_boxes(monkeypatch: pytest.MonkeyPatch
     for maximum, few, worth in ((count, 2, True), (count - 1, 2, False), (count, 10**9, False)):
         monkeypatch.setattr(design_boxes, "MOST_NUMBERS", maximum)
         monkeypatch.setattr(design_boxes, "FEW", few)
-        assert (boxes.most_boxes > 0) is worth
+        assert (boxes.max_boxes > 0) is worth
 
 
 CROSSED = {

@@ -45,7 +45,7 @@ def throws_of(table: dict[str, Any]) -> OpenThrows:
     assert phasing is not None
     assert phasing.throw_bounds is not None
     middle = tuple(0.5 * (low + high) for low, high in phasing.throw_bounds)
-    bank, split = phasing.least_geometry
+    bank, split = phasing.minimum_geometry
     found = throws_at(problem, phasing, Candidate(middle, None, bank, split))
     assert found is not None
     return found

@@ -19,7 +19,7 @@ from laufruhe.extensions.mount_relaxation.modes import ModeConstraints
 from laufruhe.extensions.mount_relaxation.odd_multiples import HighOrder, linear_sum, work_weight
 from laufruhe.extensions.mount_relaxation.open_mounts import OpenMounts, is_lifted, open_mounts
 from laufruhe.extensions.mount_relaxation.orders import Order
-from laufruhe.extensions.mount_relaxation.parameter_maps import own_axes
+from laufruhe.extensions.mount_relaxation.parameter_maps import mount_axes
 from laufruhe.extensions.mount_relaxation.program import ModeMultipliers, Multipliers, Program, Solution, mode_scores
 from laufruhe.extensions.mount_relaxation.prover import spring_bound
 from laufruhe.extensions.mount_relaxation.response import ResponseBound
@@ -195,7 +195,7 @@ def in_planes(boxes: SdpRelaxation, x: np.ndarray) -> np.ndarray:
     own = number_ranges(boxes.problem, x, x)[0]
     for kind, *_ in boxes._planes:
         m = int(np.argmax(np.any(low[:, ANGLES] < high[:, ANGLES], axis=1)))
-        frame, axes = own_axes(boxes._frames[m, ANGLES])[1:], own_axes(own[m, ANGLES])
+        frame, axes = mount_axes(boxes._frames[m, ANGLES])[1:], mount_axes(own[m, ANGLES])
         seen = frame @ axes.T @ np.diag(own[m, kind : kind + 3]) @ axes @ frame.T
         found.append(np.array([seen[0, 0], seen[1, 1], seen[0, 1]]))
     return np.concatenate(found)

@@ -13,7 +13,7 @@ from extensions.sizes.test_sizes import TEXT
 from laufruhe.errors import ModelError
 from laufruhe.extensions.sizes.boxes import SizeBoxes
 from laufruhe.extensions.sizes.model import SizeModel
-from laufruhe.extensions.sizes.solver import ask_cones
+from laufruhe.extensions.sizes.solver import solve_cone_program
 from laufruhe.problem.decision import domains_of
 from laufruhe.problem.evaluation import evaluate
 from laufruhe.problem.problem import Problem
@@ -78,7 +78,7 @@ def test_at_its_sizes_the_cone_program_finds_the_same(solved: Result, problem: P
     assert own.objective.value == pytest.approx(solved.objective.value, rel=1e-6)
     # and no box around them alone has a bound beyond it
     model = SizeModel(problem)
-    boxes = SizeBoxes(model, ask_cones)
+    boxes = SizeBoxes(model, solve_cone_program)
     point = boxes.cut(sizes, sizes, np.inf)
     assert point.bound <= solved.objective.value * (1.0 + 1e-9)
     # less by what means lose that are averaged about their angles
@@ -99,7 +99,7 @@ def test_weights_beside_sizes_are_never_worse_and_neither_are_sizes_beside_weigh
 def test_boxes_bound_what_is_in_them_with_any_weights(problem: Problem) -> None:
     """Random boxes, designs and dual rows: none allowed lies under a bound, or in what was cut off."""
     model = SizeModel(problem)
-    boxes, rng, kept = SizeBoxes(model, ask_cones), np.random.default_rng(5), 0
+    boxes, rng, kept = SizeBoxes(model, solve_cone_program), np.random.default_rng(5), 0
     domains = domains_of(problem.unbalances)
     measure = problem.objective[0].measure
     known: tuple = ()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from laufruhe.errors import ModelError
-from laufruhe.machine.layouts.base import Asked, LayoutKind
+from laufruhe.machine.layouts.base import LayoutInput, LayoutKind
 from laufruhe.machine.layouts.places import Layout, stations
 
 BANKS = tuple(math.radians(angle) for angle in (0.0, 60.0, 120.0, 180.0, 240.0, 300.0))
@@ -18,14 +18,14 @@ class SixBank(LayoutKind):
     cylinders_per_throw = 6
     banks = 6
 
-    def place(self, asked: Asked) -> Layout:
+    def place(self, inputs: LayoutInput) -> Layout:
         """Return the places bank by bank."""
-        if asked.cylinders % 6:
-            raise ModelError(f"six banks need six cylinders a throw, got {asked.cylinders}")
-        throws = asked.cylinders // 6
-        places = stations(throws, asked.spacing(throws))
+        if inputs.cylinders % 6:
+            raise ModelError(f"six banks need six cylinders a throw, got {inputs.cylinders}")
+        throws = inputs.cylinders // 6
+        places = stations(throws, inputs.spacing(throws))
         banks = tuple(bank for bank in BANKS for _ in range(throws))
-        return Layout("six-bank", places * 6, banks, (*range(throws),) * 6, (0.0,) * asked.cylinders, places)
+        return Layout("six-bank", places * 6, banks, (*range(throws),) * 6, (0.0,) * inputs.cylinders, places)
 
 
 SIX_BANK = SixBank()

@@ -35,7 +35,7 @@ from laufruhe.problem import channels
 from laufruhe.problem.evaluation import objective_value
 from laufruhe.problem.measure import Limit, Measure
 from laufruhe.problem.problem import Problem
-from laufruhe.problem.static_load import with_alternating_loads, with_whole_loads
+from laufruhe.problem.static_load import with_alternating_loads, with_mean_loads
 from laufruhe.solvers import solve
 from laufruhe.studies.scenes import shafts_of
 from laufruhe.studies.text import NEGLIGIBLE, NOTICEABLE, PRINTED_FALL, Verdict
@@ -77,7 +77,7 @@ def best(problem: Problem, mass_limit: float = math.inf) -> FrontPoint:
     price = next((limit.shadow_price for limit in result.limits if limit.name == LIMIT_NAME), 0.0)
     bound, gap = (proof.lower_bound, proof.gap) if proof else (value, 0.0)
     other = with_alternating_loads(problem)
-    other = with_whole_loads(problem) if other.objective == problem.objective else other
+    other = with_mean_loads(problem) if other.objective == problem.objective else other
     return FrontPoint(value, bound, gap, mass, price, objective_value(other, result.final))
 
 

@@ -115,15 +115,15 @@ class DesignBoxes:
         self.best: tuple[Array, Array] | None = None
 
     @property
-    def most_boxes(self) -> int:
+    def max_boxes(self) -> int:
         """Box budget: as requested, or for some tens of seconds."""
         count = len(self.lower)
-        if self.most_corners < FEW * 2**count or self.loads.rows * self.loads.columns > MOST_NUMBERS:
+        if self.max_corners < FEW * 2**count or self.loads.rows * self.loads.columns > MOST_NUMBERS:
             return 0
-        return self.loads.problem.search.boxes_or(BOXES * self.most_corners // max(4 ** (count - 3), 1))
+        return self.loads.problem.search.boxes_or(BOXES * self.max_corners // max(4 ** (count - 3), 1))
 
     @property
-    def most_corners(self) -> int:
+    def max_corners(self) -> int:
         """Largest number of vertices with multipliers."""
         return int(min(MOST_CORNERS, ROWS / max(self.loads.rows, 1)))
 
@@ -175,7 +175,7 @@ class DesignBoxes:
             return 0.0, int(np.argmax(even.scores(self._counted) + EVEN * (upper - lower) / (self.upper - self.lower)))
         places = [np.where(end < 0.0, lower, upper) for end in corners_of(len(lower))]
         known = [self._corners.get(tuple(place.tolist())) for place in places]
-        rough, is_over = None, len(self._corners) >= self.most_corners
+        rough, is_over = None, len(self._corners) >= self.max_corners
         if is_over and not any(known):
             return 0.0, int(np.argmax((upper - lower) / (self.upper - self.lower)))
         if any(known) and not all(known):
@@ -336,7 +336,7 @@ class _VertexBranching(BoxSearch):
 def designed_bound(boxes: DesignBoxes, room: float, known: Known | None = None) -> BoxResult:
     """Bound a problem that `mixes_corners`, until no design is more than `room` better than the incumbent."""
     division = _VertexBranching(boxes, room, known)
-    maximum = boxes.most_boxes
+    maximum = boxes.max_boxes
     if not maximum:
         return BoxResult(0.0, 0)
     divided = division.run(division.bounded([(boxes.lower, boxes.upper)])[0], maximum)

@@ -88,7 +88,7 @@ def load_bounds(
     if not is_boxed(problem, throws) or not 0.0 < value < math.inf:
         return
     boxes = LoadBoxes(problem, LEFT_OUT * room, throws)
-    maximum = boxes.most_boxes
+    maximum = boxes.max_boxes
     if maximum and boxes.is_sampled_fully:
         counts = [math.ceil(share * maximum) for share in shares]
         yield from divide_in_rounds(boxes, boxes.lower, boxes.upper, value, room, counts, known)
@@ -181,7 +181,7 @@ class LoadBoxes:
         return int(np.clip(ROUND_WORK / self._cost, 2, 32))
 
     @property
-    def most_boxes(self) -> int:
+    def max_boxes(self) -> int:
         """Box budget: as requested, or for some seconds."""
         return self.problem.search.boxes_or(int(min(WORK / self._cost, MOST_BOXES)))
 

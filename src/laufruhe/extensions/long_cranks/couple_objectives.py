@@ -19,7 +19,7 @@ import numpy as np
 
 from laufruhe.extensions.long_cranks.throw_halves import Window
 from laufruhe.load_models.amplitudes import AmplitudeObjective
-from laufruhe.load_models.star_model import in_few_rows
+from laufruhe.load_models.star_model import compress_rows
 from laufruhe.machine import Role
 from laufruhe.numerics.arrays import Array, ComplexArray
 from laufruhe.numerics.norms import Grid, Norm
@@ -27,7 +27,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.crank_stars import Stars, StarSpace, phase_waves, star_sums
 from laufruhe.problem.channels import LoadChannel
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
-from laufruhe.problem.measure import Measure, bends_of, load_rows
+from laufruhe.problem.measure import Measure, kinks_of, load_rows
 from laufruhe.problem.problem import Problem
 
 ONE_ORDER = 4.0 / math.pi
@@ -290,7 +290,7 @@ class _Spread:
     def term(self, weight: float, measure: Measure) -> CoupleTerm:
         """Return one term, its rows those of a result, means averaged about them (P7)."""
         rest, norm = self.rest[measure.load], measure.norm
-        bends = bends_of(measure, rest, self.design.engine)
+        bends = kinks_of(measure, rest, self.design.engine)
         constant, grid = self._rows(measure, rest, bends)
         per_turn = round(1 / self.design.engine.cycle.base_order)
         rows = []
@@ -306,7 +306,7 @@ class _Spread:
         sizes = np.array([norm.value(grid, own) for own in couples[::2]])
         if norm.is_euclidean:
             root = np.sqrt(grid.weights)[:, None]
-            compressed = in_few_rows([constant * root, couples * root])
+            compressed = compress_rows([constant * root, couples * root])
             if compressed is not None:
                 (constant, couples), grid = compressed, Grid(np.ones(compressed[0].shape[0]), compressed[0].shape[0])
         return CoupleTerm(weight, norm, grid, constant, couples, sizes)

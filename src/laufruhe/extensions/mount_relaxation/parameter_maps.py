@@ -211,10 +211,10 @@ class ParameterMaps:
         middle, turned = self.middle(m), self.reach(m)[TURNED] > 0.0
         if np.count_nonzero(turned) == 1:
             middle[TURNED] = self._frames[m, TURNED]
-        axes = own_axes(middle[TURNED])
+        axes = mount_axes(middle[TURNED])
         if not turned.any():
             return axes, []
-        other = own_axes(middle[TURNED] + ASIDE * turned)
+        other = mount_axes(middle[TURNED] + ASIDE * turned)
         stay = [i for i in range(3) if np.abs(other[i] - axes[i]).max() < STAYS]
         if np.count_nonzero(turned) > 1 or len(stay) != 1:
             return np.eye(3), [0, 1, 2]
@@ -298,7 +298,7 @@ class ParameterMaps:
         angles = sorted(side * (float(each[m, axis]) - float(self._frames[m, axis])) for each in (self.low, self.high))
         ahead = self._frames[m, TURNED].copy()
         ahead[axis - TURNED.start] += side * ASIDE
-        sign = math.copysign(1.0, float(own_axes(ahead)[pair[0]] @ axes[pair[1]]))
+        sign = math.copysign(1.0, float(mount_axes(ahead)[pair[0]] @ axes[pair[1]]))
         start = (*self.start[m, number], side * (self.start[m, axis] - self._frames[m, axis]))
         key = (kind.start, tuple(drives), turned, tuple(round(float(each), 9) for each in start))
         near = self._frames[m, number]
@@ -324,7 +324,7 @@ class ParameterMaps:
         low, high = self.low[m, kind], self.high[m, kind]
         if np.any(self.reach(m)[TURNED] > 0.0):
             return float(low.min()) * np.eye(3), float(high.max()) * np.eye(3)
-        axes = own_axes(self._frames[m, TURNED])
+        axes = mount_axes(self._frames[m, TURNED])
         return np.asarray(axes.T @ np.diag(low) @ axes), np.asarray(axes.T @ np.diag(high) @ axes)
 
     def places(self) -> tuple[PlaceTerm, ...]:
@@ -344,7 +344,7 @@ class ParameterMaps:
         return tuple(places)
 
 
-def own_axes(angles: Array) -> Array:
+def mount_axes(angles: Array) -> Array:
     """Return the own axes of a mount as rows, shape (3, 3) (E2)."""
     return np.array(turned_axes(NUMBERS, angles.tolist()))
 

@@ -92,7 +92,7 @@ def spring_bound(
     try:
         with bounds_ahead() as ahead:
             relaxation = SdpRelaxation(with_default_sampling(problem), value, room, near, ahead)
-            if not relaxation.most_boxes or not relaxation.is_sampled_fully:
+            if not relaxation.max_boxes or not relaxation.is_sampled_fully:
                 return BoxResult(0.0, 0)
             # straight for the value, but where a box shows little of it
             shares: tuple[float, ...]
@@ -101,7 +101,7 @@ def spring_bound(
             elif relaxation.has_loose_mean:
                 shares, maximum = (*FIRST, *LEVELS), FEW_RELAXED
             else:
-                shares, maximum = (OF_MANY, 0.0) if of_many else (0.0,), relaxation.most_boxes
+                shares, maximum = (OF_MANY, 0.0) if of_many else (0.0,), relaxation.max_boxes
             maximum = 1 if root_only else problem.search.boxes_or(maximum)
             return _prove_levels(relaxation, room, shares, maximum, known)
     except np.linalg.LinAlgError:

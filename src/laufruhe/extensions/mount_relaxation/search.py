@@ -175,7 +175,7 @@ class SdpRelaxation:
         return plain and all(query.is_sampled_fully for _, query in self._terms)
 
     @property
-    def most_boxes(self) -> int:
+    def max_boxes(self) -> int:
         """Return the number of boxes that take some tens of seconds."""
         parts = [order.part for variables in self._variables for variable in variables for order in variable.orders]
         cost = sum((1 + self.basis.count + 2 * self._parts[k].products) ** EFFORT for k in parts)

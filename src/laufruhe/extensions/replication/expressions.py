@@ -87,15 +87,15 @@ def check(text: str, known: Mapping[str, Sequence[Any]], cases: Collection[str])
     called = {id(node.func) for node in nodes if isinstance(node, ast.Call)}
     for node in nodes:
         if isinstance(node, ast.Name) and id(node) not in called:
-            check_among(node.id, {*CONSTANTS, *known}, "name")
+            check_name(node.id, {*CONSTANTS, *known}, "name")
         elif isinstance(node, ast.Subscript):
             place = node.slice
             for case in known.get(place.id, ()) if isinstance(place, ast.Name) else [getattr(place, "value", None)]:
                 if isinstance(case, str):
-                    check_among(case, cases, "case")
+                    check_name(case, cases, "case")
 
 
-def check_among(name: str, known: Collection[str], what: str) -> None:
+def check_name(name: str, known: Collection[str], what: str) -> None:
     """Check that a name exists.
 
     Raises
@@ -143,7 +143,7 @@ def _read(text: str) -> tuple[tuple[ast.AST, ...], CodeType]:
             nodes = tuple(ast.walk(tree.body))
             for node in nodes:
                 if isinstance(node, ast.Call):
-                    check_among(ast.unparse(node.func), FUNCTIONS, "function")
+                    check_name(ast.unparse(node.func), FUNCTIONS, "function")
                 if not _is_allowed(node):
                     rule = f"'{ast.unparse(node)}' is not allowed here"
                     raise ExpressionError(f"{rule}; use numbers, names and functions alone")

@@ -19,7 +19,7 @@ from laufruhe.extensions.replication.expressions import (
     ExpressionError,
     Place,
     check,
-    check_among,
+    check_name,
     checks_in,
     fill_in,
     filler,
@@ -28,7 +28,7 @@ from laufruhe.extensions.replication.expressions import (
 )
 from laufruhe.extensions.replication.judging import count_confirmed, judge_statements, rows
 from laufruhe.extensions.replication.models import PictureTable, ReplicaCase, StatementTable
-from laufruhe.extensions.replication.quantities import DIMENSIONS, AskedTable, check_quantity, quantity_value
+from laufruhe.extensions.replication.quantities import DIMENSIONS, QuantityQuery, check_quantity, quantity_value
 from laufruhe.files import fields as f
 from laufruhe.files.study_tables import joined
 from laufruhe.present.picture import Picture
@@ -51,7 +51,7 @@ class Replication(Part):
     problems: dict[str, dict[str, Any]] = f.optional(
         "Tables of problem files, numbers in braces; `like` names one to start from.", {}
     )
-    quantities: dict[str, str | AskedTable] = f.optional("What is computed for every case, by name.", {})
+    quantities: dict[str, str | QuantityQuery] = f.optional("What is computed for every case, by name.", {})
     define: dict[str, str] = f.optional("Expressions that several others use.", {})
     statements: list[StatementTable] = Field(default_factory=list)
     picture_: PictureTable | None = Field(default=None, alias="picture")
@@ -73,7 +73,7 @@ class Replication(Part):
         """Yield place, value and check of everything that is looked up."""
         for reading, numbers in self.readings.items():
             for name in numbers:
-                yield ("readings", reading), name, partial(check_among, known=self.numbers, what="number")
+                yield ("readings", reading), name, partial(check_name, known=self.numbers, what="number")
         for name, what in self.quantities.items():
             yield ("quantities", name), what, check_quantity
         cases = [case.name for case in self.cases]
@@ -85,7 +85,7 @@ class Replication(Part):
         places = [*DIMENSIONS, *(name for case in self.cases for name in case.sweep)]
         yield from checks_in(self.picture_, known, cases, places, ("picture",))
 
-    def each_reading(self) -> list[Part]:
+    def by_reading(self) -> list[Part]:
         """Return this part, which shows all readings side by side."""
         return [self]
 
@@ -206,7 +206,7 @@ class _Cases(dict[str, Any]):
     """Values of a quantity by case."""
 
     def __missing__(self, name: str) -> Any:
-        check_among(name, self, "case")
+        check_name(name, self, "case")
 
 
 def _by_case(data: xr.Dataset, name: str) -> _Cases:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from laufruhe.extensions.replication.expressions import check_among
+from laufruhe.extensions.replication.expressions import check_name
 from laufruhe.files import fields as f
 from laufruhe.files.measures import QuantityTable, Scene
 from laufruhe.numerics.spectrum import order_amplitude
@@ -39,7 +39,7 @@ DIMENSIONS = (
 """Along which quantities may lie."""
 
 
-class AskedTable(QuantityTable):
+class QuantityQuery(QuantityTable):
     """A quantity of every case, narrowed."""
 
     quantity: str
@@ -53,7 +53,7 @@ class Labelled(NamedTuple):
     coords: dict[str, list[Any]]
 
 
-def check_quantity(what: str | AskedTable) -> None:
+def check_quantity(what: str | QuantityQuery) -> None:
     """Check that a quantity exists.
 
     Raises
@@ -63,10 +63,10 @@ def check_quantity(what: str | AskedTable) -> None:
     """
     name = what if isinstance(what, str) else what.quantity
     if not name.startswith(DECISION):
-        check_among(name, [*RESULTS, *MEASURES], "quantity")
+        check_name(name, [*RESULTS, *MEASURES], "quantity")
 
 
-def quantity_value(result: Result, what: str | AskedTable) -> Labelled:
+def quantity_value(result: Result, what: str | QuantityQuery) -> Labelled:
     """Return a quantity of a case's design [SI].
 
     Raises
@@ -74,7 +74,7 @@ def quantity_value(result: Result, what: str | AskedTable) -> Labelled:
     ModelError
         If this engine has none of it.
     """
-    table = AskedTable(quantity=what) if isinstance(what, str) else what
+    table = QuantityQuery(quantity=what) if isinstance(what, str) else what
     name = table.quantity
     if name in RESULTS:
         return RESULTS[name](result, table)
@@ -86,7 +86,7 @@ def quantity_value(result: Result, what: str | AskedTable) -> Labelled:
     return Labelled(found, {"number": list(range(1, len(found) + 1))}) if len(found) > 1 else Labelled(found[0], {})
 
 
-def _signal(result: Result, _: AskedTable) -> Labelled:
+def _signal(result: Result, _: QuantityQuery) -> Labelled:
     values = samples_of(result.final, 0)[:, :, 1:]
     turns = result.final.engine.cycle.turns
     angle = (360.0 * turns * np.arange(len(values)) / len(values)).tolist()
@@ -94,7 +94,7 @@ def _signal(result: Result, _: AskedTable) -> Labelled:
     return Labelled(values.tolist(), {"angle": angle, "mount": names, "direction": ["lateral", "vertical"]})
 
 
-def _over_cycle(measure: Measure, result: Result, _: AskedTable) -> Labelled:
+def _over_cycle(measure: Measure, result: Result, _: QuantityQuery) -> Labelled:
     """Return a load over the cycle, place by place (C2); a single place has no label."""
     channel = measure.load
     values = samples_of(result.final, 0, channel)
@@ -109,38 +109,38 @@ def _over_cycle(measure: Measure, result: Result, _: AskedTable) -> Labelled:
     return Labelled(values.reshape([len(each) for each in labels.values()]).tolist(), labels)
 
 
-def _by_mount(measure: str, result: Result, _: AskedTable) -> Labelled:
+def _by_mount(measure: str, result: Result, _: QuantityQuery) -> Labelled:
     values = [getattr(one, measure) for one in measured(result.final, 0)]
     return Labelled(values, {"mount": result.final.mount_names})
 
 
-def _by_order(part: slice, result: Result, table: AskedTable) -> Labelled:
+def _by_order(part: slice, result: Result, table: QuantityQuery) -> Labelled:
     orders = table.orders or ORDERS
     wrench = result.final.loads[0].wrench
     return Labelled([float(order_amplitude(wrench.at(order)[part])) for order in orders], {"order": list(orders)})
 
 
-def _turning(part: slice, result: Result, table: AskedTable) -> Labelled:
+def _turning(part: slice, result: Result, table: QuantityQuery) -> Labelled:
     orders = table.orders or ORDERS
     values = [list(turning_amplitudes(*result.final.loads[0].wrench.at(order)[part][-2:])) for order in orders]
     return Labelled(values, {"order": list(orders), "turns": ["with the crank", "against the crank"]})
 
 
-def _bound(result: Result, _: AskedTable) -> Labelled:
+def _bound(result: Result, _: QuantityQuery) -> Labelled:
     return Labelled(result.certificate.lower_bound if result.certificate else math.nan, {})
 
 
-def _intervals(result: Result, _: AskedTable) -> Labelled:
+def _intervals(result: Result, _: QuantityQuery) -> Labelled:
     values = [math.degrees(angle) for angle in result.final.engine.firing_intervals]
     return Labelled(values, {"firing": list(range(1, len(values) + 1))})
 
 
-def _energy(result: Result, _: AskedTable) -> Labelled:
+def _energy(result: Result, _: QuantityQuery) -> Labelled:
     energy = mounting_in(result.final.engine).modes.energy
     return Labelled(energy.tolist(), {"motion": list(MOTIONS), "mode": list(range(1, 7))})
 
 
-RESULTS: Mapping[str, Callable[[Result, AskedTable], Labelled]] = {
+RESULTS: Mapping[str, Callable[[Result, QuantityQuery], Labelled]] = {
     "mount forces": _signal,
     "mean force by mount": partial(_by_mount, "mean"),
     "maximum force by mount": partial(_by_mount, "max"),

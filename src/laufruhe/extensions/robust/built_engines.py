@@ -19,7 +19,7 @@ from laufruhe.load_models.batch import by_feature
 from laufruhe.numerics.arrays import Array
 from laufruhe.numerics.batch_norms import BatchNorm
 from laufruhe.problem.evaluation import Evaluation, evaluate, limit_samples, objective_value, over
-from laufruhe.problem.measure import Limit, Measure, bends_of
+from laufruhe.problem.measure import Limit, Measure, kinks_of
 from laufruhe.problem.problem import Problem
 from laufruhe.problem.sets import Value
 from laufruhe.solvers.conclusion import KEPT
@@ -57,7 +57,7 @@ class BuiltEngines:
         bends = None
         if measure.is_load:
             signals = over(drawn.engine.cycle.base_order, drawn.signals(measure.load))
-            bends = bends_of(measure, signals, drawn.engine)
+            bends = kinks_of(measure, signals, drawn.engine)
         rows = [each.rows(measure, finer * self.samples, bends) for each in self._built]
         bare = rows[0].vectors
         slope = np.stack([each.vectors - bare for each in rows[1:]], axis=-1) if rows[1:] else bare[..., None][..., :0]

@@ -30,7 +30,7 @@ from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, key_path, measured
 from laufruhe.files.csv_rows import rows_of
 from laufruhe.files.fields import Table
-from laufruhe.files.problem_file import Given, Key, Note
+from laufruhe.files.problem_file import ExtensionContext, Key, Note
 from laufruhe.files.rotors import name_of_unbalance
 from laufruhe.machine import Engine, Rotor
 from laufruhe.machine.rotor import grade_of, permitted_unbalance
@@ -351,7 +351,7 @@ class AssemblyTable(Table):
     mass_unit: str = f.optional("Unit of the masses in these files.", "g")
 
 
-def _assembly(table: AssemblyTable, problem: Problem, given: Given) -> Problem:
+def _assembly(table: AssemblyTable, problem: Problem, given: ExtensionContext) -> Problem:
     """Return the problem with the lots of the files beside its file."""
     engine = problem.engine
     if given.file.geared_inertias:
@@ -381,7 +381,7 @@ def _assembly(table: AssemblyTable, problem: Problem, given: Given) -> Problem:
     return replace(problem, extras=(*problem.extras, Assembly(tuple(lots))))
 
 
-def _unchanged(_: Table, problem: Problem, __: Given) -> Problem:
+def _unchanged(_: Table, problem: Problem, __: ExtensionContext) -> Problem:
     return problem
 
 

@@ -83,8 +83,10 @@ def _beside(found: AssemblyResult, unit: str) -> str:
     middle, maximum = (figure(found.quantiles[int(share * (len(found.quantiles) - 1))], unit) for share in (0.5, 0.95))
     told = f"Of {found.assemblies:,.0f} assemblies; {found.random} of them at random"
     worst, mean = figure(found.worst, unit), figure(found.mean_parts, unit)
-    return f"{told}: half above {middle}, one of twenty above {maximum}, the worst {worst}. "
+    return (
+        f"{told}: half above {middle}, one of twenty above {maximum}, the worst {worst}. "
         f"With parts of mean mass {mean}."
+    )
 
 
 def _tolerance_record(result: Result) -> dict[str, Any]:

@@ -37,6 +37,6 @@ def run_point(result: Result) -> OperatingPoint:
     return point_of(run_of(result), result.problem.points)
 
 
-def shown_runs(result: Result, design: Evaluation) -> tuple[RunUp, RunUp]:
+def runs_of_design(result: Result, design: Evaluation) -> tuple[RunUp, RunUp]:
     """Up and down, of one of the designs of a result."""
     return runs_of(design.engine, run_point(result), design.fidelity, run_of(result))

@@ -8,7 +8,7 @@ from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, nearest
 from laufruhe.files.fields import Table
-from laufruhe.files.problem_file import Given, Key
+from laufruhe.files.problem_file import ExtensionContext, Key
 from laufruhe.machine.dynamic import FluidTrack
 from laufruhe.machine.mount import every_spring
 from laufruhe.problem.problem import Problem
@@ -25,7 +25,7 @@ class RunUpTable(Table):
     )
 
 
-def _read(table: RunUpTable, problem: Problem, __: Given) -> Problem:
+def _read(table: RunUpTable, problem: Problem, __: ExtensionContext) -> Problem:
     """Return the problem of an engine that is run up and shut down."""
     engine, points = problem.engine, [point.name for point in problem.points]
     if engine.block is None:

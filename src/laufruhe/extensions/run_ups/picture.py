@@ -7,7 +7,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from laufruhe.extensions.run_ups.channels import FORCE, TRAVEL, TWIST
-from laufruhe.extensions.run_ups.facts import run_of, run_point, runs_up, shown_runs
+from laufruhe.extensions.run_ups.facts import run_of, run_point, runs_of_design, runs_up
 from laufruhe.plots.speed_axis import LIMIT, limits_on
 from laufruhe.plots.style import entry, finish_page, page, series_of, styled
 from laufruhe.plots.words import INK
@@ -28,7 +28,7 @@ def figure(result: Result) -> Figure:
     run, factors = run_of(result), [readable(channel.unit)[1] for _, channel in _ROWS]
     maximum, legend = [0.0] * len(_ROWS), []
     for one in series_of(result):
-        runs = shown_runs(result, one.design)
+        runs = runs_of_design(result, one.design)
         for envelope, (style, _) in zip(runs, _RUNS, strict=True):
             for k, values in enumerate((envelope.force, envelope.travel, envelope.twist)):
                 drawn.panels[k].plot(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from laufruhe.extensions.run_ups.facts import run_of, run_point, runs_up, shown_runs
+from laufruhe.extensions.run_ups.facts import run_of, run_point, runs_of_design, runs_up
 from laufruhe.extensions.run_ups.machine import Run
 from laufruhe.present.measures import designs_with_loads, has_loads
 from laufruhe.present.numbers import RPM, figure
@@ -23,7 +23,7 @@ def _tables(result: Result) -> list[Table]:
     # run-up and shut-down, where the problem says how these go
     if result.problem.engine.extra(Run) is None:
         return []
-    run, (up, down) = run_of(result), shown_runs(result, result.final)
+    run, (up, down) = run_of(result), runs_of_design(result, result.final)
     rows = tuple(
         (name, f"{time:g} s", figure(envelope.worst_force, "N"), figure(envelope.worst_travel, "m"),
          figure(envelope.worst_twist, "rad"))
@@ -43,7 +43,7 @@ def _record(result: Result) -> dict[str, Any]:
             "twist": envelope.worst_twist,
         }
         for way, time, envelope in zip(
-            ("up", "down"), (run.up, run.down), shown_runs(result, result.final), strict=True
+            ("up", "down"), (run.up, run.down), runs_of_design(result, result.final), strict=True
         )
     }
     return {"up_to": run.speed, "point": run_point(result).name, **maximum}
@@ -53,7 +53,7 @@ def _over_speed(result: Result) -> Table:
     rows = [
         [design, way, RPM * speed, force, travel, math.degrees(twist)]
         for design, evaluation in designs_with_loads(result).items()
-        for way, run in zip(("run-up", "shut-down"), shown_runs(result, evaluation), strict=True)
+        for way, run in zip(("run-up", "shut-down"), runs_of_design(result, evaluation), strict=True)
         for speed, force, travel, twist in np.column_stack([run.speeds, run.force, run.travel, run.twist]).tolist()
     ]
     return Table(

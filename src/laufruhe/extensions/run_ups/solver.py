@@ -22,7 +22,7 @@ from laufruhe.problem.measure import Limit, Term
 from laufruhe.problem.problem import Phasing, Problem
 from laufruhe.solvers.conclusion import broken_limits, quoted, with_limits
 from laufruhe.solvers.result import Result, Status
-from laufruhe.solvers.stars.phasing_solver import even_stars, solve_each_order
+from laufruhe.solvers.stars.phasing_solver import even_stars, solve_every_order
 
 _LINEAR = frozenset({Kind.UNBALANCE, Kind.SHARE})
 _SMOOTH = frozenset({Kind.UNBALANCE, Kind.STIFFNESS, Kind.MOUNT})
@@ -96,4 +96,4 @@ def _designed(
 def _of_stars(problem: Problem, phasing: Phasing, decide: Decide) -> Result | None:
     if phasing.continuous or not all(math.isinf(spring.stop_gap) for _, spring in every_spring(problem.engine.mounts)):
         return None
-    return solve_each_order(problem, phasing, even_stars(phasing), lambda own, _: decide(replace(own, phasing=None)))
+    return solve_every_order(problem, phasing, even_stars(phasing), lambda own, _: decide(replace(own, phasing=None)))

@@ -17,7 +17,7 @@ from laufruhe.extensions.served_page.claims import (
     Simplification,
     breaks_words,
     conflict_claim,
-    given_claim,
+    initial_claim,
     preview_claim,
     settled_claim,
 )
@@ -145,7 +145,7 @@ def follow(source: Source, state: PageState) -> dict[str, Any]:
     limits = scene.standing(problem.limits, design, followed)
     value = objective_value(scene.problem, design) if scene.problem.objective else None
     if followed is None:
-        claim = given_claim(state.position, scene.problem, value, limits)
+        claim = initial_claim(state.position, scene.problem, value, limits)
     elif followed.conflict:
         claim = conflict_claim(state.position, followed.conflict, simpler)
     else:

@@ -136,7 +136,7 @@ def preview_claim(
     return Claim(kind, position, lead, words, value, f"the estimate{simpler.phrase}", breaks_words(limits))
 
 
-def given_claim(position: int, problem: Problem, value: float | None, limits: Iterable[LimitValue]) -> Claim:
+def initial_claim(position: int, problem: Problem, value: float | None, limits: Iterable[LimitValue]) -> Claim:
     """Return the claim about the design as given, where nothing follows sliders."""
     if value is None or not math.isfinite(value):
         words = "No objective" if value is None else "The design as given stands on a resonance"

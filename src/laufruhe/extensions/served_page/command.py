@@ -10,7 +10,7 @@ from typer.models import CommandInfo
 
 from laufruhe.cli.options import examples
 from laufruhe.cli.screen import above_zero, exit_statuses
-from laufruhe.errors import check_whole, printed, refused
+from laufruhe.errors import check_integer, printed, refused
 
 LARGEST_PORT = 65535
 ON_DISK = "Problem file (TOML)."
@@ -40,7 +40,7 @@ def page(
             rule, remedy = "is standard input, and a page watches its file", "save it, and name the file"
             raise refused("PROBLEM", "-", rule, remedy)
         if port is not None:
-            check_whole("--port", port, 1, LARGEST_PORT)
+            check_integer("--port", port, 1, LARGEST_PORT)
         seconds = above_zero("--time-limit", time_limit, "60")
         ends = None if ends_after is None else above_zero("--for", ends_after, "60")
         served = Page(problem, port, seconds)

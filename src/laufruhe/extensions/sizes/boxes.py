@@ -104,7 +104,7 @@ class SizeBoxes:
         start = self.model.problem.engine.slider_cranks[0].rod_length
         masks = self.model.fixed_rows(measure)
         self.is_whole = self.is_whole and all(rows.all() for rows in masks)
-        series = rod_series(self.model.whole_pieces(measure), start, *self.model.rod_span, masks)
+        series = rod_series(self.model.pieces_over_length(measure), start, *self.model.rod_span, masks)
         return Number(measure, sense, self._ways(factors), tuple(map(Bundle, series)))
 
     def _ways(self, numbers: Callable[[Array], Array]) -> Ways:

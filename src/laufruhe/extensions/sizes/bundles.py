@@ -52,7 +52,7 @@ class SizeReach(NamedTuple):
 Ways: TypeAlias = Array
 
 
-def least_of(nodes: Array, terms: Array, rest: Array, reach: SizeReach) -> Array:
+def minimum_of(nodes: Array, terms: Array, rest: Array, reach: SizeReach) -> Array:
     """Return the least of functions on a box, shape (t,): their first two terms at its ends, less bounds of the others.
 
     Parameters
@@ -93,7 +93,7 @@ class Bundle:
 
     def minimum(self, reach: SizeReach) -> float:
         """Return a lower bound of the norm on a box."""
-        values = least_of(self.nodes, self.lengths.terms(*reach.rod), self.lengths.rest, reach)
+        values = minimum_of(self.nodes, self.lengths.terms(*reach.rod), self.lengths.rest, reach)
         return max(float(values.max(initial=0.0)), 0.0)
 
 

@@ -28,7 +28,7 @@ from laufruhe.files.bearings import MainBearingTable, one_by_one
 from laufruhe.files.complaints import Refused, blamed_on
 from laufruhe.files.engine import EngineTable
 from laufruhe.files.fields import Open, Table
-from laufruhe.files.problem_file import Given, Key
+from laufruhe.files.problem_file import ExtensionContext, Key
 from laufruhe.files.rotors import check_factors
 from laufruhe.machine import CRANKSHAFT, Bearing, SliderCrank
 from laufruhe.machine.layouts import Throw
@@ -145,7 +145,7 @@ def _opened(
             yield f"running_gear.{name}.{key}", (name, key), getattr(part, key)
 
 
-def _read(table: RunningGearTable | None, problem: Problem, given: Given) -> Problem:
+def _read(table: RunningGearTable | None, problem: Problem, given: ExtensionContext) -> Problem:
     engine, throws = problem.engine, [throw for throw in given.throws if throw.shaft == CRANKSHAFT]
     decisions = _decisions(table, given.engine, one_by_one(given.file.main_bearings, given.throws), engine.bearings)
     if decisions and table is not None and table.density is not None:

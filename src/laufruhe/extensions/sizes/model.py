@@ -24,7 +24,7 @@ from laufruhe.numerics.arrays import Array, Mask
 from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.problem.decision import Decision, Kind, domains_of, ends_of, vector_of
 from laufruhe.problem.evaluation import Evaluation, evaluate, over
-from laufruhe.problem.measure import Measure, Rows, bends_of, load_rows, mass_rows
+from laufruhe.problem.measure import Measure, Rows, kinks_of, load_rows, mass_rows
 from laufruhe.problem.problem import Problem
 
 MASSES, MOST_KEPT = 4, 4096
@@ -141,14 +141,14 @@ class SizeModel:
         samples = self.problem.fidelity.samples
         return samples * (max(math.ceil(FINE / samples), 1) if self._averages(measure) else measure.norm.refinement)
 
-    def whole_pieces(self, measure: Measure) -> Callable[[float], tuple[Piece, ...]]:
+    def pieces_over_length(self, measure: Measure) -> Callable[[float], tuple[Piece, ...]]:
         """Return a function from a length of the rod to the pieces of a measure, with the same rows at each."""
         length = self._sizes_given[ROD_LENGTH]
         if not measure.is_load:
             return lambda at: self._cut_up(measure, at)
         base = self.problem.engine.cycle.base_order
         signals = over(base, self._each_alone(length)[0].signals(measure.load))
-        bends = bends_of(measure, signals, self.problem.engine)
+        bends = kinks_of(measure, signals, self.problem.engine)
         return lambda at: self._cut_up(measure, at, bends)
 
     def fixed_rows(self, measure: Measure) -> list[Mask]:
@@ -159,14 +159,14 @@ class SizeModel:
         ValueError
             If a load has other bends at another length.
         """
-        pieces = self.whole_pieces(measure)(self._sizes_given[ROD_LENGTH])
+        pieces = self.pieces_over_length(measure)(self._sizes_given[ROD_LENGTH])
         if not measure.is_load:
             return [np.ones(len(piece.affine.constant), dtype=bool) for piece in pieces]
         start, low, high = self._sizes_given[ROD_LENGTH], *self.rod_span
         lengths = [start, *np.linspace(low, high, BETWEEN)]
         base = self.problem.engine.cycle.base_order
         signals = [over(base, self._each_alone(float(at))[0].signals(measure.load)) for at in lengths]
-        bends = bends_of(measure, signals[0], self.problem.engine)
+        bends = kinks_of(measure, signals[0], self.problem.engine)
         steps = self._steps(measure)
         masks = [
             _unswept(
@@ -231,7 +231,7 @@ class SizeModel:
         base = problem.engine.cycle.base_order
         steps = self._steps(measure)
         signals: list[list[Spectrum]] = [over(base, count.signals(channel)) for count in evaluations]
-        bends = bends_of(measure, signals[0], problem.engine) if bends_at is None else bends_at
+        bends = kinks_of(measure, signals[0], problem.engine) if bends_at is None else bends_at
         if self._averages(measure):
             signals = [[signal.averaged(signal.period / steps) for signal in count] for count in signals]
         rows = [load_rows(measure, problem.points, signal, problem.engine, steps, bends) for signal in signals]

@@ -14,7 +14,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from laufruhe.extensions.sizes.bundles import Grouped, Number, SizeReach, corner, least_of
+from laufruhe.extensions.sizes.bundles import Grouped, Number, SizeReach, corner, minimum_of
 from laufruhe.extensions.sizes.model import MASSES, SizeModel
 from laufruhe.load_models.affine import AffineNorm, AffineProblem
 from laufruhe.machine import Engine
@@ -139,7 +139,7 @@ class SizePrograms:
                 rest = rest + group.price * maximum * group.lengths.rest
                 terms = group.lengths.terms(*reach.rod)
         total[:, 0] -= known.constant
-        value = float(least_of(total[None], terms, rest, reach)[0])
+        value = float(minimum_of(total[None], terms, rest, reach)[0])
         if known.excludes:
             return math.inf if value > ROUNDING * known.size else 0.0
         return value

@@ -97,7 +97,7 @@ def solve_sizes(problem: Problem, known: float = math.inf) -> Result:
     best = _proposed(program)
     boxes: SizeBoxes | None = None
     with suppress(ValueError):
-        boxes = SizeBoxes(model, ask_cones)
+        boxes = SizeBoxes(model, solve_cone_program)
 
     def bounded(value: float, room: float, design: Design) -> BoxResult:
         usual = MOST_WITH_ROD if model.moves_rod else MOST_PROGRAMS if model.domains else MOST_BOXES
@@ -137,7 +137,7 @@ def _proposed(program: SizeProgram) -> Array:
     return min(best, program.balanced(program.columns(best)[program.sized]), key=program.rank)
 
 
-def ask_cones(program: AffineProblem, exactly: bool = False) -> tuple[Array | None, Multipliers]:
+def solve_cone_program(program: AffineProblem, exactly: bool = False) -> tuple[Array | None, Multipliers]:
     """A program's decision vector and dual rows, at few angles, or at as many as tell all but all."""
     steps = MANY_STEPS if exactly else FEW_STEPS
     fewer = replace(

@@ -13,7 +13,7 @@ from laufruhe.extensions.sizes.solver import solve_sizes
 from laufruhe.problem.problem import Problem
 from laufruhe.solvers.result import Result
 from laufruhe.solvers.stars.families import families_of
-from laufruhe.solvers.stars.phasing_solver import even_stars, solve_each_order
+from laufruhe.solvers.stars.phasing_solver import even_stars, solve_every_order
 from laufruhe.solvers.stars.star_results import no_star
 from laufruhe.solvers.throws.throw_starts import why_none_fires
 
@@ -42,5 +42,5 @@ def solve_star_sizes(problem: Problem) -> Result:
     stars = even_stars(phasing)
     if not stars:
         return no_star(problem, why_none_fires(phasing)[0])
-    result = solve_each_order(problem, phasing, stars, solve_sizes)
+    result = solve_every_order(problem, phasing, stars, solve_sizes)
     return replace(result, timing={**result.timing, "phasing": time.perf_counter() - started})

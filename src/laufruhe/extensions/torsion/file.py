@@ -13,9 +13,9 @@ from laufruhe import units
 from laufruhe.extensions.torsion.machine import STEEL, TORSION, Absorber, Disc, Section, Torsion, stiffness_of
 from laufruhe.files import fields as f
 from laufruhe.files.complaints import Refused, blamed_on, nearest, one_of
-from laufruhe.files.fields import Name, Number, OneOrEach, Open, Table
+from laufruhe.files.fields import ListOrSingle, Name, Number, Open, Table
 from laufruhe.files.nested import Place
-from laufruhe.files.problem_file import Given, Key
+from laufruhe.files.problem_file import ExtensionContext, Key
 from laufruhe.machine import CRANKSHAFT, SliderCrank
 from laufruhe.machine.layouts import Throw
 from laufruhe.physics.torque import reduced_inertia
@@ -28,12 +28,12 @@ T = TypeVar("T")
 MOST_DISCS = 60
 # share by which the inertia of discs may differ from what is given of all that turns: numbers are written rounded
 _ROUNDED = 0.01
-Inertias: TypeAlias = Annotated[list[float], OneOrEach(Annotated[float, Number("kg m^2", minimum=0.0)])]
+Inertias: TypeAlias = Annotated[list[float], ListOrSingle(Annotated[float, Number("kg m^2", minimum=0.0)])]
 TorsionalDamping: TypeAlias = Annotated[float, Number("N m s/rad", minimum=0.0)]
-TorsionalDampings: TypeAlias = Annotated[list[float], OneOrEach(TorsionalDamping)]
+TorsionalDampings: TypeAlias = Annotated[list[float], ListOrSingle(TorsionalDamping)]
 OpenTorsionalStiffness: TypeAlias = Annotated[float | Open, Number("N m/rad", above=0.0, openable=True)]
 OpenTorsionalDamping: TypeAlias = Annotated[float | Open, Number("N m s/rad", minimum=0.0, openable=True)]
-TorsionalStiffnesses: TypeAlias = Annotated[list[float | Open], OneOrEach(OpenTorsionalStiffness)]
+TorsionalStiffnesses: TypeAlias = Annotated[list[float | Open], ListOrSingle(OpenTorsionalStiffness)]
 
 
 class PieceTable(Table):
@@ -123,7 +123,7 @@ class _Opened:
         return number.start
 
 
-def _read(table: TorsionTable, problem: Problem, given: Given) -> Problem:
+def _read(table: TorsionTable, problem: Problem, given: ExtensionContext) -> Problem:
     chain, decisions = _chain(table, problem.engine.slider_cranks, given.throws)
     _check_inertia(chain, decisions, problem, "fidelity.crank_inertia" if given.file.flywheel is None else "flywheel")
     return replace(problem, engine=problem.engine.with_extra(chain), decisions=(*problem.decisions, *decisions))

@@ -43,7 +43,7 @@ SPACING = Key(
 
 
 @dataclass(frozen=True)
-class Asked:
+class LayoutInput:
     """Engine description that a layout is given.
 
     Attributes
@@ -133,14 +133,14 @@ class LayoutKind(ABC):
         Parameters
         ----------
         own
-            As in `Asked`.
+            As in `LayoutInput`.
         shared
             What [engine] says of all mechanisms: `rotating_mass` and `big_end`.
         """
         raise NotImplementedError(f"layout '{self.name}' has pistons")
 
     @abstractmethod
-    def place(self, asked: Asked) -> Layout:
+    def place(self, inputs: LayoutInput) -> Layout:
         """Return places, banks and pins.
 
         Raises
@@ -150,7 +150,7 @@ class LayoutKind(ABC):
         """
 
     def parts(
-        self, asked: Asked, layout: Layout, throws: Sequence[float]
+        self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
         """Return the slider-cranks and the throws that they work on."""
-        return build(asked.cycle, layout, asked.mechanism, throws, asked.firing_order)
+        return build(inputs.cycle, layout, inputs.mechanism, throws, inputs.firing_order)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from laufruhe.errors import KeyedError
-from laufruhe.machine.layouts.base import SPACING, Asked, LayoutKind
+from laufruhe.machine.layouts.base import SPACING, LayoutInput, LayoutKind
 from laufruhe.machine.layouts.places import Layout, check_even, stations
 from laufruhe.machine.layouts.vee import STAGGER
 
@@ -37,8 +37,12 @@ class Boxer(LayoutKind):
     keys = (SPACING, STAGGER)
     banks = 2
 
-    def place(self, asked: Asked) -> Layout:
+    def place(self, inputs: LayoutInput) -> Layout:
         """Banks at 180 degrees."""
-        if asked.own["bank_stagger"] is None:
+        if inputs.own["bank_stagger"] is None:
             raise KeyedError("bank_stagger", "is missing; add the distance between opposed cylinders")
-        return boxer(asked.cylinders, asked.spacing(asked.cylinders // self.banks), asked.own["bank_stagger"])
+        return boxer(
+            inputs.cylinders,
+            inputs.spacing(inputs.cylinders // self.banks),
+            inputs.own["bank_stagger"],
+        )

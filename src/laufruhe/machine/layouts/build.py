@@ -131,18 +131,18 @@ def even_throws(cycle: Cycle, layout: Layout, firing_order: Sequence[int]) -> tu
         If cylinders on one throw ask for two different angles.
     """
     step = Fraction(cycle.turns, len(firing_order))
-    asked: dict[int, Turn] = {}
+    inputs: dict[int, Turn] = {}
     for place, number in enumerate(firing_order):
         k = number - 1
-        turn = (layout.own_turn(k) - place * step) % 1
-        first = asked.setdefault(layout.pins[k], turn)
+        turn = (layout.dead_centre_turn(k) - place * step) % 1
+        first = inputs.setdefault(layout.pins[k], turn)
         if abs(math.remainder(float(first - turn), 1.0)) > SAME_TURN:
             raise ModelError(
                 f"firing order {list(firing_order)} cannot be even with these pins and banks: cylinder {number} "
                 f"wants its throw at {math.degrees(angle_of(turn)):.6g} deg, another on it at "
                 f"{math.degrees(angle_of(first)):.6g} deg; give the throws"
             )
-    return tuple(angle_of(asked[pin]) for pin in range(len(layout.throw_positions)))
+    return tuple(angle_of(inputs[pin]) for pin in range(len(layout.throw_positions)))
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from fractions import Fraction
 from laufruhe import units
 from laufruhe.errors import KeyedError, ModelError
 from laufruhe.machine.engine import Cycle
-from laufruhe.machine.layouts.base import SPACING, Asked, Key, LayoutKind
+from laufruhe.machine.layouts.base import SPACING, Key, LayoutInput, LayoutKind
 from laufruhe.machine.layouts.build import Throw
 from laufruhe.machine.layouts.places import Layout, stations
 from laufruhe.machine.rotor import CRANKSHAFT, Shaft
@@ -95,60 +95,60 @@ class Delta(LayoutKind):
     banks = 3
     fires_evenly = True
 
-    def place(self, asked: Asked) -> Layout:
+    def place(self, inputs: LayoutInput) -> Layout:
         """Return rows by the throws of the lower crank, banks by the dead centres of their first pistons."""
-        rows, rest = divmod(asked.cylinders, 3)
+        rows, rest = divmod(inputs.cylinders, 3)
         if rest:
-            raise KeyedError("cylinders", "is no multiple of the 3 of a row; give one that is", str(asked.cylinders))
-        triangle, places = self._triangle(asked), stations(rows, asked.spacing(rows))
+            raise KeyedError("cylinders", "is no multiple of the 3 of a row; give one that is", str(inputs.cylinders))
+        triangle, places = self._triangle(inputs), stations(rows, inputs.spacing(rows))
         turns = [angle_of(within(triangle.centre(bank, bank), 1)) for bank in range(3)]
         return Layout(
             "delta",
             places * 3,
             tuple(turn for turn in turns for _ in places),
             tuple(range(rows)) * 3,
-            (0.0,) * asked.cylinders,
+            (0.0,) * inputs.cylinders,
             places,
         )
 
-    def _triangle(self, asked: Asked) -> Triangle:
-        if asked.own["crank_distance"] is None:
+    def _triangle(self, inputs: LayoutInput) -> Triangle:
+        if inputs.own["crank_distance"] is None:
             raise KeyedError("crank_distance", "is missing; add the distance between two cranks")
-        if asked.cycle is not Cycle.TWO_STROKE:
+        if inputs.cycle is not Cycle.TWO_STROKE:
             rule = 'has ports in a triangle of cranks, which work every turn; write "two-stroke"'
-            raise KeyedError("cycle", rule, str(asked.cycle))
-        if asked.mechanism.offset:
+            raise KeyedError("cycle", rule, str(inputs.cycle))
+        if inputs.mechanism.offset:
             rule = "means nothing for pistons on one axis; leave it out"
-            raise KeyedError("offset", rule, units.shown(asked.mechanism.offset, "m"))
-        reversed_one = asked.own["reversed_crank"] or 0
+            raise KeyedError("offset", rule, units.shown(inputs.mechanism.offset, "m"))
+        reversed_one = inputs.own["reversed_crank"] or 0
         if reversed_one > 3:
             raise KeyedError("reversed_crank", "is no crank of a triangle; give 1, 2 or 3", str(reversed_one))
         ratios = _RATIOS[reversed_one]
-        given = asked.own["crank_leads"]
+        given = inputs.own["crank_leads"]
         if given is not None and len(given) != 2:
             raise KeyedError("crank_leads", f"has {len(given)} angles; give those of two banks, the third follows")
         first, second = map(as_turn, given) if given is not None else (equal_lead(ratios),) * 2
-        return Triangle(asked.own["crank_distance"], ratios, (first, second, closing_lead(ratios, first, second)))
+        return Triangle(inputs.own["crank_distance"], ratios, (first, second, closing_lead(ratios, first, second)))
 
     def parts(
-        self, asked: Asked, layout: Layout, throws: Sequence[float]
+        self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
         """Return the pistons at the first corners of the banks, then at the second, and the throws of all cranks."""
-        triangle, mechanism = self._triangle(asked), asked.mechanism
+        triangle, mechanism = self._triangle(inputs), inputs.mechanism
         found: list[SliderCrank] = []
         cranks: list[Throw] = []
         for turned in (0, 1):
             for bank in range(3):
                 corner = (bank + turned) % 3
                 for row, x in enumerate(layout.throw_positions):
-                    found.append(_piston(triangle, corner, bank, x, throws[row], asked, len(found) + 1))
+                    found.append(_piston(triangle, corner, bank, x, throws[row], inputs, len(found) + 1))
         for shaft in triangle.shafts:
             for x in layout.throw_positions:
                 own = tuple(k for k, part in enumerate(found) if part.shaft == shaft and part.x == x)
                 angle = found[own[0]].throw
                 unbalance = mechanism.rotating_mass * mechanism.crank_radius * cis(as_turn(angle))
                 cranks.append(Throw(x, angle, own, unbalance, shaft))
-        _check_order(asked.firing_order, found[: asked.cylinders])
+        _check_order(inputs.firing_order, found[: inputs.cylinders])
         return tuple(found), tuple(cranks)
 
 
@@ -162,11 +162,11 @@ def _check_order(order: Sequence[int] | None, firsts: Sequence[SliderCrank]) -> 
 
 
 def _piston(
-    triangle: Triangle, corner: int, bank: int, x: float, throw: float, asked: Asked, number: int
+    triangle: Triangle, corner: int, bank: int, x: float, throw: float, inputs: LayoutInput, number: int
 ) -> SliderCrank:
     shaft = triangle.shafts[corner]
     centre = within(triangle.centre(corner, bank) - as_turn(throw), 1)
     axis = triangle.axis(corner, bank)
     angle = within(axis - triangle.ratios[corner] * centre, 1)
     angles = (angle_of(angle), angle_of(within(axis, 1)), angle_of(centre))
-    return asked.mechanism.cylinder(number, x, *angles, shaft=shaft)
+    return inputs.mechanism.cylinder(number, x, *angles, shaft=shaft)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from laufruhe.machine.layouts.base import Asked, LayoutKind
+from laufruhe.machine.layouts.base import LayoutInput, LayoutKind
 from laufruhe.machine.layouts.places import Layout, stations
 
 
@@ -21,6 +21,6 @@ class Inline(LayoutKind):
     name = "inline"
     openable: ClassVar[tuple[str, ...]] = ("throws", "firing_order")
 
-    def place(self, asked: Asked) -> Layout:
+    def place(self, inputs: LayoutInput) -> Layout:
         """Return a single upright bank."""
-        return inline(asked.cylinders, asked.spacing(asked.cylinders))
+        return inline(inputs.cylinders, inputs.spacing(inputs.cylinders))

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from laufruhe import units
 from laufruhe.errors import KeyedError, ModelError
-from laufruhe.machine.layouts.base import SPACING, Asked, Key
+from laufruhe.machine.layouts.base import SPACING, Key, LayoutInput
 from laufruhe.machine.layouts.build import Throw
 from laufruhe.machine.layouts.inline import Inline
 from laufruhe.machine.layouts.places import Layout
@@ -78,25 +78,25 @@ class OpposedPiston(Inline):
     openable = ()
 
     def parts(
-        self, asked: Asked, layout: Layout, throws: Sequence[float]
+        self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
         """Return the lower pistons, then the upper ones, and the throws of both cranks."""
-        lower, cranks = super().parts(asked, layout, throws)
-        distance, lead = asked.own["crank_distance"], asked.own["crank_lead"]
+        lower, cranks = super().parts(inputs, layout, throws)
+        distance, lead = inputs.own["crank_distance"], inputs.own["crank_lead"]
         if distance is None:
             raise KeyedError("crank_distance", "is missing; add the distance between the two cranks")
-        ports = asked.own["port_arc"]
+        ports = inputs.own["port_arc"]
         if ports is not None and abs(lead) >= ports:
             rule = f"is beyond the ports, which are open for {units.shown(ports, 'rad')} and never together"
             raise KeyedError("crank_lead", f"{rule}; lessen it", units.shown(lead, "rad"))
-        if asked.mechanism.offset:
+        if inputs.mechanism.offset:
             rule = "means nothing for pistons on one axis; leave it out"
-            raise KeyedError("offset", rule, units.shown(asked.mechanism.offset, "m"))
-        crank = Shaft("second crankshaft", float(asked.own["crank_ratio"] or -1), 0.0, distance)
-        upper = facing_pistons(lower, crank, lead, asked.mechanism.rotating_mass)
-        own = asked.own["second_reciprocating_mass"]
+            raise KeyedError("offset", rule, units.shown(inputs.mechanism.offset, "m"))
+        crank = Shaft("second crankshaft", float(inputs.own["crank_ratio"] or -1), 0.0, distance)
+        upper = facing_pistons(lower, crank, lead, inputs.mechanism.rotating_mass)
+        own = inputs.own["second_reciprocating_mass"]
         if own is not None:
-            heavier = own - asked.piston_mass
+            heavier = own - inputs.piston_mass
             upper = tuple(replace(part, reciprocating_mass=part.reciprocating_mass + heavier) for part in upper)
         above = tuple(Throw(p.x, p.throw, (len(lower) + k,), shaft=crank) for k, p in enumerate(upper))
         return (*lower, *upper), (*cranks, *above)

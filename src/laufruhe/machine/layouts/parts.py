@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from laufruhe.errors import ModelError, counted
-from laufruhe.machine.layouts.base import Asked, LayoutKind
+from laufruhe.machine.layouts.base import LayoutInput, LayoutKind
 from laufruhe.machine.layouts.places import Layout
 
 
@@ -15,6 +15,6 @@ class Parts(LayoutKind):
     lists = ("slider_cranks", "shafts")
     is_free = True
 
-    def place(self, asked: Asked) -> Layout:
+    def place(self, inputs: LayoutInput) -> Layout:
         """Refuse: the list gives every place."""
-        raise ModelError(f"a list of {counted(asked.cylinders, 'slider-crank')} has no layout; fix the throws")
+        raise ModelError(f"a list of {counted(inputs.cylinders, 'slider-crank')} has no layout; fix the throws")

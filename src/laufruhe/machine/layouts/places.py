@@ -42,14 +42,14 @@ class Layout:
     late: tuple[float, ...] = ()
     throws: tuple[float, ...] | None = None
 
-    def own_turn(self, k: int) -> Turn:
+    def dead_centre_turn(self, k: int) -> Turn:
         """Return the crank angle of alpha = 0 of cylinder k with its throw at zero, in turns (C5)."""
         return as_turn(self.banks[k]) - as_turn(self.pin_offsets[k])
 
     def dead_centre(self, throws: Sequence[float], k: int) -> Turn:
         """Return the crank angle of cylinder k's dead centre, in turns (C5)."""
         late = as_turn(self.late[k]) if self.late else 0
-        return self.own_turn(k) - as_turn(throws[self.pins[k]]) + late
+        return self.dead_centre_turn(k) - as_turn(throws[self.pins[k]]) + late
 
     @property
     def spread(self) -> float:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields, replace
 
 from laufruhe.errors import KeyedError, ModelError, counted
 from laufruhe.machine.articulated import ArticulatedCrank, Knuckle
-from laufruhe.machine.layouts.base import Asked, Key, LayoutKind, rod_of
+from laufruhe.machine.layouts.base import Key, LayoutInput, LayoutKind, rod_of
 from laufruhe.machine.layouts.build import Mechanism, Throw, build, numbers_of
 from laufruhe.machine.layouts.places import Layout
 from laufruhe.machine.slider_crank import SliderCrank
@@ -104,11 +104,11 @@ class Radial(LayoutKind):
     openable = ("firing_order",)
     needs_rod = True
 
-    def place(self, asked: Asked) -> Layout:
+    def place(self, inputs: LayoutInput) -> Layout:
         """Return cylinders at equal angles around one throw; phi = 0 is the true dead centre of cylinder 1 (C5)."""
-        count = asked.cylinders
+        count = inputs.cylinders
         banks, none = _banks(count), (0.0,) * count
-        rods = _master_rod(asked)
+        rods = _master_rod(inputs)
         try:
             late = tuple(rods.cylinder(k + 1, 0.0, 0.0, banks[k], 0.0).fires_at for k in range(count))
         except KeyedError:
@@ -118,19 +118,19 @@ class Radial(LayoutKind):
         return Layout("radial", none, banks, (0,) * count, none, (0.0,), late=late, throws=(banks[0] + late[0],))
 
     def parts(
-        self, asked: Asked, layout: Layout, throws: Sequence[float]
+        self, inputs: LayoutInput, layout: Layout, throws: Sequence[float]
     ) -> tuple[tuple[SliderCrank, ...], tuple[Throw, ...]]:
         """Return the slider-cranks of master and articulated rods; on four strokes every second one fires."""
-        turns, count = asked.cycle.turns, asked.cylinders
+        turns, count = inputs.cycle.turns, inputs.cylinders
         order = [k + 1 for start in range(turns) for k in range(start, count, turns)]
-        return build(asked.cycle, layout, _master_rod(asked), throws, asked.firing_order or order)
+        return build(inputs.cycle, layout, _master_rod(inputs), throws, inputs.firing_order or order)
 
 
 def _banks(count: int) -> tuple[float, ...]:
     return tuple(math.tau * k / count for k in range(count))
 
 
-def _master_rod(asked: Asked) -> MasterRod:
+def _master_rod(inputs: LayoutInput) -> MasterRod:
     """Return the master rod that [engine] describes.
 
     Raises
@@ -138,15 +138,15 @@ def _master_rod(asked: Asked) -> MasterRod:
     KeyedError
         If it contradicts itself.
     """
-    own, count = asked.own, asked.cylinders
+    own, count = inputs.own, inputs.cylinders
     radius, master, given = own["knuckle_radius"], own["master_cylinder"] or 1, own["knuckle_angles"]
     if radius is None:
         raise KeyedError("knuckle_radius", "is missing; add it, 0 mm puts all rods on the crank pin")
-    if math.isinf(asked.mechanism.rod_length):
+    if math.isinf(inputs.mechanism.rod_length):
         raise KeyedError("rod_ratio", "makes a Scotch yoke, which has no master rod; give more", "0")
     if master > count:
         raise KeyedError("master_cylinder", f"is none of {count} cylinders; count them from 1", str(master))
-    if asked.rod is not None and own["articulated_rod"] is None:
+    if inputs.rod is not None and own["articulated_rod"] is None:
         raise KeyedError("articulated_rod", "is missing beside [engine.rod]; add it, or leave both out")
     banks = _banks(count)
     if given is not None and len(given) != count - 1:
@@ -155,13 +155,13 @@ def _master_rod(asked: Asked) -> MasterRod:
     even = [bank - banks[master - 1] for bank in banks]
     angles = even if given is None else [*given[: master - 1], 0.0, *given[master - 1 :]]
     return MasterRod(
-        **{shared.name: getattr(asked.mechanism, shared.name) for shared in fields(asked.mechanism)},
+        **{shared.name: getattr(inputs.mechanism, shared.name) for shared in fields(inputs.mechanism)},
         master=master,
         master_bank=banks[master - 1],
         knuckle_radius=radius,
         knuckle_angles=tuple(angles),
         length=own["articulated_rod_length"],
-        piston_mass=asked.piston_mass,
+        piston_mass=inputs.piston_mass,
         knuckle_mass=own["knuckle_mass"],
         rod=own["articulated_rod"],
     )

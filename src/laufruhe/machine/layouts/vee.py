@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from laufruhe.errors import KeyedError
-from laufruhe.machine.layouts.base import SPACING, Asked, Key, LayoutKind
+from laufruhe.machine.layouts.base import SPACING, Key, LayoutInput, LayoutKind
 from laufruhe.machine.layouts.places import Layout, check_even, stations
 
 STAGGER = Key("bank_stagger", "length")
@@ -55,10 +55,16 @@ class Vee(LayoutKind):
     cylinders_per_throw = 2
     banks = 2
 
-    def place(self, asked: Asked) -> Layout:
+    def place(self, inputs: LayoutInput) -> Layout:
         """Return two banks on shared or split pins."""
-        own = asked.own
+        own = inputs.own
         if own["bank_angle"] is None:
             raise KeyedError("bank_angle", "is missing; add the angle between the banks, or its bounds")
         split, stagger = own["split_pin_angle"] or 0.0, own["bank_stagger"] or 0.0
-        return vee(asked.cylinders, asked.spacing(asked.cylinders // self.banks), own["bank_angle"], split, stagger)
+        return vee(
+            inputs.cylinders,
+            inputs.spacing(inputs.cylinders // self.banks),
+            own["bank_angle"],
+            split,
+            stagger,
+        )

@@ -59,7 +59,7 @@ class PeakToPeak(Norm):
         balls = enclosing_balls(_signals(rows, grid.steps))
         if balls.radii.max(initial=0.0) > 0.0:
             largest = int(np.argmax(balls.radii))
-            at, shares = largest * grid.steps + balls.held[largest], balls.shares[largest]
+            at, shares = largest * grid.steps + balls.inside[largest], balls.shares[largest]
             along = (rows[at] - balls.centres[largest]) / balls.radii[largest]
             np.add.at(z, at, 2.0 * shares[:, None] * along)
         return z

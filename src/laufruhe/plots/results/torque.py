@@ -16,7 +16,7 @@ from laufruhe.numerics.spectrum import Spectrum
 from laufruhe.physics.torque import TorqueFacts, swing_of, torque_facts, torque_parts, turning_inertia
 from laufruhe.plots.style import GREEN, ORANGE, PALE, SKY, Series, entry, finish_page, page, series_of, styled
 from laufruhe.plots.words import FAINT, INK, SMALL, in_thousands, round_ticks
-from laufruhe.present.measures import asks_torque, has_loads
+from laufruhe.present.measures import has_loads, uses_torque
 from laufruhe.present.numbers import RPM, number
 from laufruhe.solvers.result import Result
 
@@ -31,7 +31,7 @@ _MEAN: Any = {"color": FAINT, "linewidth": 1.0, "linestyle": (0, (4, 1.6)), "zor
 
 def applies(result: Result) -> bool:
     """Return True if the result shows crankshaft torque and has loads."""
-    return asks_torque(result) and has_loads(result)
+    return uses_torque(result) and has_loads(result)
 
 
 @styled()

@@ -141,7 +141,7 @@ class LeadBoxes:
                 tilts[:, s] += [z.ravel() @ each.reshape(z.size, -1) for each in (flat, steep)]
                 if measure.is_load:
                     rests[s] += self._remainder(measure, s, led, z, middle, float(half[s]))
-        arcs = least_on_arcs(self.model.domains, self._ratios, half, under.gradient, slopes, tilts)
+        arcs = minimum_on_arcs(self.model.domains, self._ratios, half, under.gradient, slopes, tilts)
         value = under.constant + arcs - float(rests.sum())
         at_middle = under.constant + sum(domain.minimum(under.gradient) for domain in self.model.domains)
         excluded = False
@@ -188,7 +188,7 @@ class LeadBoxes:
         return _Rest(math.sqrt(square), np.concatenate(maximum), tuple(bends))
 
 
-def least_on_arcs(
+def minimum_on_arcs(
     domains: Sequence[Domain], ratios: Array, half: Array, gradient: Array, slopes: Array, tilts: Array
 ) -> float:
     """Return a lower bound of a function of leads and unbalances in a box of leads (P13).

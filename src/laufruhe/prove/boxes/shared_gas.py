@@ -172,8 +172,8 @@ class SharedGasBoxes:
                         raise ModelError(f"{part.shaft.name} and {other.shaft.name} {why}; fix one lead")
                     if led[1]:
                         found.append(part.name)
-        led_parts = (part for part in engine.slider_cranks if part.shaft.name in self._names)
-        for part in led_parts:
+        parts_with_leads = (part for part in engine.slider_cranks if part.shaft.name in self._names)
+        for part in parts_with_leads:
             if not any(part.faces(other) for other in engine.slider_cranks if other is not part):
                 why = "comes earlier with gas of its own beside chambers that are shared; fix its lead"
                 raise ModelError(f"{part.shaft.name} {why}")

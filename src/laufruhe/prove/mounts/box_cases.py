@@ -16,7 +16,7 @@ from laufruhe.physics.static_cases import Stops, case_wrench, stops_of
 from laufruhe.problem import channels
 from laufruhe.problem.channels import Channel, counted_cases
 from laufruhe.problem.measure import Measure
-from laufruhe.prove.mounts.box_norms import LinearBound, counted_rows, nothing_under
+from laufruhe.prove.mounts.box_norms import LinearBound, counted_rows, zero_bound
 from laufruhe.prove.mounts.box_response import BoxModel, LoadedOrders, is_travel
 from laufruhe.prove.mounts.box_series import Expansion, mapped, series
 
@@ -34,7 +34,7 @@ _AS_LOADS: Mapping[Channel, Channel] = {
 
 def static_loads(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> LinearBound:
     """Return a linear lower bound of the largest travel or force under load cases on every box (E60)."""
-    mounting, best = model.mounting(model.lower), nothing_under(lower)
+    mounting, best = model.mounting(model.lower), zero_bound(lower)
     every = stops_of(mounting)
     used = every.stiffness > 0.0
     # in coordinates with unit mass
@@ -54,7 +54,7 @@ def _bound_case(
     stable = np.linalg.eigvalsh(soft)[:, 0] > 0.0
     matrices, soft = (np.where(stable[:, None, None], each, np.eye(6)) for each in (matrices, soft))
     travel = _equilibrium(matrices, stops, load) @ stops.rows.T
-    signs, best = np.sign(stops.beyond(travel)), nothing_under(lower)
+    signs, best = np.sign(stops.beyond(travel)), zero_bound(lower)
     for _ in range(2):
         bound, reach = _with_stops(model, measure, stops, load, (centres, halves, matrices, soft, travel), signs)
         best = best.or_else(bound.where(stable))

@@ -53,7 +53,7 @@ class LinearBound:
         return LinearBound(*(getattr(first, part) + getattr(second, part) for part in PARTS))
 
 
-def nothing_under(lower: Array) -> LinearBound:
+def zero_bound(lower: Array) -> LinearBound:
     """Return the bound zero of a length, for boxes of this shape."""
     return LinearBound(np.zeros(len(lower)), np.zeros_like(lower), np.zeros(len(lower)), np.zeros_like(lower))
 
@@ -81,7 +81,7 @@ def norm_under(problem: Problem, quantity: Measure, answer: LinearResponse, line
     points = [p for p in np.flatnonzero(share > 0.0) if np.any(lines.points == p)]
     by_point = [_sampled(quantity, answer, lines, int(p)) for p in points]
     if not by_point:
-        return nothing_under(np.zeros((len(answer.slopes), answer.slopes.shape[2])))
+        return zero_bound(np.zeros((len(answer.slopes), answer.slopes.shape[2])))
     if not quantity.norm.sums_lengths:
         best = np.argmax([bound.value for bound in by_point], axis=0)
         pick = np.arange(len(best))

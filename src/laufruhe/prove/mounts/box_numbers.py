@@ -17,7 +17,7 @@ from laufruhe.problem.measure import Limit, Measure
 from laufruhe.prove.mounts.box_cases import static_loads
 from laufruhe.prove.mounts.box_norms import LinearBound
 from laufruhe.prove.mounts.box_response import BoxModel
-from laufruhe.prove.mounts.box_shares import most_shares, shortfall
+from laufruhe.prove.mounts.box_shares import maximum_shares, shortfall
 from laufruhe.prove.mounts.ranges import SLACK
 
 
@@ -75,7 +75,7 @@ RANGES: Mapping[Channel, Ranges] = {
     ),
     channels.TORQUE_ROLL: lambda *at: (axis_residual(*at), math.inf),
     channels.RAW_TORQUE_ROLL: lambda *at: (axis_residual(*at), math.inf),
-    channels.DECOUPLING: lambda *at: (-math.inf, most_shares(*at).min(axis=0)),
+    channels.DECOUPLING: lambda *at: (-math.inf, maximum_shares(*at).min(axis=0)),
     channels.STATIC_TRAVEL: lambda *at: (static_loads(*at).minimum, math.inf),
     channels.STATIC_FORCE: lambda *at: (static_loads(*at).minimum, math.inf),
     channels.DECOUPLING_SHORTFALL: lambda *at: (shortfall(*at), math.inf),

@@ -110,7 +110,7 @@ def _rounding(squares: Array) -> Array:
     return np.asarray(ROUNDING * np.abs(squares[:, -1, None, None]))
 
 
-def most_shares(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
+def maximum_shares(model: BoxModel, measure: Measure, lower: Array, upper: Array) -> Array:
     """Return upper bounds of the largest share of each motion in a mode, shape (motions, boxes) (E7, E39)."""
     at = box_modes(model, lower, upper)
     return np.array([_shares(model, at, motion).maximum.max(axis=1) for motion in motion_indices(measure)])

@@ -73,7 +73,7 @@ def divided_bounds(
         Incumbent, to check bounds.
     """
     search = StiffnessBoxes(problem, LEFT_OUT * room, value - NEARLY * room if value < math.inf else math.inf)
-    maximum = search.most_boxes
+    maximum = search.max_boxes
     if maximum and search.is_sampled_fully:
         counts = [math.ceil(share * maximum) for share in shares]
         yield from divide_in_rounds(search, search.model.lower, search.model.upper, value, room, counts, known)
@@ -165,7 +165,7 @@ class StiffnessBoxes:
         return int(np.clip(MEMORY / (3.0 * self._cost), 2, 64))
 
     @property
-    def most_boxes(self) -> int:
+    def max_boxes(self) -> int:
         """Box budget: as requested, or for a few seconds."""
         few = len(self.problem.mount_decisions) <= MOST_OPEN
         return self.problem.search.boxes_or(int(min(WORK / self._cost, MOST_BOXES)) if few else 0)

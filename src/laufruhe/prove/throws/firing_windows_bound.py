@@ -54,7 +54,7 @@ def uneven_bound(
     images = StarSpace(space.phases, space.patterns, space.places, mirror=True, reflect=True)
     minimum = math.inf
     for block in images.blocks():
-        minimum = least_bound(costs, block, minimum)
+        minimum = minimum_bound(costs, block, minimum)
     return max(minimum, 0.0)
 
 
@@ -69,7 +69,7 @@ def steady_bound(problem: Problem) -> float:
     return total
 
 
-def least_bound(costs: Array, stars: Stars, known: float) -> float:
+def minimum_bound(costs: Array, stars: Stars, known: float) -> float:
     """Return the least of `star_bounds`, or what is known where that is less.
 
     Directions come a few at a time: a star that they hold over what another one has needs no further ones.

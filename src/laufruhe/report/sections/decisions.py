@@ -36,7 +36,7 @@ def _row(before: DecisionValue | None, d: DecisionValue, unit: str) -> tuple[str
     # the angle of a zero size is meaningless
     size = before if d.name.endswith(".angle") else None
     initial = DASH if size and not size.initial else with_unit(d.initial, d.unit)
-    if size and size.is_nothing:
+    if size and size.is_zero:
         return d.name, initial, DASH, bounds, DASH, DASH
     upper = abs(d.value - d.upper) <= abs(d.value - d.lower)
     mark = DASH if not d.at_bound else "upper" if upper else "lower"

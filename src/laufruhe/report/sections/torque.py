@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from laufruhe.physics.torque import TorqueFacts, torque_facts
-from laufruhe.present.measures import asks_torque
+from laufruhe.present.measures import uses_torque
 from laufruhe.present.numbers import DASH, number
 from laufruhe.present.tables import Table
 from laufruhe.solvers.result import Result
@@ -18,7 +18,7 @@ HEAD = ("at", "mean [N m]", "power [kW]", "least [N m]", "largest [N m]", "store
 def tables(result: Result) -> list[Table]:
     """Return a row per operating point, if the problem asks for torque or has a flywheel."""
     engine, problem = result.final.engine, result.problem
-    if not asks_torque(result):
+    if not uses_torque(result):
         return []
     facts = ((point.name, torque_facts(engine, point, problem.fidelity)) for point in problem.points)
     rows = tuple(_row(*pair) for pair in facts)

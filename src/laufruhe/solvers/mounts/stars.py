@@ -98,7 +98,7 @@ def solve_star_mounts(problem: Problem) -> Result:
 def _stars(problem: Problem, phasing: Phasing) -> tuple[list[Star], int]:
     """Return stars by their rank on the baseline mounts, and the number of all stars."""
     if phasing.throws is not None:
-        star = Candidate(phasing.throws, None, *phasing.least_geometry)
+        star = Candidate(phasing.throws, None, *phasing.minimum_geometry)
         sets = phasing.shafts.allowed
         return [(replace(star, left_out=phasing.without(built)), None) for built in sets], len(sets)
     if phasing.throw_bounds is not None:

@@ -23,7 +23,7 @@ SOFT = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class MountResponse:
     """Travel and force of the mounts, shape (3 mounts,)."""
 
     travel: Any
@@ -41,7 +41,7 @@ class StaticCases:
 
     def __init__(self, mounts: SymbolicMounts, mounting: ElasticMounting, root: Array, held: Gathered) -> None:
         self._mounts, self._mounting, self._root, self._held = mounts, mounting, root, held
-        self._stops, self._found = stops_of(mounting), dict[LoadCase, Held]()
+        self._stops, self._found = stops_of(mounting), dict[LoadCase, MountResponse]()
 
     def largest(self, measure: Measure, engine: Engine) -> Any:
         """A variable that no length of a measure exceeds, in units of what the mounts as given have (E22)."""
@@ -59,17 +59,17 @@ class StaticCases:
         named.hold(squares - top * top)
         return unit * top
 
-    def _symbols(self, case: LoadCase) -> Held:
+    def _symbols(self, case: LoadCase) -> MountResponse:
         if case not in self._found:
             self._found[case] = self._solved(case)
         return self._found[case]
 
-    def _solved(self, case: LoadCase) -> Held:
+    def _solved(self, case: LoadCase) -> MountResponse:
         mounts, load = self._mounts, self._root @ case_wrench(self._mounting.block, case)
         y, _ = elimination()(mounts.stiffness, ca.MX(6, 6), ca.DM(load), ca.DM.zeros(6))
         stops = np.flatnonzero(self._stops.stiffness)
         if not len(stops):
-            return Held(mounts.travels @ y, mounts.springs @ y)
+            return MountResponse(mounts.travels @ y, mounts.springs @ y)
         named, rows = self._held.named(case.name), stops.tolist()
         size = float(np.linalg.norm(np.linalg.solve(self._root.T, settled(self._mounting, case).motion)))
         y = size * named.free((y / size).T).T
@@ -78,7 +78,7 @@ class StaticCases:
         balance = mounts.stiffness @ y + own.T @ pushed - ca.DM(load)
         self._held.add(balance / float(np.linalg.norm(load)), 0.0, 0.0, "balance")
         directions = ca.DM(np.ascontiguousarray(self._stops.directions[:, stops]))
-        return Held(mounts.travels @ y, mounts.springs @ y + directions @ pushed)
+        return MountResponse(mounts.travels @ y, mounts.springs @ y + directions @ pushed)
 
 
 def _beyond(travel: Any, gaps: Array) -> Any:

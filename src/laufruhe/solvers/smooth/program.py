@@ -105,7 +105,7 @@ class SmoothProgram:
         self._simulated = SimulatedVariables(problem, ca.vertcat(self._d, self._u), self._held, coarser)
         self.unit = unit
         self._points: list[PointResponse] = []
-        if problem.asks_mounts:
+        if problem.uses_mounts:
             self._mounting = mounting_in(problem.engine)
             self._root = mass_root(self._mounting.block)
             self._mounts = symbolic_mounts(problem, self._mounting.block, self._d)

@@ -65,7 +65,7 @@ def solve_phasing(problem: Problem, search: Search = search_even) -> Result:
         return solve_alike_stars(problem, phasing, partial(solve_phasing, search=search))
     started = time.perf_counter()
     if phasing.throws is not None:
-        result = solve_each_order(problem, phasing, even_stars(phasing))
+        result = solve_every_order(problem, phasing, even_stars(phasing))
     elif phasing.throw_bounds is not None:
         result = _solve_uneven(problem, phasing, None)
     else:
@@ -84,7 +84,7 @@ def _solve_open_throws(problem: Problem, phasing: Phasing, search: Search) -> Re
     one_by_one = is_unlike or phasing.shares_throws or any(measure.is_cylinder_resolved for measure in problem.measures)
     if (problem.feels_order or is_unlike) and is_even and one_by_one:
         stars = even_stars(phasing)
-        result = solve_each_order(problem, phasing, stars) if stars else no_star(problem, why_none_fires(phasing)[0])
+        result = solve_every_order(problem, phasing, stars) if stars else no_star(problem, why_none_fires(phasing)[0])
         if not phasing.continuous:
             return result
         return _solve_uneven(problem, phasing, None if result.objective is None else result)
@@ -187,12 +187,12 @@ def _needed_shafts(problem: Problem, phasing: Phasing, best: EvenDesign) -> tupl
 def even_stars(phasing: Phasing) -> list[Star]:
     """Return throws as given, or all stars that fire evenly, images included."""
     if phasing.throws is not None:
-        return [(Candidate(phasing.throws, None, *phasing.least_geometry), None)]
+        return [(Candidate(phasing.throws, None, *phasing.minimum_geometry), None)]
     pairs = [(family, tuple(map(int, star))) for family in families_of(phasing)[0] for star in family.stars]
     return [(replace(family.candidate(phasing, steps), firing_order=None), steps) for family, steps in pairs]
 
 
-def solve_each_order(
+def solve_every_order(
     problem: Problem, phasing: Phasing, stars: Sequence[Star], decide: Decide = lambda own, _: solve_fixed(own),
     maximum: int | None = None,
 ) -> Result:  # fmt: skip

@@ -187,7 +187,7 @@ def ranked_orders(
 
 def why_no_order(phasing: Phasing, throws: Sequence[float]) -> str:
     """Return why throws as given [rad] have no firing order; empty where they have one."""
-    candidate = Candidate(tuple(throws), phasing.firing_order, *phasing.least_geometry)
+    candidate = Candidate(tuple(throws), phasing.firing_order, *phasing.minimum_geometry)
     if ranked_orders(phasing, candidate):
         return ""
     orders = ranked_orders(replace(phasing, intervals=Intervals(0.0, math.inf)), candidate)

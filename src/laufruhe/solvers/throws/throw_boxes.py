@@ -16,7 +16,7 @@ import numpy as np
 
 from laufruhe.errors import ModelError
 from laufruhe.load_models.affine import MOST_NUMBERS, AffineNorm, AffineProblem
-from laufruhe.load_models.star_model import in_few_rows
+from laufruhe.load_models.star_model import compress_rows
 from laufruhe.load_models.throw_waves import ThrowWaves, WaveNorm
 from laufruhe.machine.firing_windows import SLACK, FiringBounds, FiringWindow
 from laufruhe.numerics.arrays import Array
@@ -332,7 +332,7 @@ def compressed(norm: WaveNorm) -> WaveNorm:
         return WaveNorm(fewer, norm.waves[..., acts], norm.left_out)
     scaled = np.sqrt(fixed.grid.weights)[:, None]
     waves = norm.waves * scaled
-    rows = in_few_rows([fixed.constant * scaled, np.moveaxis(fixed.slope * scaled[..., None], -1, 0),
+    rows = compress_rows([fixed.constant * scaled, np.moveaxis(fixed.slope * scaled[..., None], -1, 0),
                        waves.real, waves.imag])  # fmt: skip
     if rows is None:
         return norm

@@ -236,7 +236,7 @@ class ThrowSearch(Search[_Part, _Best]):
         self._seen = self._tried = self._stood = 0
         self._best, self._not_met = _Best(best), set[str]()
         self.what = "boxes of throws" + (" and angles" if any(phasing.opened) else "")
-        throws = phasing.layout(*phasing.least_geometry).throw_positions
+        throws = phasing.layout(*phasing.minimum_geometry).throw_positions
         is_one_angle = sum(phasing.opened) == 1 and len(throws) == 1 and phasing.throw_bounds is None
         self._most_samples = MOST_OF_ONE_ANGLE if is_one_angle else MOST_SAMPLES
         tolerable = COST_OF_ONE_ANGLE if is_one_angle else STEPS_COST

@@ -103,7 +103,7 @@ def why_none_fires(phasing: Phasing) -> tuple[str, bool]:
 
 def _firing_patterns(phasing: Phasing) -> tuple[list[FiringPattern], bool]:
     """Return ways to fire, the most even first, and whether these are all."""
-    layout = phasing.layout(*phasing.least_geometry)
+    layout = phasing.layout(*phasing.minimum_geometry)
     first = [k for k, pin in enumerate(layout.pins) if pin == 0]
     low, high = (sum(pair) for pair in zip(phasing.bank or (0.0, 0.0), phasing.split or (0.0, 0.0), strict=True))
     slots = FiringSlots(
@@ -148,7 +148,7 @@ def _cranks_of_pattern(phasing: Phasing, pattern: FiringPattern, number: int) ->
     orders = _throw_orders(phasing, count, (_MOST_CRANKS if simple else _MOST_EVALUATED) // number**2)
     # a throw stands as far back as its first cylinder fires late (C5)
     firsts = np.array([pattern.moments[members[0]] for members in pattern.members])[orders]
-    throws = angle_of(layout.own_turn(0)) + firsts[:, :1] - firsts
+    throws = angle_of(layout.dead_centre_turn(0)) + firsts[:, :1] - firsts
     if simple is not None:
         values = simple.of_angles(layout.throw_positions, throws)
         best = np.argsort(values, kind="stable")[: 4 * _STARTS]
@@ -217,6 +217,6 @@ def turning_back(phasing: Phasing, candidate: Candidate) -> Candidate:
     order = [partners[k - 1] for k in reversed(candidate.firing_order or ())]
     throws = [-angle for angle in candidate.throws]
     # cylinder 1 at its dead centre when phi = 0 (C5)
-    shift = angle_of(layout.own_turn(0)) - throws[layout.pins[0]]
+    shift = angle_of(layout.dead_centre_turn(0)) - throws[layout.pins[0]]
     turned = tuple((angle + shift) % math.tau for angle in throws)
     return replace(candidate, throws=turned, firing_order=from_one(order) if order else None)

@@ -25,7 +25,7 @@ MOST_WINDOWS = 6_000
 
 def windows_of(problem: Problem, phasing: Phasing) -> list[FiringWindow] | None:
     """Return every way to fire within the bounds, one of images that are worth the same; None if there are too many."""
-    layout, allowed = phasing.layout(*phasing.least_geometry), phasing.intervals
+    layout, allowed = phasing.layout(*phasing.minimum_geometry), phasing.intervals
     firing = firing_bounds(phasing)
     is_free = allowed.minimum <= 0.0 and allowed.maximum >= phasing.cycle.angle
     if phasing.throw_bounds is not None and is_free and phasing.firing_order is None and not problem.feels_gas:
@@ -66,7 +66,7 @@ def _has_images(problem: Problem, phasing: Phasing) -> bool:
 
 def firing_bounds(phasing: Phasing) -> FiringBounds:
     """Return the bounds that firing has to keep."""
-    layout, allowed = phasing.layout(*phasing.least_geometry), phasing.intervals
+    layout, allowed = phasing.layout(*phasing.minimum_geometry), phasing.intervals
     return FiringBounds(
         phasing.cycle, layout, max(allowed.minimum, 0.0), allowed.maximum, phasing.throw_bounds, phasing.firing_order,
         tuple(p for p, is_open in zip((phasing.bank, phasing.split), phasing.opened, strict=True) if p and is_open),
@@ -75,7 +75,7 @@ def firing_bounds(phasing: Phasing) -> FiringBounds:
 
 def design_at(phasing: Phasing, angles: Array) -> Candidate:
     """Return throws, bank angle and split pins at the throws and shared angles of a box, without a firing order."""
-    layout = phasing.layout(*phasing.least_geometry)
+    layout = phasing.layout(*phasing.minimum_geometry)
     count = len(layout.throw_positions)
     shared = iter(angles[count:])
     geometry = [
@@ -92,7 +92,7 @@ def place_in(phasing: Phasing, window: FiringWindow, candidate: Candidate) -> Ar
     """Return throws and shared angles of a design as boxes of a window have them; None if it does not keep that."""
     if window.order and window.order != candidate.firing_order:
         return None
-    layout = phasing.layout(*phasing.least_geometry)
+    layout = phasing.layout(*phasing.minimum_geometry)
     geometry = (candidate.bank_angle, candidate.split_pin)
     shared = [float(angle or 0.0) for angle, is_open in zip(geometry, phasing.opened, strict=True) if is_open]
     turned = layout.side(0) * sum(shared) if phasing.throw_bounds is None else 0.0

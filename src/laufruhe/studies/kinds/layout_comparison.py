@@ -146,7 +146,7 @@ def _value(measure: Measure | InputError, design: Evaluation) -> float:
 
 
 def _least_flywheel(degree: float, design: Evaluation) -> float:
-    return max(swing_of(design.engine, at.point, design.fidelity).least_inertia(degree) for at in design.loads)
+    return max(swing_of(design.engine, at.point, design.fidelity).minimum_inertia(degree) for at in design.loads)
 
 
 def _ranking(data: xr.Dataset) -> list[Text]:
